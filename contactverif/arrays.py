@@ -1,0 +1,24 @@
+"""Types of the arrays that flow through the house, and how they are made read-only."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+Array = NDArray[Any]  # float64 or complex128: a residual takes and gives either
+
+UNIT_ROUNDOFF = 2.0**-53
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
+
+def frozen(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
+    """A contiguous read-only copy of `values` with the given dtype."""
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,139 @@
+"""A formulation on trial: the plugin behind a counter where every answer is checked before it is used.
+
+What a plugin may leave out is filled in here (no pairing, a loop instead of a batch), and what it breaks is raised as
+a `ContractError`; judging is for the properties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from contactverif.arrays import Array, FloatArray, frozen
+from contactverif.case import Case
+from contactverif.errors import ContractError, NonFiniteError, PluginError
+from contactverif.formulation import ContactPoints, Pairing, Traits
+from contactverif.interface import Interface
+
+OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
+
+
+class Subject:
+    """A factory of formulations, and the traits of what it makes.
+
+    Parameters
+    ----------
+    name : as on the command line, with options.
+    make : `make(penalty=…)` gives the formulation.
+
+    Raises
+    ------
+    PluginError, ContractError : if the factory raises, or what it makes has no `residual`.
+    """
+
+    def __init__(self, name: str, make: Callable[..., Any]) -> None:
+        self.name = name
+        self._make = make
+        plugin = _asked("make", make, penalty=1.0)
+        if not callable(getattr(plugin, "residual", None)):
+            raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`")
+        traits = getattr(plugin, "traits", Traits())
+        if not isinstance(traits, Traits):
+            raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.formulation.Traits")
+        self.traits: Traits = traits
+        self.provides = frozenset(part for part in OPTIONAL_PARTS if callable(getattr(plugin, part, None)))
+
+    def penalty(self, case: Case) -> float:
+        """The penalty in this formulation's own kind: ε̂ as it is, or ε̂ × the mean slave segment if nodal."""
+        if self.traits.penalty != "nodal":
+            return case.penalty
+        return case.penalty * float(case.interface.slave.lengths(case.interface.nodes).mean())
+
+    def on(self, case: Case) -> Guarded:
+        """The formulation with the penalty of the case."""
+        return self.with_penalty(self.penalty(case))
+
+    def with_penalty(self, penalty: float) -> Guarded:
+        """The formulation with a penalty in its own kind."""
+        return Guarded(_asked("make", self._make, penalty=penalty), self.traits, self.provides)
+
+
+class Guarded:
+    """One formulation; the four verbs of the contract, every answer checked.
+
+    Raises
+    ------
+    PluginError : from any verb, if the plugin raises.
+    ContractError : if an answer is of the wrong kind, shape or dtype, or a pairing holds what it must not.
+    NonFiniteError : if an answer holds NaN or infinity.
+    """
+
+    def __init__(self, plugin: Any, traits: Traits, provides: frozenset[str]) -> None:
+        self._plugin = plugin
+        self._traits = traits
+        self.provides = provides
+
+    def pair(self, interface: Interface, z: FloatArray) -> Pairing | None:
+        """The pairing at z (n_unknowns,), None where the plugin has none."""
+        if "pair" not in self.provides:
+            return None
+        answer = _asked("pair", self._plugin.pair, interface, frozen(z, np.float64))
+        pairing = answer if isinstance(answer, Pairing) else Pairing(answer)
+        pairing.check_bounds(interface)
+        return pairing
+
+    def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
+        """Forces (..., n_unknowns) at z (..., n_unknowns); a loop where the plugin does one state at a time."""
+        if z.ndim == 1 or self._traits.batched:
+            return self._residual(interface, pairing, z)
+        states = z.reshape(-1, z.shape[-1])
+        return np.stack([self._residual(interface, pairing, state) for state in states]).reshape(z.shape)
+
+    def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
+        forces = _asked("residual", self._plugin.residual, interface, pairing, frozen(z, z.dtype.type))
+        if not isinstance(forces, np.ndarray):
+            raise ContractError(f"residual: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
+        if forces.shape != z.shape:
+            raise ContractError(f"residual: returned shape {forces.shape}; needed {z.shape}, that of z")
+        if forces.dtype != z.dtype:
+            raise ContractError(f"residual: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
+        if not np.isfinite(forces).all():
+            raise NonFiniteError(f"residual: {_first_bad(forces)}")
+        return forces
+
+    def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
+        """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse array."""
+        tangent = _asked("tangent", self._plugin.tangent, interface, pairing, frozen(z, np.float64))
+        if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
+            raise ContractError(f"tangent: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
+        if tangent.shape != (z.size, z.size):
+            raise ContractError(f"tangent: returned shape {tangent.shape}; needed {(z.size, z.size)}")
+        if tangent.dtype != np.float64:
+            raise ContractError(f"tangent: returned dtype {tangent.dtype}; needed float64")
+        entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
+        if not np.isfinite(entries).all():
+            raise NonFiniteError(f"tangent: {_first_bad(entries)}")
+        return tangent
+
+    def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
+        """The points of contact at z (n_unknowns,)."""
+        points = _asked("contact_points", self._plugin.contact_points, interface, pairing, frozen(z, np.float64))
+        if not isinstance(points, ContactPoints):
+            raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
+        return points
+
+
+def _asked(verb: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """What the plugin answers; whatever it raises becomes a PluginError that says where."""
+    try:
+        return function(*arguments, **options)
+    except Exception as error:
+        raise PluginError(f"{verb}: {type(error).__name__}: {error}") from error
+
+
+def _first_bad(values: Array) -> str:
+    bad = np.flatnonzero(~np.isfinite(values).reshape(-1))
+    return f"{values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries"
