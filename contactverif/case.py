@@ -38,15 +38,23 @@ class Case:
     name: str = ""
 
     def __post_init__(self) -> None:
-        z = frozen(self.z, np.float64)
+        raw = np.asarray(self.z)
+        if raw.dtype.kind not in "fiu":
+            raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
+        z = frozen(raw, np.float64)
         if z.shape != (self.interface.n_unknowns,):
             raise MisuseError("z", f"shape {z.shape}", f"({self.interface.n_unknowns},): n_nodes × dim, flat")
         if not np.isfinite(z).all():
             raise MisuseError("z", "NaN or infinity", "finite positions")
-        if not (np.isfinite(self.penalty) and self.penalty > 0):
-            raise MisuseError("penalty", f"{self.penalty}", "a finite number > 0")
+        penalty = np.asarray(self.penalty)
+        if penalty.shape != () or penalty.dtype.kind not in "fiu" or not 0 < penalty < np.inf:
+            raise MisuseError("penalty", f"{self.penalty!r}", "a finite number > 0")
+        seed = np.asarray(self.seed)
+        if seed.shape != () or seed.dtype.kind not in "iu" or not 0 <= seed < 2**63:
+            raise MisuseError("seed", f"{self.seed!r}", "an integer from 0 to 2^63 − 1")
         object.__setattr__(self, "z", z)
         object.__setattr__(self, "penalty", float(self.penalty))
+        object.__setattr__(self, "seed", int(self.seed))
         parameters = {name: frozen(values, np.float64) for name, values in self.parameters.items()}
         object.__setattr__(self, "parameters", parameters)
 

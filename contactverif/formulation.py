@@ -57,6 +57,11 @@ class Pairing(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._arrays)
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pairing) and self.same_as(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
     def __repr__(self) -> str:
         return f"Pairing({', '.join(f'{name}{values.shape}' for name, values in self._arrays.items())})"
 
@@ -153,7 +158,10 @@ class ContactPoints:
         dtypes = {"slave_segment": np.int64, "master_segment": np.int64, "active": np.bool_}
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
         for entry in fields(self):
-            values: NDArray[Any] = frozen(getattr(self, entry.name), dtypes.get(entry.name, np.float64))
+            raw, dtype = np.asarray(getattr(self, entry.name)), dtypes.get(entry.name, np.float64)
+            if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # or 0.7 becomes segment 0
+                raise MisuseError(f"ContactPoints.{entry.name}", f"dtype {raw.dtype}", np.dtype(dtype).name)
+            values: NDArray[Any] = frozen(raw, dtype)
             wanted = 2 if entry.name in ("position", "normal") else 1
             if values.ndim != wanted or len(values) != n_points:
                 raise MisuseError(

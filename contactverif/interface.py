@@ -6,9 +6,10 @@ A `Surface` knows how segments hang together and nothing of positions; an `Inter
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from contactverif.arrays import FloatArray, IntArray, frozen
 from contactverif.errors import MisuseError
@@ -35,7 +36,7 @@ class Surface:
     chain_order: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        raw = np.asarray(self.segments)
+        raw = _array("segments", self.segments)
         if raw.ndim != 2 or raw.shape[1] != 2 or len(raw) == 0:
             raise MisuseError("segments", f"an array of shape {raw.shape}", "shape (n_segments, 2), n_segments ≥ 1")
         if not np.issubdtype(raw.dtype, np.integer):
@@ -99,7 +100,10 @@ class Interface:
     master: Surface
 
     def __post_init__(self) -> None:
-        raw = np.asarray(self.nodes)
+        for name, surface in (("slave", self.slave), ("master", self.master)):
+            if not isinstance(surface, Surface):
+                raise MisuseError(name, f"a {type(surface).__name__}", "a Surface")
+        raw = _array("nodes", self.nodes)
         if raw.ndim != 2 or raw.shape[1] != 2:
             raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
         if raw.dtype.kind not in "fiu":
@@ -129,7 +133,7 @@ class Interface:
     @classmethod
     def from_chains(cls, slave: ArrayLike, master: ArrayLike) -> Interface:
         """One open chain a side, through the points (n, 2) in walking order, the body on the left."""
-        points = [np.asarray(side, dtype=np.float64) for side in (slave, master)]
+        points = [_array(name, side) for name, side in (("slave", slave), ("master", master))]
         for name, side in zip(("slave", "master"), points, strict=True):
             if side.ndim != 2 or side.shape[1] != 2 or len(side) < 2:
                 raise MisuseError(name, f"an array of shape {side.shape}", "shape (n ≥ 2, 2), the points of a chain")
@@ -170,7 +174,14 @@ class Interface:
 
     def at(self, nodes: ArrayLike) -> Interface:
         """The same segments on other reference positions (n_nodes, dim)."""
-        return Interface(np.asarray(nodes, dtype=np.float64), self.slave, self.master)
+        return Interface(_array("nodes", nodes), self.slave, self.master)
+
+
+def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise MisuseError(argument, "rows of different lengths", "an array") from error
 
 
 def _neighbours(segments: IntArray) -> IntArray:

@@ -104,13 +104,23 @@ class Property:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What became of one case."""
+    """What became of one case.
+
+    Attributes
+    ----------
+    case : what was judged.
+    verdict, reason : how it came out, and why it is no pass.
+    measurement : the numbers, None where the plugin gave none.
+    seconds : spent measuring and judging.
+    breach : the plugin broke the contract or returned NaN: a failure that nobody can have promised.
+    """
 
     case: Case
     verdict: Verdict
     reason: str = ""
     measurement: Measurement | None = None
     seconds: float = 0.0
+    breach: bool = False
 
     @property
     def decided(self) -> bool:
@@ -119,8 +129,8 @@ class Outcome:
 
 
 def excess(quantity: Quantity, value: float, tolerance: float) -> float:
-    """How far the value is towards its tolerance: above 1 fails, infinite for NaN."""
-    if not isfinite(value):
+    """How far the value is towards its tolerance: above 1 fails, infinite where either is no finite number."""
+    if not (isfinite(value) and isfinite(tolerance)):
         return float("inf")
     top, bottom = (value, tolerance) if quantity.sense == "at most" else (tolerance, value)
     if bottom <= 0:
@@ -130,14 +140,20 @@ def excess(quantity: Quantity, value: float, tolerance: float) -> float:
 
 def judge(question: Property, measurement: Measurement) -> tuple[Verdict, str]:
     """The verdict on a measurement, with its reason where it is no pass."""
+    strangers = measurement.values.keys() - {quantity.name for quantity in question.quantities}
+    if strangers:
+        raise ValueError(f"{question.id} measured {sorted(strangers)}, which it does not declare as quantities")
     failures = []
-    for quantity in question.quantities:
-        if quantity.name not in measurement.values:
-            continue
-        value, tolerance = measurement.values[quantity.name], measurement.tolerances[quantity.name]
-        if not isfinite(value):
+    measured = [quantity for quantity in question.quantities if quantity.name in measurement.values]
+    for quantity in measured:
+        if not isfinite(value := measurement.values[quantity.name]):
             return Verdict.FAIL, f"{quantity.name} is {value}"
-        if excess(quantity, value, tolerance) > 1:
+    untold = ""
+    for quantity in measured:
+        value, tolerance = measurement.values[quantity.name], measurement.tolerances[quantity.name]
+        if not isfinite(tolerance):
+            untold = f"the tolerance of {quantity.name} is {tolerance}"
+        elif excess(quantity, value, tolerance) > 1:
             failures.append(f"{quantity.name} {value:.3g}, {quantity.sense} {tolerance:.3g}")
     if measurement.broken:
         failures.insert(0, measurement.broken)
@@ -145,4 +161,6 @@ def judge(question: Property, measurement: Measurement) -> tuple[Verdict, str]:
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
         return Verdict.FAIL, "; ".join(failures)
+    if untold:  # the judge's fault, not the formulation's: neither a pass nor an accusation
+        return Verdict.UNDECIDED, untold
     return Verdict.PASS, ""

@@ -47,10 +47,19 @@ class Row:
         return sum(outcome.decided for outcome in self.outcomes)
 
     @property
+    def breach(self) -> bool:
+        """Whether the contract was broken somewhere, which fails a run whatever was promised."""
+        return any(outcome.breach for outcome in (*self.outcomes, *((self.witness,) if self.witness else ())))
+
+    @property
     def unexpected(self) -> str:
         """Empty, or why this row makes the run fail."""
         if self.verdict is Verdict.CRASHED:
             return "" if self.known else "crashed"
+        if self.verdict is Verdict.FAIL and self.breach and not self.known:
+            return "breaks the contract"
+        if self.verdict is Verdict.NOT_PROVIDED and self.promise is True and not self.known:
+            return "promised, and not provided"
         if self.verdict is Verdict.NOT_JUDGED:
             return "not judged"
         if self.verdict is Verdict.FAIL and self.promise is True and not self.known:
@@ -64,7 +73,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NotLoaded:
-    """A formulation that could not be asked anything."""
+    """A formulation (or a property, under its id) that could not be loaded, and so was not asked anything."""
 
     formulation: str
     reason: str

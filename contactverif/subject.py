@@ -40,7 +40,7 @@ class Subject:
         plugin = _asked("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
             raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`")
-        traits = getattr(plugin, "traits", Traits())
+        traits = _asked("traits", getattr, plugin, "traits", Traits())
         if not isinstance(traits, Traits):
             raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.formulation.Traits")
         self.traits: Traits = traits
@@ -89,8 +89,10 @@ class Guarded:
         """Forces (..., n_unknowns) at z (..., n_unknowns); a loop where the plugin does one state at a time."""
         if z.ndim == 1 or self._traits.batched:
             return self._residual(interface, pairing, z)
-        states = z.reshape(-1, z.shape[-1])
-        return np.stack([self._residual(interface, pairing, state) for state in states]).reshape(z.shape)
+        forces = np.empty_like(z)
+        for index in np.ndindex(z.shape[:-1]):
+            forces[index] = self._residual(interface, pairing, z[index])
+        return forces
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         forces = _asked("residual", self._plugin.residual, interface, pairing, frozen(z, z.dtype.type))
@@ -102,10 +104,10 @@ class Guarded:
             raise ContractError(f"residual: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
         if not np.isfinite(forces).all():
             raise NonFiniteError(f"residual: {_first_bad(forces)}")
-        return forces
+        return forces.copy()  # the plugin may use its own array again
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
-        """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse array."""
+        """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse coo array."""
         tangent = _asked("tangent", self._plugin.tangent, interface, pairing, frozen(z, np.float64))
         if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
             raise ContractError(f"tangent: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
@@ -113,6 +115,7 @@ class Guarded:
             raise ContractError(f"tangent: returned shape {tangent.shape}; needed {(z.size, z.size)}")
         if tangent.dtype != np.float64:
             raise ContractError(f"tangent: returned dtype {tangent.dtype}; needed float64")
+        tangent = tangent.copy() if isinstance(tangent, np.ndarray) else tangent.tocoo(copy=True)
         entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
         if not np.isfinite(entries).all():
             raise NonFiniteError(f"tangent: {_first_bad(entries)}")
@@ -130,7 +133,7 @@ def _asked(verb: str, function: Callable[..., Any], *arguments: Any, **options: 
     """What the plugin answers; whatever it raises becomes a PluginError that says where."""
     try:
         return function(*arguments, **options)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PluginError(f"{verb}: {type(error).__name__}: {error}") from error
 
 

@@ -189,12 +189,13 @@ def vts_ppt_balanced(
     penalty, n, free_end, tau : as for `vts_ppt`; free_end is "cover" by default.
     """
     current = chosen("area", area, AREAS) == CURRENT
+    covers = free_end == "cover" or None  # else an overhang breaks the balance, and nothing is promised of it
     traits = replace(
         _PRINTED,
-        conserves_force=True,
-        conserves_moment=True,
+        conserves_force=covers,
+        conserves_moment=covers,
         area="current" if current else "reference",
-        continuity="C1",
+        continuity="C1" if covers else None,
         witnesses={},
     )
     return replace(

@@ -1,0 +1,255 @@
+"""The command line. It knows everything and is imported by nobody; what takes long to import is imported when asked."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from contactverif.errors import ContactverifError, MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.arrays import FloatArray
+    from contactverif.case import Case
+    from contactverif.interface import Interface
+    from contactverif.property import Property
+    from contactverif.subject import Subject
+
+app = typer.Typer(
+    help="Tells whether a contact formulation is right: random interfaces, exact answers, shrunk failures.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+PROFILE_HELP = "dev: 100 examples, a fresh seed. ci: 100 examples, seed 0. nightly: 2000 examples, a fresh seed."
+
+
+@app.command("list")
+def list_(
+    traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
+) -> None:
+    """List the installed formulations with what they promise, and the properties that ask for it."""
+    from contactverif.registry import load_formulations, load_properties
+    from contactverif.tables import formulations_table, properties_table, show
+
+    show(formulations_table(load_formulations(), every_trait=traits))
+    show(properties_table(load_properties()))
+
+
+@app.command()
+def verify(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.", metavar="NAME…"),
+    ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="Every installed formulation.")] = False,
+    properties: Annotated[
+        list[str] | None,
+        typer.Option("--property", "-p", help="Only properties whose id matches; repeatable.", metavar="GLOB"),
+    ] = None,
+    examples: Annotated[int | None, typer.Option(help="Random cases a property.", min=1)] = None,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", min=0)] = None,
+    profile: Annotated[str, typer.Option(help=PROFILE_HELP)] = "dev",
+    report: Annotated[Path | None, typer.Option(help="Write all that was found to this netCDF file.")] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Draw each counterexample into this folder.", metavar="FOLDER")
+    ] = None,
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="A failure that is known, with its reason; repeatable.", metavar="ID=REASON"),
+    ] = None,
+    mesh: Annotated[
+        Path | None, typer.Option(help="Ask on the interface of this mesh, with random states.", metavar="FILE")
+    ] = None,
+    slave: Annotated[
+        str | None, typer.Option(help="Physical group of line elements that is the slave.", metavar="TAG")
+    ] = None,
+    master: Annotated[
+        str | None, typer.Option(help="Physical group of line elements that is the master.", metavar="TAG")
+    ] = None,
+    flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's surfaces.")] = False,
+) -> None:
+    """Ask every property of a formulation; print a table, draw what failed, write a report.
+
+    Exit status 0: nothing failed that was promised, nothing passed that was said to fail, and every property was
+    judged. 1: otherwise. 2: something was asked that cannot be.
+
+    For example:  contactverif verify vts-ppt --report vts-ppt.nc
+                  contactverif verify nts -p 'patch.*' --seed 7
+                  contactverif verify mine --mesh punch.msh --slave punch --master base
+    """
+    from contactverif.progress import Bar
+    from contactverif.registry import load_formulation, load_properties
+    from contactverif.runner import run
+    from contactverif.tables import counterexample, run_table, show, summary
+    from contactverif_reports.draw import figure
+    from contactverif_reports.write import check_writable, write
+
+    names = _chosen(names or [], all_)
+    interface = _interface(mesh, slave, master, flip)
+    questions = load_properties(properties or ["*"])
+    subjects = [load_formulation(name) for name in names]
+    reasons = dict(_reason(text) for text in known or [])
+    if report is not None:
+        check_writable(report)
+    if pictures is not None:
+        _folder(pictures)
+    with Bar() as bar:
+        found = run(
+            subjects,
+            questions,
+            profile=profile,
+            examples=examples,
+            seed=seed,
+            interface=interface,
+            known=reasons,
+            progress=bar.told,
+        )
+    show(run_table(found))
+    for row in found.rows:
+        text = counterexample(row, report)
+        if text:
+            show(text)
+            if pictures is not None:
+                outcome = row.shrunk or row.witness
+                assert outcome is not None
+                path = pictures / f"{_file_name(row.formulation, row.question.id)}.png"
+                figure(outcome.case, path, title=f"{row.formulation}, {row.question.id}: {outcome.reason}")
+                typer.echo(f"    picture: {path}")
+    if report is not None:
+        write(found, report)
+        typer.echo(f"report: {report}")
+    show(summary(found))
+    raise typer.Exit(0 if found.passed else 1)
+
+
+@app.command()
+def replay(
+    report: Annotated[Path, typer.Argument(help="A report that `verify --report` wrote.")],
+    case: Annotated[
+        str | None, typer.Option(help="Id of a counterexample; without it the ids are listed.", metavar="ID")
+    ] = None,
+    formulation: Annotated[
+        str | None, typer.Option(help="Judge this formulation on the case instead of the one that failed.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the case to this file, .png or .svg.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Judge one stored counterexample again, with a picture. Exit status 1 if it fails again."""
+    from contactverif.property import Verdict
+    from contactverif.tables import replayed, show
+    from contactverif_reports.draw import as_text, figure
+    from contactverif_reports.read import case_ids, read_case
+
+    if case is None:
+        ids = case_ids(report)
+        typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
+        return
+    stored = read_case(report, case)
+    subject = _subject(formulation or stored.formulation)
+    question = _question(stored.property_id)
+    from contactverif.runner import judge_case
+
+    outcome = judge_case(question, stored.case, subject)
+    typer.echo(as_text(stored.case))
+    show(replayed(stored, subject.name, outcome))
+    if picture is not None:
+        forces = _forces(subject, stored.case)
+        figure(stored.case, picture, title=f"{subject.name}, {question.id}: {outcome.reason or 'pass'}", forces=forces)
+        typer.echo(f"picture: {picture}")
+    raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)
+
+
+def _chosen(names: list[str], every: bool) -> list[str]:
+    from contactverif.registry import formulation_names
+
+    if every and names:
+        raise MisuseError("NAME…", f"{', '.join(names)} and --all", "one of the two")
+    if every:
+        return list(formulation_names())
+    if not names:
+        raise MisuseError("NAME…", "nothing", f"--all, or some of {', '.join(formulation_names())}")
+    return names
+
+
+def _interface(mesh: Path | None, slave: str | None, master: str | None, flip: bool) -> Interface | None:
+    from contactverif.mesh import read_interface
+
+    if mesh is None:
+        for option, value in (("--slave", slave), ("--master", master), ("--flip", flip or None)):
+            if value is not None:
+                raise MisuseError("--mesh", f"none, but {option}", "--mesh FILE, which the tags belong to")
+        return None
+    if slave is None or master is None:
+        missing = "--slave" if slave is None else "--master"
+        raise MisuseError(missing, "nothing", f"{missing} TAG, a physical group of line elements of {mesh}")
+    return read_interface(mesh, slave=slave, master=master, flip=flip)
+
+
+def _reason(text: str) -> tuple[str, str]:
+    property_id, equals, reason = text.partition("=")
+    if not (property_id and equals and reason):
+        raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
+    return property_id, reason
+
+
+def _folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MisuseError("--pictures", f"{path} ({error.strerror})", "a folder that can be written") from None
+
+
+def _file_name(formulation: str, property_id: str) -> str:
+    from contactverif_reports.schema import case_id
+
+    return case_id(formulation, property_id)
+
+
+def _subject(name: str) -> Subject:
+    from contactverif.registry import load_formulation
+    from contactverif.result import NotLoaded
+
+    subject = load_formulation(name)
+    if isinstance(subject, NotLoaded):
+        raise MisuseError("formulation", f"{name}, which does not load ({subject.reason})", "one that loads")
+    return subject
+
+
+def _question(property_id: str) -> Property:
+    from contactverif.registry import load_properties
+    from contactverif.result import NotLoaded
+
+    (question,) = load_properties([property_id])
+    if isinstance(question, NotLoaded):
+        raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
+    return question
+
+
+def _forces(subject: Subject, case: Case) -> FloatArray | None:
+    """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none."""
+    from contactverif.errors import ContractError
+
+    formulation = subject.on(case)
+    try:
+        forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+    except ContractError:
+        return None
+    return -forces.reshape(case.interface.nodes.shape)
+
+
+def main() -> None:
+    """The command `contactverif`: a user's mistake is one line and exit status 2, never a traceback."""
+    try:
+        app()
+    except ContactverifError as error:
+        typer.echo(f"contactverif: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("contactverif: stopped; no report was written", err=True)
+        sys.exit(130)

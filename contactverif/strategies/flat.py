@@ -1,0 +1,91 @@
+"""Flat interfaces under uniform penetration: what the patch test is asked on.
+
+Each slave chain lies wholly over one master chain; ends may coincide. Meshes match or not, neighbours' lengths differ
+by up to 2^20, and up to 100 master segments lie under one slave segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import cycle
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.arrays import FloatArray
+from contactverif.case import Case
+from contactverif.interface import Interface
+from contactverif.strategies import given_interface
+from contactverif.strategies.panels import Panel, assembled, shortest
+from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds
+
+MOST_MASTER_SEGMENTS = 100  # in one chain
+_DEPTHS = st.integers(1, 8)  # quarters
+_REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # master lengths × 2^-this
+
+
+def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Uniform penetration; every slave point projects inside the master.
+
+    Parameters
+    ----------
+    interface : random meshes if None; else states of this one, moved along its normal.
+
+    Returns
+    -------
+    Strategy of cases with the parameters "penetration" (|g| > 0, a length), "along" (n_nodes,) (coordinate of each
+    node along the line, the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's
+    first to its last node). None if the interface is not flat, or its slave is not over its master.
+    """
+    return _flat_cases() if interface is None else given_interface.flat_cases(interface)
+
+
+@st.composite
+def _flat_cases(draw: DrawFn) -> Case:
+    sides = draw(_panels())
+    quarters, unit = draw(_DEPTHS), draw(depth_units())
+    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
+    penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
+    interface, z, along = assembled([_panel(*side, penetration) for side in sides], motion)
+    parameters = {
+        "penetration": np.array(penetration * motion.scale),
+        "along": along,
+        "direction": motion.direction,
+    }
+    return Case(interface, z, penalty, parameters, seed)
+
+
+@cache
+def _panels() -> SearchStrategy[list[tuple[FloatArray, FloatArray]]]:
+    overhang = st.integers(0, 3)
+    one = st.builds(_places, lengths(), lengths(), overhang, overhang, _REFINEMENTS, SEVENTHS)
+    return st.one_of(st.lists(one, min_size=1, max_size=1), st.lists(one, min_size=1, max_size=2))
+
+
+def _places(
+    slave: Sequence[float], master: Sequence[float], left: int, right: int, refinement: int, sevenths: int
+) -> tuple[FloatArray, FloatArray]:
+    """Ascending x of the nodes of a slave chain and of a master chain that goes beyond it by `left` and `right`.
+
+    What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
+    as long as needed. The slave moves into the left overhang by some sevenths of it.
+    """
+    slave_x = np.concatenate([[0.0], np.cumsum(slave)])
+    end = slave_x[-1] + right
+    master_x = [-float(left)]
+    for length in cycle(master) if refinement else master:
+        following = master_x[-1] + length * 2.0**-refinement
+        if following >= end or len(master_x) == MOST_MASTER_SEGMENTS:
+            break
+        master_x.append(following)
+    return slave_x - left * sevenths / 7, np.array([*master_x, end])
+
+
+def _line(x: FloatArray, height: float = 0.0) -> FloatArray:
+    return np.column_stack([x, np.full(len(x), height)])
+
+
+def _panel(slave_x: FloatArray, master_x: FloatArray, penetration: float) -> Panel:
+    return Panel(_line(slave_x, -penetration), _line(master_x[::-1]), _line(slave_x))

@@ -1,0 +1,126 @@
+"""Interfaces of any shape: flat, tilted, bent, circular, overhanging on either side, partly open.
+
+The master of an open panel is the graph of a broken line, with walls; the slave's nodes lie below that line by their
+penetration. So contact is there by construction, and nothing need be filtered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import cycle
+from math import floor, log2
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.arrays import FloatArray
+from contactverif.case import Case
+from contactverif.interface import Interface
+from contactverif.strategies import given_interface
+from contactverif.strategies.panels import Panel, assembled, on_lattice, shortest
+from contactverif.strategies.parts import OFFSETS, dealt, depth_units, depths, lengths, motions, penalties, seeds
+from contactverif.strategies.rings import Ring, rings
+
+_ON = st.integers(0, 7)  # 0 is no offset
+_WALL = 11  # one step in twelve
+_BENDS = st.sampled_from([0.0, 0.125, 0.25, 0.5, 1.0, 0.03125])  # steepness of the master's steps
+_TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # slope of a slave segment, at most 45°
+
+
+def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
+    """States of any kind; one in eight exactly on the lattice, the others off it by some sevenths.
+
+    Parameters
+    ----------
+    interface : random meshes if None; else random states of this one.
+    """
+    return _general_cases(smooth=False) if interface is None else given_interface.states(interface, smooth=False)
+
+
+def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
+    """As `general_cases`, always with the offset by sevenths: for derivatives, which mean nothing at a kink."""
+    return _general_cases(smooth=True) if interface is None else given_interface.states(interface, smooth=True)
+
+
+@st.composite
+def _general_cases(draw: DrawFn, smooth: bool) -> Case:
+    makers: list[Broken | Ring] = draw(_PANELS)
+    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
+    # Drawn last, so that the offset shrinks last.
+    offset_on = smooth or draw(_ON) > 0
+    offsets = draw(OFFSETS) if offset_on else [0]
+    interface, z, _ = assembled([maker(offsets) for maker in makers], motion)
+    return Case(interface, z, penalty, {}, seed)
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A slave chain below a broken line.
+
+    Attributes
+    ----------
+    steps : of the master from left to right: length along, rise in units of `bend`, kind (a wall if 11).
+    bend : the steepness of a rise of 1; walls are steep anyway.
+    slave : lengths along of the slave segments.
+    start : x of the slave's first node; the master's is at 0.
+    tilt : slope of the slave against the master, turned about its middle, flatter for long chains.
+    quarters, unit : penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
+    """
+
+    steps: Sequence[tuple[float, int, int]]
+    bend: float
+    slave: Sequence[float]
+    start: int
+    tilt: float
+    quarters: Sequence[int]
+    unit: float
+
+    def __call__(self, offsets: Sequence[int]) -> Panel:
+        """The panel; nodes moved by so many sevenths of a small length, 0 for none."""
+        line = self._master(offsets)
+        x = self.start + np.concatenate([[0.0], np.cumsum(self.slave)])
+        length = min(shortest(line), min(self.slave))
+        reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
+        flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
+        rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
+        sevenths = dealt(offsets, 2 * len(x)).reshape(-1, 2) / 7 / 16
+        depth = (dealt(self.quarters, len(x)) / 4 + sevenths[:, 1]) * self.unit * length
+        x = x + sevenths[:, 0] * length
+        # The line is met again at the moved nodes, or a steep line would make the penetration another one.
+        heights = on_lattice(np.interp(x, *line.T)) + rise - depth
+        return Panel(np.column_stack([x, heights]), line[::-1], reference)
+
+    def _master(self, offsets: Sequence[int]) -> FloatArray:
+        """Points (n, 2) from left to right. Walls lean by some thirteenths, so that nothing is seen edge-on.
+
+        No wall stands on a wall, so that no two nodes can coincide.
+        """
+        points, upright = [(0.0, 0.0)], False
+        for (along, up, kind), offset in zip(self.steps, cycle(offsets), strict=False):
+            upright = kind == _WALL and not upright
+            dx, dy = (offset / 13 / 32, (up or 1) / 2) if upright else (along, up * self.bend)
+            points.append((points[-1][0] + dx, points[-1][1] + dy))
+        return np.array(points)
+
+
+@cache
+def _broken() -> SearchStrategy[Broken]:
+    """Flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
+    flat = lengths().map(lambda along: [(length, 0, 0) for length in along])
+    bent = st.lists(
+        st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
+    )
+    plain = lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
+    depth = st.one_of(depths(), depths(lowest=-6))
+    start = st.integers(-2, 2)
+    return st.one_of(
+        st.builds(Broken, flat, st.just(0.0), lengths(), start, _TILTS, depth, depth_units()),
+        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, depth_units()),
+    )
+
+
+_ONE = st.one_of(_broken(), _broken(), rings())
+_PANELS = st.one_of(st.lists(_ONE, min_size=1, max_size=1), st.lists(_ONE, min_size=1, max_size=2))

@@ -1,0 +1,128 @@
+"""Random states of an interface that somebody gives: their mesh, our displacements."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.case import Case
+from contactverif.interface import Interface, Surface
+from contactverif.oracle import gaps
+from contactverif.strategies.parts import OFFSETS, dealt, depth_units, depths, penalties, seeds
+
+_QUARTERS = st.integers(1, 8)
+_ON = st.integers(0, 7)  # 0 is no offset
+_MODES = st.lists(st.integers(-8, 8), min_size=1, max_size=6)  # amplitudes of waves, in eighths
+
+
+def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
+    """The slave moved along the normal into a uniform penetration of 2^-10 to 2^-1 of the shortest segment.
+
+    None unless both surfaces are straight and parallel up to 64 u X, face each other, and each slave chain lies over
+    one master chain.
+    """
+    nodes, n_slave = interface.nodes, interface.n_slave_nodes
+    ends = nodes[interface.slave.segments]
+    chord = (ends[:, 1] - ends[:, 0]).sum(axis=0)
+    if not chord.any():
+        return None  # closed chains
+    direction = chord / np.hypot(*chord)
+    normal = np.array([-direction[1], direction[0]])  # out of the master
+    roundoff = 64 * UNIT_ROUNDOFF * float(np.abs(nodes).max())
+    heights, along = nodes @ normal, nodes @ direction
+    if max(np.ptp(heights[:n_slave]), np.ptp(heights[n_slave:])) > roundoff:
+        return None
+    slave, master = (_stretches(surface, along) for surface in (interface.slave, interface.master))
+    if slave is None or master is None or not _forward(interface.slave, along, 1, roundoff):
+        return None
+    if not _forward(interface.master, along, -1, roundoff) or not all(
+        any(low >= first - roundoff and high <= last + roundoff for first, last in master) for low, high in slave
+    ):
+        return None
+    return _flat_states(interface, along, direction, normal, float(heights[:n_slave].mean() - heights[n_slave:].mean()))
+
+
+@st.composite
+def _flat_states(
+    draw: DrawFn, interface: Interface, along: FloatArray, direction: FloatArray, normal: FloatArray, opening: float
+) -> Case:
+    quarters, unit = draw(_QUARTERS), draw(depth_units())
+    penalty, seed = draw(penalties()), draw(seeds())
+    penetration = quarters / 16 * unit * _shortest_segment(interface)
+    positions = interface.nodes.copy()
+    positions[: interface.n_slave_nodes] -= (opening + penetration) * normal
+    parameters = {"penetration": np.array(penetration), "along": along, "direction": direction}
+    return Case(interface, positions.reshape(-1), penalty, parameters, seed)
+
+
+def _stretches(surface: Surface, along: FloatArray) -> list[tuple[float, float]] | None:
+    """From where to where each chain goes; None if one is closed."""
+    first = np.flatnonzero(surface.neighbours[:, 0] < 0)
+    last = np.flatnonzero(surface.neighbours[:, 1] < 0)
+    starts = np.searchsorted(
+        np.flatnonzero(surface.neighbours[surface.chain_order, 0] < 0), np.arange(len(surface)), "right"
+    )
+    if len(first) == 0 or len(first) != len(last):
+        return None
+    stretches = []
+    for chain in range(1, starts.max() + 1):
+        places = along[surface.segments[surface.chain_order[starts == chain]]]
+        stretches.append((float(places.min()), float(places.max())))
+    return stretches
+
+
+def _forward(surface: Surface, along: FloatArray, way: int, roundoff: float) -> bool:
+    steps = np.diff(along[surface.segments], axis=1)
+    return bool((way * steps > roundoff).all())
+
+
+@st.composite
+def states(draw: DrawFn, interface: Interface, smooth: bool) -> Case:
+    """Waves of all nodes, a push of the slave as a whole until its deepest node penetrates, and a coprime offset."""
+    quarters, unit = draw(depths()), draw(depth_units())
+    slave_waves, master_waves = draw(_MODES), draw(_MODES)
+    penalty, seed = draw(penalties()), draw(seeds())
+    offset_on = smooth or draw(_ON) > 0
+    offsets = draw(OFFSETS) if offset_on else [0]
+    n_slave, shortest = interface.n_slave_nodes, _shortest_segment(interface)
+    depth = quarters[0] / 4 * unit * shortest
+    positions = interface.nodes.copy()
+    for waves, part in ((slave_waves, slice(0, n_slave)), (master_waves, slice(n_slave, None))):
+        positions[part] += depth / 4 * _waves(interface.nodes[part], waves)
+    positions[:n_slave] += (dealt(offsets, 2 * n_slave) / 7 / 32 * min(depth, shortest)).reshape(-1, 2)
+    positions[:n_slave] += _push(interface, positions, depth)
+    return Case(interface, positions.reshape(-1), penalty, {}, seed)
+
+
+def _shortest_segment(interface: Interface) -> float:
+    return float(min(side.lengths(interface.nodes).min() for side in (interface.slave, interface.master)))
+
+
+def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
+    """Displacements (n, 2): Σ a_k/8 cos(k π s + k) along the longer side of the box, alternating components."""
+    box = np.ptp(nodes, axis=0)
+    axis = int(np.argmax(box))
+    place = (nodes[:, axis] - nodes[:, axis].min()) / box[axis]
+    displacement = np.zeros_like(nodes)
+    for k, amplitude in enumerate(amplitudes):
+        displacement[:, (k + 1 + axis) % 2] += amplitude / 8 * np.cos(k * np.pi * place + k)
+    return displacement
+
+
+def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:
+    """Translation (2,) of the slave that brings its deepest node to the penetration `depth`."""
+    count = len(interface.slave)
+    segments = np.repeat(np.arange(count), 2)
+    home, gap = gaps(interface, positions.reshape(-1), segments, np.tile([-1.0, 1.0], count))
+    ends = positions[interface.master.segments[home]]
+    tangents = ends[:, 1] - ends[:, 0]
+    squared = (tangents**2).sum(axis=1)
+    points = positions[interface.slave.segments].reshape(-1, 2)
+    foot = ((points - ends[:, 0]) * tangents).sum(axis=1) / squared
+    outside = (foot < 0) | (foot > 1)
+    deepest = int(np.argmin(np.where(outside & ~outside.all(), np.inf, gap)))
+    normal = np.array([tangents[deepest, 1], -tangents[deepest, 0]]) / np.sqrt(squared[deepest])
+    push: FloatArray = -(gap[deepest] + depth) * normal
+    return push

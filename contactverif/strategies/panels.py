@@ -1,0 +1,90 @@
+"""From points to a case: panels (a slave chain and the master chain below it), put side by side, moved, numbered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, log2
+
+import numpy as np
+
+from contactverif.arrays import FloatArray, IntArray
+from contactverif.interface import Interface, Surface
+from contactverif.strategies.parts import Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One slave chain and one master chain, at rest on the lattice.
+
+    Attributes
+    ----------
+    slave, master : (n, 2) current positions in walking order, the body on the left: in +x and in −x if they are open
+        and the slave is on top.
+    reference : (n, 2) reference positions of the slave; the master is where it was.
+    closed : each chain's last point is joined to its first.
+    """
+
+    slave: FloatArray
+    master: FloatArray
+    reference: FloatArray
+    closed: bool = False
+
+    @property
+    def shortest_segment(self) -> float:
+        """Of the reference, both sides."""
+        return min(shortest(self.reference), shortest(self.master))
+
+
+def on_lattice(values: FloatArray) -> FloatArray:
+    """The nearest multiples of 2^-20."""
+    rounded: FloatArray = np.round(values * 2.0**20) * 2.0**-20
+    return rounded
+
+
+def shortest(points: FloatArray) -> float:
+    """The shortest of the segments between consecutive points (n, 2)."""
+    return float(np.hypot(*np.diff(points, axis=0).T).min())
+
+
+def assembled(panels: Sequence[Panel], motion: Motion) -> tuple[Interface, FloatArray, FloatArray]:
+    """The panels in a row, far apart.
+
+    Returns
+    -------
+    The interface, scaled but not moved; z (n_unknowns,), scaled and moved; the x (n_nodes,) before the motion, scaled.
+    """
+    offsets = _offsets(panels)
+    slaves, masters, references = (
+        [getattr(panel, side) + offset for panel, offset in zip(panels, offsets, strict=True)]
+        for side in ("slave", "master", "reference")
+    )
+    interface = Interface(
+        np.vstack(references + masters) * motion.scale,
+        Surface(_chains(slaves, panels, 0)),
+        Surface(_chains(masters, panels, sum(map(len, slaves)))),
+    )
+    current = np.vstack(slaves + masters)
+    return interface, motion(current).reshape(-1), current[:, 0] * motion.scale
+
+
+def _offsets(panels: Sequence[Panel]) -> list[FloatArray]:
+    """Shifts in x that keep panels apart by four widths or more, powers of two."""
+    offsets, reached = [np.zeros(2)], 0.0
+    for before, panel in pairwise(panels):
+        width = max(np.ptp(np.vstack([one.slave, one.master])[:, 0]) for one in (before, panel))
+        reached += 8 * 2.0 ** ceil(log2(width))
+        offsets.append(np.array([reached, 0.0]))
+    return offsets
+
+
+def _chains(chains: Sequence[FloatArray], panels: Sequence[Panel], start: int) -> IntArray:
+    segments = []
+    for chain, panel in zip(chains, panels, strict=True):
+        numbers = np.arange(start, start + len(chain))
+        ends = np.roll(numbers, -1)
+        pairs = np.column_stack([numbers, ends])
+        segments.append(pairs if panel.closed else pairs[:-1])
+        start += len(chain)
+    return np.vstack(segments)

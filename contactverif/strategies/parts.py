@@ -1,0 +1,121 @@
+"""The small draws that all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds.
+
+Lengths are small integers × 2^k, so that coordinates are exact in binary. No strategy here filters, and each shrinks
+to the simplest thing: length 1, a quarter of a segment of penetration, no motion, scale 1.
+Strategies are cached because hypothesis validates each new one anew, which takes longer than drawing from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import ldexp
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.arrays import FloatArray
+from contactverif.errors import MisuseError
+
+# Numerators over 7: a second lattice, coprime to the powers of two.
+SEVENTHS = st.integers(0, 6)
+OFFSETS = st.lists(st.integers(1, 6), min_size=1, max_size=7)  # dealt out in turn, never 0
+_QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (cos, sin)
+
+
+@cache
+def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]]:
+    """Lengths of 1 to `most` consecutive segments: 1 to 8; one list in five has neighbours' ratios up to 7 × 2^20."""
+    if most < 1:
+        raise MisuseError("most", f"{most}", "at least one segment")
+    plain = st.lists(st.integers(1, 8).map(float), min_size=1, max_size=most)
+    if not graded:
+        return plain
+    wide = st.lists(st.builds(ldexp, st.integers(1, 7).map(float), st.integers(-10, 10)), min_size=1, max_size=most)
+    return st.one_of(plain, plain, plain, plain, wide)
+
+
+@cache
+def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
+    """Penetrations in quarters of some unit, to be dealt out in turn to the nodes; below 0 is open."""
+    return st.lists(st.integers(lowest, 8), min_size=1, max_size=most)
+
+
+@cache
+def depth_units() -> SearchStrategy[float]:
+    """2^-e, e = 0 … 8: what the depths are multiplied by, besides the shortest segment."""
+    return st.integers(0, 8).map(lambda e: 2.0**-e)
+
+
+@cache
+def penalties() -> SearchStrategy[float]:
+    """Distributed stiffness: a small integer × 2^k."""
+    return st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-8, 24))
+
+
+@cache
+def seeds() -> SearchStrategy[int]:
+    """Of what a property draws at random for a case."""
+    return st.integers(0, 2**16)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A rigid motion after a scaling: x → 2^k (Q x + shift).
+
+    Attributes
+    ----------
+    degrees : of the rotation Q, counter-clockwise; quarter turns are exact.
+    shift : in units of the lattice.
+    exponent : k.
+    """
+
+    degrees: int = 0
+    shift: tuple[int, int] = (0, 0)
+    exponent: int = 0
+
+    @property
+    def scale(self) -> float:
+        """2^k."""
+        return ldexp(1.0, self.exponent)
+
+    @property
+    def cos_sin(self) -> tuple[np.longdouble, np.longdouble]:
+        """Of the angle, in extended precision where the machine has it."""
+        if self.degrees in _QUARTER_TURNS:
+            cos, sin = _QUARTER_TURNS[self.degrees]
+            return np.longdouble(cos), np.longdouble(sin)
+        angle = np.longdouble(self.degrees) * np.arccos(np.longdouble(-1)) / 180
+        return np.cos(angle), np.sin(angle)
+
+    @property
+    def direction(self) -> FloatArray:
+        """Where the lattice's x-axis goes, a unit vector (2,)."""
+        return np.array(self.cos_sin, dtype=np.float64)
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Points (n, 2) moved; each coordinate is rounded once, from extended precision."""
+        cos, sin = self.cos_sin
+        x, y = points.astype(np.longdouble).T
+        moved = np.column_stack([cos * x - sin * y + self.shift[0], sin * x + cos * y + self.shift[1]])
+        rounded: FloatArray = (moved * self.scale).astype(np.float64)
+        return rounded
+
+
+REST = Motion()
+
+
+@cache
+def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> SearchStrategy[Motion]:
+    """Rest or any rigid motion; only quarter turns if `exact`. Translations up to `furthest`, scales 2^±`exponents`."""
+    degrees = st.sampled_from([0, 90, 180, 270]) if exact else st.integers(0, 359)
+    place = st.integers(-furthest, furthest)
+    exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
+    return st.one_of(st.just(REST), st.builds(Motion, degrees, st.tuples(place, place), exponent))
+
+
+def dealt(values: Sequence[int], count: int) -> FloatArray:
+    """`count` floats, the values in turn."""
+    return np.resize(np.asarray(values, dtype=np.float64), count)

@@ -1,0 +1,65 @@
+"""Circular interfaces: arcs and closed rings, the master inside or outside, the nodes on the lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+from numpy.typing import NDArray
+
+from contactverif.arrays import FloatArray
+from contactverif.strategies.panels import Panel, on_lattice, shortest
+from contactverif.strategies.parts import dealt, depth_units, depths
+
+RADIUS = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """Two concentric polygons, or parts of them.
+
+    Attributes
+    ----------
+    slave, master : weights by which the segments share the angle.
+    degrees : the angle; 360 is closed.
+    inner_slave : the slave is the disc, else the hole around it.
+    quarters, unit : as of `Broken`, measured along the radius.
+    """
+
+    slave: Sequence[int]
+    master: Sequence[int]
+    degrees: int
+    inner_slave: bool
+    quarters: Sequence[int]
+    unit: float
+
+    def __call__(self, offsets: Sequence[int]) -> Panel:
+        """The panel; slave nodes moved by so many sevenths of a small length, 0 for none."""
+        uneven = dealt(offsets, len(self.master)) * (np.arange(len(self.master)) % 3) / 13 / 8  # nothing is edge-on
+        master = self._points(np.add(self.master, uneven), not self.inner_slave)
+        reference = self._points(np.array(self.slave), self.inner_slave)
+        length = min(shortest(master), shortest(reference))
+        depth = on_lattice(dealt(self.quarters, len(reference)) / 4 * self.unit * length)
+        outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
+        shift = dealt(offsets, reference.size).reshape(-1, 2) / 7 / 16 * length
+        slave = on_lattice(reference + outward * depth[:, None]) + shift
+        return Panel(slave, master, reference, closed=self.degrees == 360)
+
+    def _points(self, weights: NDArray[Any], inner: bool) -> FloatArray:
+        """Points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
+        shares = np.concatenate([[0.0], np.cumsum(weights)]) / np.sum(weights)
+        angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares))
+        points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
+        return points if inner else points[::-1]
+
+
+def rings() -> SearchStrategy[Ring]:
+    """Arcs of 60° to 180°, and closed rings."""
+    weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
+    degrees = st.sampled_from([60, 90, 150, 180, 360])
+    depth = st.one_of(depths(), depths(lowest=-6))
+    return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())

@@ -1,0 +1,80 @@
+"""Exact ties, where a formulation must decide and none of its choices is wrong: each case stands on a kink.
+
+Slave nodes over master nodes, quarter points over master nodes, points on the bisector of a vertex, ends at ends, gaps
+of exactly zero. Motions are quarter turns and whole numbers, so that a tie stays one bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.arrays import FloatArray
+from contactverif.case import Case
+from contactverif.strategies.panels import Panel, assembled
+from contactverif.strategies.parts import dealt, depth_units, motions, penalties, seeds
+
+_RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # of a vertex above its neighbours, per length
+_QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # penetrations; 0 is a gap of exactly zero
+_SEGMENT = st.tuples(st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3))  # length, quarter under a master node
+
+
+def tie_cases() -> SearchStrategy[Case]:
+    """Random meshes that stand exactly on a kink, many of them on several."""
+    return _tie_cases()
+
+
+@st.composite
+def _tie_cases(draw: DrawFn) -> Case:
+    panel = draw(_PANELS)
+    motion, penalty, seed = draw(motions(exact=True)), draw(penalties()), draw(seeds())
+    interface, z, _ = assembled([panel], motion)
+    return Case(interface, z, penalty, {}, seed)
+
+
+def _facing(
+    segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
+) -> Panel:
+    """Master nodes under all slave nodes and under one quarter point or middle of some slave segments (0: of none)."""
+    slave_x, master_x = [0.0], [0.0]
+    for length, quarter in segments:
+        if quarter:
+            master_x.append(slave_x[-1] + length * quarter / 4)
+        slave_x.append(slave_x[-1] + length)
+        master_x.append(slave_x[-1])
+    heights = np.resize(rises, len(master_x)) / 4
+    return _below(np.array(slave_x), np.column_stack([master_x, heights]), quarters, unit / 4)
+
+
+def _on_bisector(
+    segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
+) -> Panel:
+    """A symmetric roof or valley of two segments; a node, or the quarter of the first slave segment, on its bisector.
+
+    The slave is level, so that the bisector, which is upright, is met at right angles.
+    """
+    x = np.concatenate([[0.0], np.cumsum([length for length, _ in segments])])
+    x -= segments[0][0] * segments[0][1] / 4
+    reach = 4 * x[-1]
+    line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
+    slave = np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)])
+    return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
+
+
+def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
+    """Slave nodes at x, sunk below the broken line (n, 2)."""
+    heights = np.interp(x, *line.T)
+    slave = np.column_stack([x, heights - dealt(quarters, len(x)) / 4 * unit])
+    return Panel(slave, line[::-1], np.column_stack([x, heights]))
+
+
+_DRAWN = (
+    st.lists(_SEGMENT, min_size=1, max_size=5),
+    st.lists(_RISES, min_size=1, max_size=4),
+    _QUARTERS,
+    depth_units(),
+)
+_PANELS = st.one_of(st.builds(_facing, *_DRAWN), st.builds(_on_bisector, *_DRAWN))

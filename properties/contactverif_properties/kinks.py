@@ -1,0 +1,75 @@
+"""Whether a state is so near a kink that a failure there means nothing. The harness decides, not the plugin's pairing.
+
+A kink is where a contact point changes its master segment, its gap changes sign, or an end of its area of competence
+passes a master node. Where the plugin says where its contact points are, the distance to the nearest kink is computed
+from the positions; where it does not, one-sided differences of its residual must agree.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from contactverif.arrays import FloatArray
+from contactverif.case import Case
+from contactverif.formulation import Pairing
+from contactverif.oracle import kink_margin
+from contactverif.subject import Guarded
+
+
+def jump(case: Case, formulation: Guarded, reach: float, directions: FloatArray) -> tuple[float, float]:
+    """How much the largest entries of forces and tangent change when the nodes move by `reach`, either way.
+
+    Parameters
+    ----------
+    directions : (n, n_unknowns), the largest entry of each 1.
+
+    Returns
+    -------
+    The largest change of a force and of an entry of the tangent (0 where there is none).
+    """
+    force, tangent = _answers(case, formulation, case.z)
+    there = [_answers(case, formulation, case.z + way * reach * d) for d in directions for way in (1, -1)]
+    return (
+        max(float(np.abs(other - force).max()) for other, _ in there),
+        max(float(np.abs(other - tangent).max()) for _, other in there),
+    )
+
+
+def _answers(case: Case, formulation: Guarded, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    pairing = formulation.pair(case.interface, z)
+    forces = formulation.residual(case.interface, pairing, z)
+    if "tangent" not in formulation.provides:
+        return forces, np.zeros(1)
+    return forces, dense(formulation.tangent(case.interface, pairing, z))
+
+
+def dense(tangent: Any) -> FloatArray:
+    """The tangent as an array (n_unknowns, n_unknowns)."""
+    array: FloatArray = tangent.toarray() if sparse.issparse(tangent) else np.asarray(tangent)
+    return array
+
+
+def kink_within(case: Case, formulation: Guarded, pairing: Pairing | None, reach: float, direction: FloatArray) -> str:
+    """Empty, or why moving the nodes by `reach` (a length) may change a decision.
+
+    Parameters
+    ----------
+    direction : (n_unknowns,) largest entry 1, along which one-sided differences are taken if need be.
+    """
+    if "contact_points" in formulation.provides:
+        points = formulation.contact_points(case.interface, pairing, case.z)
+        margin = kink_margin(case.interface, case.z, points.slave_segment, points.c, points.area_from, points.area_to)
+        return f"a kink: a decision hangs on {margin:.2g}, less than {reach:.2g}" if margin <= reach else ""
+    here, ahead, behind = (
+        formulation.residual(case.interface, formulation.pair(case.interface, z), z)
+        for z in (case.z, case.z + reach * direction, case.z - reach * direction)
+    )
+    bend = np.abs(ahead - 2 * here + behind).max()
+    slope = np.abs(ahead - behind).max() / 2
+    # A smooth function bends by slope × reach/ℓ; a kink by as much as the slope itself.
+    if bend > slope * np.sqrt(reach / case.shortest_segment):
+        return f"a kink: one-sided differences over {reach:.2g} disagree by {bend / max(slope, bend):.2g}"
+    return ""

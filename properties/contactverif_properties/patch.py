@@ -1,0 +1,53 @@
+"""The patch test on an interface alone: is a uniform pressure transmitted exactly, on both sides?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.case import Case
+from contactverif.oracle import uniform_pressure_weights
+from contactverif.property import Measurement, Property
+from contactverif.strategies import flat_cases
+from contactverif.subject import Subject
+from contactverif_properties import roundoff
+
+ERROR = roundoff.gap_quantity("error of a nodal force")
+
+
+def transmitted(case: Case, subject: Subject) -> Measurement:
+    """Nodal forces of a uniform penetration against the exact consistent ones.
+
+    Returns
+    -------
+    Measurement
+        Largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless. For a barrier or a multiplier
+        method the forces are shares of their sum on the slave, since their size is not ε̂ |g|.
+
+    Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20; exact forces in rationals (`contactverif.oracle`).
+    """
+    formulation = subject.on(case)
+    forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
+    penetration = case.parameter("penetration")
+    weights = uniform_pressure_weights(case.interface, case.parameters["along"])
+    n_slave = case.interface.n_slave_nodes
+    length = weights[:n_slave].sum()
+    along = case.parameters["direction"]
+    normal = np.array([-along[1], along[0]])  # out of the master: to the left of the way the slave runs
+    sides = np.where(np.arange(len(weights)) < n_slave, -1.0, 1.0)
+    exact = (sides * weights / length)[:, None] * normal
+    size = case.penalty * penetration * length
+    if subject.traits.enforcement != "penalty":
+        size = float(-(forces[:n_slave] @ normal).sum())
+    error = np.linalg.norm(forces - size * exact, axis=1).max()
+    return Measurement({ERROR.name: roundoff.share(error, abs(size))}, {ERROR.name: roundoff.of_gap(case, penetration)})
+
+
+FLAT_TRANSMISSION = Property(
+    id="patch.flat.transmission",
+    family="patch",
+    summary="a uniform penetration of a flat interface gives the exact consistent nodal forces on both sides",
+    quantities=(ERROR,),
+    cases=flat_cases,
+    measure=transmitted,
+    promise=lambda traits: traits.passes_flat_patch,
+)

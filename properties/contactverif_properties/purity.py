@@ -1,0 +1,82 @@
+"""Does an answer depend on anything but the question? Calls are repeated, reordered and batched."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.case import Case
+from contactverif.interface import Interface
+from contactverif.property import Measurement, Property, Quantity
+from contactverif.subject import Subject
+from contactverif_properties import roundoff
+from contactverif_properties.anywhere import any_cases
+
+BITWISE = "the same operations on the same numbers give the same bits"
+AGAIN = Quantity("entries that change when asked again", "1", "0", BITWISE)
+REORDERED = Quantity("entries that change with the order of calls", "1", "0", BITWISE)
+BATCHED = Quantity(
+    "batch against loop", "1", roundoff.PATCH, "a batch may sum in another order; a gap is rounded to uX"
+)
+
+
+def pure(case: Case, subject: Subject) -> Measurement:
+    """R(x1), R(x2), R(x1) gives the first again, also after a tangent and in a batch; inputs stay as they are."""
+    interface, z = case.interface, case.z
+    random = np.random.default_rng(case.seed)
+    elsewhere = z + random.uniform(-1, 1, z.size) * case.shortest_segment / 4
+    before = _fingerprint(interface)
+
+    formulation = subject.on(case)
+    pairing = formulation.pair(interface, z)
+    first = formulation.residual(interface, pairing, z)
+    pairing_elsewhere = formulation.pair(interface, elsewhere)
+    second = formulation.residual(interface, pairing_elsewhere, elsewhere)
+    pairing_again = formulation.pair(interface, z)
+    again = formulation.residual(interface, pairing_again, z)
+    fresh = subject.on(case)  # it meets the states the other way round, tangents first
+    pairing_first = fresh.pair(interface, elsewhere)
+    if "tangent" in fresh.provides:
+        fresh.tangent(interface, pairing_first, elsewhere)
+        fresh.tangent(interface, pairing, z)
+    changed = (fresh.residual(interface, pairing_first, elsewhere) != second).sum()
+    changed += (fresh.residual(interface, pairing, z) != first).sum()
+    both = formulation.residual(interface, pairing, np.stack([elsewhere, z]))
+    alone = formulation.residual(interface, pairing, elsewhere)
+
+    broken = []
+    if pairing != pairing_again:
+        broken.append("the pairing of a state differs when asked again")
+    if pairing_elsewhere != pairing_first:
+        broken.append("the pairing of a state depends on the state before it")
+    if _fingerprint(interface) != before:
+        broken.append("the interface was changed")
+    largest = float(max(np.abs(first).max(), np.abs(alone).max()))
+    difference = float(max(np.abs(both[1] - first).max(), np.abs(both[0] - alone).max()))
+    return Measurement(
+        {
+            AGAIN.name: float((again != first).sum()),
+            REORDERED.name: float(changed),
+            BATCHED.name: roundoff.share(difference, largest),
+        },
+        {
+            AGAIN.name: 0.0,
+            REORDERED.name: 0.0,
+            BATCHED.name: roundoff.of_gap(case, roundoff.mean_penetration(case, first)),
+        },
+        broken="; ".join(broken),
+    )
+
+
+def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
+    return interface.nodes.tobytes(), interface.slave.segments.tobytes(), interface.master.segments.tobytes()
+
+
+PURITY = Property(
+    id="purity",
+    family="invariants",
+    summary="an answer depends on nothing but the question: no memory, no changed input, a batch equals a loop",
+    quantities=(AGAIN, REORDERED, BATCHED),
+    cases=any_cases,
+    measure=pure,
+    promise=lambda traits: True,
+)

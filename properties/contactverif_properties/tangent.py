@@ -1,0 +1,142 @@
+"""Is the tangent the derivative of the residual? Differences on a frozen pairing, where the residual is smooth.
+
+Source: verification 13; the two conditions together, since an error of 1e-3 in one entry has a Taylor slope of 2, and a
+central difference alone has an error of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.case import Case
+from contactverif.formulation import Pairing
+from contactverif.property import Measurement, Property, Quantity
+from contactverif.strategies import smooth_cases
+from contactverif.subject import Guarded, Subject
+from contactverif_properties.kinks import kink_within
+
+N_DIRECTIONS = 8
+CENTRAL_STEPS = (8.0, 1.0, 0.125)  # × the step at which truncation and roundoff of a central difference are equal
+TAYLOR_STEPS = (2.0**-6, 2.0**-10)  # × ℓ
+SLOPE = 1.9
+
+CENTRAL = Quantity(
+    "central difference",
+    "1",
+    "30 (uS/ℓ)^(2/3)",
+    "truncation (h/ℓ)² and roundoff uS/h are equal at h = ℓ (uS/ℓ)^(1/3); 30 is for the third derivative",
+)
+TAYLOR = Quantity(
+    "Taylor slope", "1", "1.9", "|R(x+hd) − R − hKd| falls like h²; 2 less what is left of h³", "at least"
+)
+COMPLEX = Quantity(
+    "complex step",
+    "1",
+    "1e-11 + 64 uS/ℓ",
+    "a complex step has no truncation; rounding the ends of a segment turns it by uS/ℓ",
+)
+
+
+def directional(case: Case, subject: Subject) -> Measurement:
+    """Tangent times eight random directions against differences of the residual, all states in one batch.
+
+    Returns
+    -------
+    Measurement
+        Best central difference over the steps, worst direction, relative to the largest derivative; least slope of the
+        Taylor remainder (none where all remainders are roundoff); the complex step where the plugin takes complex
+        positions.
+    """
+    formulation, interface, z = subject.on(case), case.interface, case.z
+    pairing = formulation.pair(interface, z)
+    directions = random_directions(case)
+    shortest, reach = case.shortest_segment, case.largest_coordinate
+    balanced_step = shortest * (UNIT_ROUNDOFF * reach / shortest) ** (1 / 3)
+    central = np.array(CENTRAL_STEPS) * balanced_step
+    taylor = np.array(TAYLOR_STEPS) * shortest
+    steps = np.concatenate([central, -central, taylor])
+    batch = z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
+    forces = formulation.residual(interface, pairing, np.concatenate([batch.reshape(-1, z.size), z[None]]))
+    here, moved = forces[-1], forces[:-1].reshape(batch.shape)
+    derivative = (formulation.tangent(interface, pairing, z) @ directions.T).T  # (n_directions, n_unknowns)
+
+    n = len(central)
+    differences = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
+    size = max(np.abs(derivative).max(), np.abs(differences).max())
+    values = {CENTRAL.name: 0.0}
+    tolerances = {
+        CENTRAL.name: 30 * (UNIT_ROUNDOFF * reach / shortest) ** (2 / 3),
+        TAYLOR.name: SLOPE,
+        COMPLEX.name: 1e-11 + 64 * UNIT_ROUNDOFF * reach / shortest,
+    }
+    if size > 0:
+        errors = np.abs(differences - derivative).max(axis=2)  # (n_steps, n_directions)
+        values[CENTRAL.name] = float(errors.min(axis=0).max() / size)
+        forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # the longest central step serves here too
+        remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
+        slope = taylor_slope(remainders, steps[forward], floor=1e3 * UNIT_ROUNDOFF * reach * size)
+        if np.isfinite(slope):
+            values[TAYLOR.name] = slope
+        if subject.traits.takes_complex:
+            values[COMPLEX.name] = complex_step(formulation, case, pairing, directions, derivative) / size
+    broken, undecided = "", ""
+    step = float(central[-1])
+    if pairing is not None and not _same_around(formulation, case, pairing, step * directions[0]):
+        undecided = kink_within(case, formulation, pairing, 4 * step, directions[0])
+        if not undecided:
+            if _same_around(formulation, case, pairing, 2.0**-20 * step * directions[0]):
+                undecided = "the pairing changes within the step, where the harness sees no kink"
+            else:
+                broken = "the pairing changes however little the nodes move, and no kink is near"
+    elif pairing is None:
+        undecided = kink_within(case, formulation, pairing, 4 * step, directions[0])
+    return Measurement(values, tolerances, undecided, broken)
+
+
+def random_directions(case: Case) -> FloatArray:
+    """Eight directions (8, n_unknowns), entries in [−1, 1], the largest of each 1."""
+    directions = np.random.default_rng(case.seed).uniform(-1, 1, (N_DIRECTIONS, case.z.size))
+    scaled: FloatArray = directions / np.abs(directions).max(axis=1, keepdims=True)
+    return scaled
+
+
+def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
+    """Slope of log |remainder| against log h: the best between neighbouring steps, the worst over the directions.
+
+    `remainders` is (n_steps, n_directions), `steps` (n_steps,), in any order. A remainder below `floor` is roundoff: a
+    direction of which that leaves no slope is exact, and infinity stands for all of them being so.
+    """
+    order = np.argsort(-steps)
+    remainders, steps = remainders[order], steps[order]
+    decided = remainders[1:] > floor
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.log(remainders[:-1] / remainders[1:]) / np.log(steps[:-1] / steps[1:])[:, None]
+    best = np.where(decided, slopes, -np.inf).max(axis=0)
+    return float(best[decided.any(axis=0)].min(initial=np.inf))
+
+
+def complex_step(
+    formulation: Guarded, case: Case, pairing: Pairing | None, directions: FloatArray, derivative: Array
+) -> float:
+    """Largest difference of Im R(x + ihd)/h from the derivative; h so small that h² vanishes."""
+    h = case.shortest_segment * 2.0**-100
+    forces = formulation.residual(case.interface, pairing, case.z + 1j * h * directions)
+    return float(np.abs(forces.imag / h - derivative).max())
+
+
+def _same_around(formulation: Guarded, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
+    there = (formulation.pair(case.interface, case.z + way * shift) for way in (1, -1))
+    return all(other is not None and pairing.same_as(other) for other in there)
+
+
+DIRECTIONAL = Property(
+    id="tangent.directional",
+    family="tangent",
+    summary="the tangent is the derivative of the residual on a frozen pairing",
+    quantities=(CENTRAL, TAYLOR, COMPLEX),
+    cases=smooth_cases,
+    measure=directional,
+    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    needs=frozenset({"tangent"}),
+)

@@ -1,0 +1,83 @@
+"""Makes formulations that are wrong on purpose: one line of the shipped plugin's source changed, run uncompiled.
+
+The line must stand in the source, or the mutant says so: a mutant that changes nothing would prove nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import itertools
+import sys
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import contactverif_nts
+
+PACKAGE = "contactverif_nts"
+MODULES = ("eq6", "walk", "box3", "options", "points", "ppt")  # in the order in which they import each other
+
+_numbers = itertools.count()
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A wrong formulation, and the property that is meant to catch it."""
+
+    name: str
+    caught_by: str
+    make: Callable[..., Any]
+
+
+def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0, **options: Any) -> Callable[..., Any]:
+    """The factory of a copy of the plugin in which the nth occurrence of `old` in a module reads `new`."""
+    sources = {name: inspect.getsource(importlib.import_module(f"{PACKAGE}.{name}")) for name in MODULES}
+    parts = sources[module].split(old)
+    if len(parts) < nth + 2:
+        raise AssertionError(f"{module} has no line {old!r} number {nth} any more: bring the mutant up to date")
+    sources[module] = old.join(parts[: nth + 1]) + new + old.join(parts[nth + 1 :])
+
+    copy = f"{PACKAGE}_mutant_{next(_numbers)}"
+    package = types.ModuleType(copy)
+    package.__path__ = []
+    sys.modules[copy] = package
+    for name, source in sources.items():
+        source = source.replace(PACKAGE, copy).replace("\n@compiled\n", "\n")
+        part = types.ModuleType(f"{copy}.{name}")
+        sys.modules[f"{copy}.{name}"] = part
+        setattr(package, name, part)
+        exec(compile(source, f"<{copy}.{name}>", "exec"), vars(part))
+    home = "points" if hasattr(sys.modules[f"{copy}.points"], factory) else "ppt"
+    make = getattr(sys.modules[f"{copy}.{home}"], factory)
+
+    def mutant(*, penalty: float) -> Any:
+        return make(penalty=penalty, **options)
+
+    return mutant
+
+
+class Wrapped:
+    """The balanced VTS-PPT with one verb replaced by a subclass-free wrapper: verbs are looked up in `verbs` first."""
+
+    def __init__(self, penalty: float, **verbs: Callable[..., Any]) -> None:
+        self._inner = contactverif_nts.vts_ppt_balanced(penalty=penalty)
+        self._verbs = verbs
+        self.traits = self._inner.traits
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        return self._ask("pair", interface, z)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self._ask("residual", interface, pairing, z)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self._ask("tangent", interface, pairing, z)
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self._ask("contact_points", interface, pairing, z)
+
+    def _ask(self, verb: str, *arguments: Any) -> Any:
+        answer = getattr(self._inner, verb)
+        return self._verbs[verb](answer, *arguments) if verb in self._verbs else answer(*arguments)

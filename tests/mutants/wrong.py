@@ -1,0 +1,143 @@
+"""The wrong formulations. Each is wrong in one line, and keeps the promises of the right one it was made from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mutate import Mutant, Wrapped, changed_line
+
+from contactverif import Pairing
+
+PATCH, FORCE, MOMENT = "patch.flat.transmission", "balance.force", "balance.moment"
+TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
+BALANCED = "vts_ppt_balanced"
+
+
+def line(
+    name: str, caught_by: str, module: str, old: str, new: str, *, factory: str = BALANCED, nth: int = 0, **options: Any
+) -> Mutant:
+    return Mutant(name, caught_by, changed_line(module, old, new, factory=factory, nth=nth, **options))
+
+
+def _remembers(penalty: float) -> Any:
+    seen: list[Any] = []
+
+    def pair(answer: Any, interface: Any, z: Any) -> Any:
+        seen.append(answer(interface, z))
+        same_problem = seen[0]["master"].shape == seen[-1]["master"].shape
+        return seen[0] if same_problem else seen[-1]
+
+    return Wrapped(penalty, pair=pair)
+
+
+def _restless(penalty: float) -> Any:
+    calls: list[int] = []
+
+    def pair(answer: Any, interface: Any, z: Any) -> Any:
+        calls.append(0)
+        return Pairing({**answer(interface, z), "call": np.array([len(calls) % 2])})
+
+    return Wrapped(penalty, pair=pair)
+
+
+def _moves_the_mesh(penalty: float) -> Any:
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        interface.nodes.setflags(write=True)
+        interface.nodes[0, 0] += 1e-3
+        return answer(interface, pairing, z)
+
+    return Wrapped(penalty, residual=residual)
+
+
+def _writes_on_its_input(penalty: float) -> Any:
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        z += 0.0
+        return answer(interface, pairing, z)
+
+    return Wrapped(penalty, residual=residual)
+
+
+def _single_precision(penalty: float) -> Any:
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        rounded = z.astype(np.complex64 if np.iscomplexobj(z) else np.float32).astype(z.dtype)
+        return answer(interface, pairing, rounded)
+
+    return Wrapped(penalty, residual=residual)
+
+
+def _tangent_leaves_a_trace(penalty: float) -> Any:
+    scale = [1.0]
+
+    def tangent(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        scale[0] = 1 + 2.0**-40
+        return answer(interface, pairing, z)
+
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        return answer(interface, pairing, z) * scale[0]
+
+    return Wrapped(penalty, tangent=tangent, residual=residual)
+
+
+MUTANTS = (
+    line("force on a slave node off by 1e-6", FORCE, "box3",
+         "_push(r, node_a, (1 - c) / 2 * f_v, normal)", "_push(r, node_a, (1 - c) / 2 * f_v * (1 + 1e-6), normal)"),
+    line("slave and master forces of the printed algorithm", FORCE, "box3",
+         "pressure = f_v / dot(minus(x_q, x_p), t)", "pressure = penalty * g"),
+    line("shares of one segment exchanged", MOMENT, "box3",
+         "xi = dot(minus(x_v, x1), t) / l_12", "xi = 1 - dot(minus(x_v, x1), t) / l_12"),
+    line("shares of the nodes of a segment exchanged", MOMENT, "box3",
+         "_push(r, f, -pressure * w_f, normal)", "w_f, w_m = w_m, w_f; _push(r, f, -pressure * w_f, normal)"),
+    line("ξ of the last segment from its other end", PATCH, "box3",
+         "b = dot(minus(x_q, x_f), t) / length", "b = 1 - dot(minus(x_q, x_f), t) / length"),
+    line("intermediate segments skipped", PATCH, "box3",
+         "w_m = length * (b * b - a * a) / 2", "w_m = length * (b * b - a * a) / 2 * (b - a < 1)"),
+    line("virtual slave nodes at Gauss points", PATCH, "box3",
+         "c = -1 + (2 * (point % n) + 1) / n", "c = (-1 + (2 * (point % n) + 1) / n) * 2 / 3**0.5"),
+    line("area of competence ends at the virtual slave node", PATCH, "box3",
+         "c_p, c_q = c + 1 / n + zero, c - 1 / n + zero",
+         "c_p, c_q = c + (1 / n if point % n < n - 1 else 0) + zero, c - 1 / n + zero"),
+    line("walk ends one segment early", PATCH, "walk",
+         "        stop = following", "        stop = following; break"),
+    line("pushes the wrong way", PATCH, "box3",
+         "f_v = penalty * g * l_ab * (c_p - c_q) / 2", "f_v = -penalty * g * l_ab * (c_p - c_q) / 2"),
+    Mutant("positions in single precision", PATCH, lambda *, penalty: _single_precision(penalty)),
+    line("sign of ω in Eq. 6", TANGENT, "eq6",
+         "d_omega[2, i] = -n[i] / l_12", "d_omega[2, i] = n[i] / l_12", factory="vts_me"),
+    line("Δn missing", TANGENT, "box3",
+         "value -= force * t[i] * d_omega[column, j]", "pass"),
+    line("Δl_AB missing", TANGENT, "box3",
+         "d_l[A, i], d_l[B, i] = -t_ab[i], t_ab[i]", "pass"),
+    line("ΔS missing", TANGENT, "box3",
+         "d_pressure[:CORE] = d_f / s - f_v * d_s / (s * s)", "d_pressure[:CORE] = d_f / s"),
+    line("Δc of a cut end missing", TANGENT, "box3",
+         "d_c[cutting_node, i] += t[i] / half", "pass"),
+    line("Δl of the neighbour missing in NTS-AR", TANGENT, "eq6",
+         "_stretch(d_area, 4, x, nodes[4], nodes[5], w)", "pass", factory="nts_ar"),
+    line("one entry of the tangent off by 1e-3", TANGENT, "box3",
+         "values[place] = value", "values[place] = value * (1 + 1e-3 * (place == 5))"),
+    line("area of competence not shortened at a free end", TANGENT, "box3",
+         "f_v = penalty * g * l_ab * (c_p - c_q) / 2", "f_v = penalty * g * l_ab / n"),
+    line("magnitude of a complex gap", TANGENT, "box3",
+         "f_v = penalty * g * l_ab * (c_p - c_q) / 2", "f_v = -penalty * np.abs(g) * l_ab * (c_p - c_q) / 2"),
+    line("stale normal", OBJECTIVITY, "box3",
+         "l_12, t, normal = frame(x1, node(now, node_2))",
+         "l_12, t, normal = frame(node(reference, node_1), node(reference, node_2))"),
+    line("a normal along the axis", OBJECTIVITY, "eq6",
+         "        l_12, t, n = frame(x1, node(x_now, node_2))",
+         "        l_12, t, n = frame(x1, node(x_now, node_2)); n = (0 * n[0], 1.0 + 0 * n[1])", factory="vts_me"),
+    line("absolute tolerance for a gap", SCALING, "walk",
+         "active[point] = dot(minus(x_v, x1), n_m) <= 0", "active[point] = dot(minus(x_v, x1), n_m) <= 1e-9"),
+    line("absolute guard against a division by zero", SCALING, "box3",
+         "xi = dot(minus(x_v, x1), t) / l_12", "xi = dot(minus(x_v, x1), t) / (l_12 + 1e-12)"),
+    line("NaN on a segment seen edge-on", PURITY, "walk",
+         "_projected_length(x, master, following, t) <= 0", "_projected_length(x, master, following, t) < 0",
+         nth=0, factory="vts_ppt", free_end="extend"),
+    line("a batch of one state many times", PURITY, "box3",
+         "now, r = x[state], forces[state]", "now, r = x[0], forces[state]"),
+    Mutant("pairing kept from the first call", PURITY, lambda *, penalty: _remembers(penalty)),
+    Mutant("pairing that changes at every call", PURITY, lambda *, penalty: _restless(penalty)),
+    Mutant("tangent that leaves a trace", PURITY, lambda *, penalty: _tangent_leaves_a_trace(penalty)),
+    Mutant("interface modified", PURITY, lambda *, penalty: _moves_the_mesh(penalty)),
+    Mutant("positions modified", PURITY, lambda *, penalty: _writes_on_its_input(penalty)),
+)  # fmt: skip

@@ -1,0 +1,186 @@
+"""What the formulations of the paper transmit: its tables exactly, and what is known of the printed algorithm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactverif_nts
+from contactverif import Interface, MisuseError
+
+GAP = 1 / 8
+PENALTY = 8.0  # p = ε̂ |g| = 1
+
+TABLE = {  # case: slave lengths, master lengths, {formulation: forces on the master}
+    "A1": ([2, 2], [4], {"nts_ar": "2 2", "vts_g": "2 2", "vts_me": "2 2", "vts_ppt": "2 2"}),
+    "B": (
+        [2, 2, 4, 4],
+        [3, 3, 4, 2],
+        {
+            "nts": "4/3 4/3 5/6 1/2 1",
+            "nts_ar": "5/3 10/3 3 2 2",
+            "vts_me": "3/2 3 7/2 3 1",
+            "vts_ppt": "3/2 3 7/2 3 1",
+            "vts_ppt_balanced": "3/2 3 7/2 3 1",
+        },
+    ),
+    "C": (
+        [2, 2, 4, 4],
+        [3, 3, 3, 3],
+        {
+            "nts": "4/3 4/3 2/3 2/3 1",
+            "nts_ar": "5/3 10/3 7/3 8/3 2",
+            "vts_me": "3/2 3 17/6 10/3 4/3",
+            "vts_ppt": "3/2 3 3 3 3/2",
+            "vts_ppt_basic": "3/2 3 3 3 3/2",
+            "vts_ppt_balanced": "3/2 3 3 3 3/2",
+        },
+    ),
+}
+ON_THE_SLAVE = {"A1": "1 2 1", "B": "1 2 3 4 2", "C": "1 2 3 4 2"}
+EVERY = ("nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_basic", "vts_ppt_balanced")
+
+
+def flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.0) -> tuple[Interface, Any]:
+    """A flat interface with uniform penetration GAP; the master begins at `shift`."""
+    upper = np.array([0.0, *accumulate(slave)])
+    lower = np.array([0.0, *accumulate(master)])[::-1] + shift
+    interface = Interface.from_chains(
+        np.column_stack([upper, np.zeros_like(upper)]), np.column_stack([lower, np.zeros_like(lower)])
+    )
+    x = interface.nodes.copy()
+    x[: len(upper), 1] -= GAP
+    return interface, x.ravel()
+
+
+def pushed(formulation: Any, interface: Interface, z: Any) -> Any:
+    """Forces (n_nodes, 2) by which contact pushes the nodes."""
+    return -formulation.residual(interface, formulation.pair(interface, z), z).reshape(-1, 2)
+
+
+def exactly(text: str) -> list[Fraction]:
+    return [Fraction(word) for word in text.split()]
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "expected"),
+    [(case, name, expected) for case, (_, _, rows) in TABLE.items() for name, expected in rows.items()],
+)
+def test_force_tables_come_out_exactly(case: str, name: str, expected: str) -> None:
+    slave, master, _ = TABLE[case]
+    interface, z = flat(slave, master)
+    forces = pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
+    n_slave = interface.n_slave_nodes
+    found = [Fraction(float(value)).limit_denominator(60) for value in -forces[n_slave:, 1][::-1]]
+    assert found == exactly(expected)
+    assert np.abs([float(value) for value in found] + forces[n_slave:, 1][::-1]).max() < 64 * 2.0**-53
+    on_slave = [1] * n_slave if name == "nts" else exactly(ON_THE_SLAVE[case])
+    assert [Fraction(float(value)) for value in forces[:n_slave, 1]] == on_slave
+    assert not forces[:, 0].any()
+
+
+@pytest.mark.parametrize("theta", [0.1, 0.3])
+def test_printed_ppt_loses_one_minus_cosine_of_the_slave_force(theta: float) -> None:
+    interface, z = flat([1.0], [1.3, 1.4], shift=-0.8)
+    x = z.reshape(-1, 2).copy()
+    x[1] = x[0] + [np.cos(theta), -np.sin(theta)]  # penetrates deeper to the right; each area covers both segments
+    forces = pushed(contactverif_nts.vts_ppt(penalty=PENALTY, n=1), interface, x.ravel())
+    pairing = contactverif_nts.vts_ppt(penalty=PENALTY, n=1).pair(interface, x.ravel())
+    assert pairing["first"][0] != pairing["last"][0]
+    defect = np.linalg.norm(forces.sum(axis=0)) / np.linalg.norm(forces[:2].sum(axis=0))
+    assert defect == pytest.approx(1 - np.cos(theta), rel=1e-12)
+    balanced = pushed(contactverif_nts.vts_ppt_balanced(penalty=PENALTY, n=1), interface, x.ravel())
+    assert np.linalg.norm(balanced.sum(axis=0)) < 16 * 2.0**-53
+
+
+def test_free_ends_truncate_extend_and_cover() -> None:
+    """Half of the slave's last quarter overhangs; beside it a short last segment of the master."""
+    interface, z = flat([4.0], [3.375, 0.125], shift=0.0)
+    n_slave = interface.n_slave_nodes
+    truncated = pushed(contactverif_nts.vts_ppt(penalty=PENALTY), interface, z)
+    extended = pushed(contactverif_nts.vts_ppt(penalty=PENALTY, free_end="extend"), interface, z)
+    covered = pushed(contactverif_nts.vts_ppt_balanced(penalty=PENALTY), interface, z)
+    assert truncated[:n_slave, 1].sum() == 4
+    assert -truncated[n_slave:, 1].sum() == 3.5
+    b = 5.0  # the area of competence ends five lengths of the last segment behind its beginning
+    assert -extended[n_slave, 1] == 0.125 * b**2 / 2
+    assert -extended[n_slave:, 1].sum() == 4
+    assert covered[:n_slave, 1].sum() == 3.5
+    exact = [3.5 - 3.5**2 / 8, 3.5**2 / 8, 1 / 16, 3.5 / 2, 3.375 / 2]  # uniform pressure on [0, 3.5]
+    assert covered[:, 1] * np.sign(covered[:, 1]) == pytest.approx(exact, rel=1e-14)
+
+
+def test_a_slave_wholly_past_the_master_feels_nothing() -> None:
+    interface, z = flat([1.0, 1.0], [1.0], shift=5.0)
+    for name in EVERY:
+        assert not pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z).any()
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_an_open_gap_gives_no_force_and_exactly_closed_neither(name: str) -> None:
+    interface, z = flat([2, 2], [3, 1])
+    for lift in (GAP, 2 * GAP):
+        x = z.reshape(-1, 2).copy()
+        x[: interface.n_slave_nodes, 1] += lift
+        assert not pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, x.ravel()).any()
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.1, 6.2, 23))
+@pytest.mark.parametrize("name", EVERY)
+def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: float) -> None:
+    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
+    turned = pushed(formulation, interface, (z.reshape(-1, 2) @ turn.T).ravel())
+    assert turned @ turn == pytest.approx(pushed(formulation, interface, z), abs=1e-13)
+
+
+@pytest.mark.parametrize("n_master", [1, 2, 7, 100])
+def test_any_number_of_master_segments_under_one_slave_segment(n_master: int) -> None:
+    interface, z = flat([12.0], [12.0 / n_master] * n_master)
+    for name in ("vts_ppt", "vts_ppt_balanced"):
+        forces = pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
+        share = 12 / n_master
+        expected = [-share / 2, *[-share] * (n_master - 1), -share / 2]
+        assert forces[2:, 1] == pytest.approx(expected, rel=1e-12)
+
+
+def test_several_and_closed_chains() -> None:
+    """A closed square master inside a closed square slave that presses on all four of its sides."""
+    from contactverif import Surface
+
+    inner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)  # body on the left: counter-clockwise
+    outer = 0.95 * inner[::-1] * [1, 1]  # a hole: clockwise, a little too small
+    numbers = np.arange(4)
+    ring = np.column_stack([numbers, np.roll(numbers, -1)])
+    interface = Interface(np.vstack([outer, inner]), Surface(ring), Surface(ring + 4))
+    assert (interface.master.neighbours >= 0).all()
+    for name in ("nts_ar", "vts_me", "vts_ppt", "vts_ppt_balanced"):
+        formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
+        forces = pushed(formulation, interface, interface.nodes.ravel())
+        assert np.abs(forces.sum(axis=0)).max() < 1e-14
+        radial = (forces[:4] * outer).sum(axis=1)
+        assert radial == pytest.approx(radial[0])
+        assert radial[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "named"),
+    [
+        (contactverif_nts.vts_me, {"n": 0}, "n: found 0"),
+        (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
+        (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
+        (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),
+        (contactverif_nts.nts, {"tau": -1}, "tau: found -1"),
+        (contactverif_nts.vts_ppt, {"penalty": 0}, "penalty: found 0"),
+        (contactverif_nts.vts_ppt, {"penalty": float("nan")}, "penalty: found nan"),
+    ],
+)
+def test_options_are_checked(make: Callable[..., Any], options: dict[str, Any], named: str) -> None:
+    with pytest.raises(MisuseError, match=named):
+        make(**{"penalty": 1.0, **options})
