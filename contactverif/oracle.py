@@ -24,18 +24,12 @@ _PAIRS_AT_ONCE = 2**18  # of points and master segments, so that memory stays sm
 _SNAP = 1e-2  # past a free end by this share of the segment, formulations may still see contact
 
 
-# ---------------------------------------------------------------- consistent nodal forces of a flat interface
-
-
 def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> list[Fraction]:
     """Lengths (n_nodes,) that a uniform pressure is multiplied by to give the consistent nodal forces.
 
     Slave nodes: ∫ N over their segments. Master nodes: ∫ N over the part of the master that slave chains cover.
-
-    Parameters
-    ----------
-    along : (n_nodes,) coordinate of each node along the straight interface, a length; floats count as the rationals
-        that they are. Chains are open, and those of one surface do not overlap.
+    `along` (n_nodes,) is the coordinate of each node along the straight interface, a length; floats count as the
+    rationals that they are. Chains are open, and those of one surface do not overlap.
     """
     places, scale = _integers(np.asarray(along, dtype=np.float64))
     weights = [Fraction(0)] * len(places)
@@ -64,13 +58,14 @@ def uniform_pressure_weights(interface: Interface, along: ArrayLike) -> FloatArr
 
 def _covered(slave: Surface, places: list[int]) -> list[tuple[int, int]]:
     """The stretch that each slave chain covers."""
+    firsts, lasts = slave.segments[:, 0].tolist(), slave.segments[:, 1].tolist()
     stretches: list[tuple[int, int]] = []
     for segment in slave.chain_order.tolist():
-        low, high = sorted(places[node] for node in slave.segments[segment].tolist())
         if slave.neighbours[segment, 0] < 0:
-            stretches.append((low, high))
-        else:
-            stretches[-1] = (min(stretches[-1][0], low), max(stretches[-1][1], high))
+            begin = places[firsts[segment]]
+        if slave.neighbours[segment, 1] < 0:
+            end = places[lasts[segment]]
+            stretches.append((min(begin, end), max(begin, end)))
     return stretches
 
 
@@ -80,8 +75,6 @@ def _integers(values: FloatArray) -> tuple[list[int], int]:
     scale = max(denominator for _, denominator in ratios)
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
 
-
-# ---------------------------------------------------------------- exact projection
 
 _Point = tuple[int, int]
 
@@ -146,8 +139,7 @@ class _Exact:
         return self.nodes[first], self.nodes[second]
 
     def direction(self, segment: int) -> _Point:
-        first, second = self.ends(segment)
-        return second[0] - first[0], second[1] - first[1]
+        return _from(*self.ends(segment))
 
     def nearest(self, point: _Point) -> Projection:
         ranked = []
@@ -164,12 +156,11 @@ class _Exact:
                 distance = Fraction(_dot(_from(end, point), _from(end, point)))
                 ranked.append((distance, Fraction(past * past, squared), segment))
         best, overshoot, segment = min(ranked)
-        first, _ = self.ends(segment)
-        along = self.direction(segment)
-        gap = -_cross(along, _from(first, point))  # times the segment's length
+        along, from_first = self.direction(segment), _from(self.ends(segment)[0], point)
+        gap = -_cross(along, from_first)  # times the segment's length
         return Projection(
             segment=segment,
-            xi=Fraction(_dot(_from(first, point), along), _dot(along, along)),
+            xi=Fraction(_dot(from_first, along), _dot(along, along)),
             squared_distance=best / self.scale**2,
             signed_squared_gap=Fraction(gap * abs(gap), _dot(along, along)) / self.scale**2,
             tied=tuple(index for distance, _, index in ranked if distance == best),
@@ -177,8 +168,8 @@ class _Exact:
         )
 
 
-def _from(origin: _Point, point: _Point) -> _Point:
-    return point[0] - origin[0], point[1] - origin[1]
+def _from(a: _Point, b: _Point) -> _Point:
+    return b[0] - a[0], b[1] - a[1]
 
 
 def _dot(a: _Point, b: _Point) -> int:
@@ -245,9 +236,6 @@ def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) ->
         yield from ("first", "last", *["intermediate"] * (len(covered) - 2))
 
 
-# ---------------------------------------------------------------- distance to a kink
-
-
 def usual_places(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Contact points to ask about where a plugin names none: nodes, quarter points, middles of the slave segments.
 
@@ -312,24 +300,14 @@ def kink_margin(
     return max(margin, 0.0)
 
 
-def gaps(interface: Interface, z: FloatArray, slave_segment: IntArray, c: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The nearest master segments (n_points,) and the gaps (n_points,) to their lines, in floats."""
-    nodes = np.asarray(z, dtype=np.float64)[: interface.n_unknowns].reshape(-1, 2)
-    points = _at(nodes[interface.slave.segments[slave_segment]], c)
-    line = _Line.of(interface.master, nodes)
-    home = _distances(line, points)[1]
-    return home, _dots(points - line.first[home], line.normal[home])
-
-
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """The master in floats: (n_segments,) lengths, (n_segments, dim) ends, tangents and normals, neighbours."""
+    """The master in floats; axes are those of a surface's segments."""
 
-    first: FloatArray
+    first: FloatArray  # (n_segments, dim), as the second ends and the tangents
     second: FloatArray
-    length: FloatArray
+    length: FloatArray  # (n_segments,)
     tangent: FloatArray
-    normal: FloatArray
     neighbours: IntArray
 
     @classmethod
@@ -337,8 +315,7 @@ class _Line:
         first, second = nodes[master.segments[:, 0]], nodes[master.segments[:, 1]]
         length = np.hypot(*(second - first).T)
         tangent = (second - first) / length[:, None]
-        normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
-        return cls(first, second, length, tangent, normal, master.neighbours)
+        return cls(first, second, length, tangent, master.neighbours)
 
 
 def _at(carriers: FloatArray, c: FloatArray) -> FloatArray:
@@ -380,7 +357,7 @@ def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
     own = distance[rows, home]
     length, inverse, tangent = line.length[home], 1 / line.length[home], line.tangent[home]
     difference = points - line.first[home]
-    foot, gap = _dots(difference, tangent), _dots(difference, line.normal[home])
+    foot, gap = _dots(difference, tangent), _dots(difference, tangent[:, ::-1] * [1, -1])
     overshoot = np.maximum(np.maximum(-foot, foot - length), 0.0)
     least = float((np.abs(gap) / (3 * (1 + overshoot * inverse))).min(initial=np.inf))
     by_distance = (distance - own[:, None]) / 4

@@ -21,7 +21,17 @@ from contactverif.case import Case
 from contactverif.interface import Interface
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assembled, on_lattice, shortest
-from contactverif.strategies.parts import OFFSETS, dealt, depth_units, depths, lengths, motions, penalties, seeds
+from contactverif.strategies.parts import (
+    OFFSETS,
+    dealt,
+    depth_units,
+    depths,
+    lengths,
+    motions,
+    penalties,
+    seeds,
+    shifts,
+)
 from contactverif.strategies.rings import Ring, rings
 
 _ON = st.integers(0, 7)  # 0 is no offset
@@ -79,29 +89,33 @@ class Broken:
     unit: float
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
-        """The panel; nodes moved by so many sevenths of a small length, 0 for none."""
+        """The panel; nodes moved off the lattice by these numerators, 0 for none."""
         line = self._master(offsets)
         x = self.start + np.concatenate([[0.0], np.cumsum(self.slave)])
         length = min(shortest(line), min(self.slave))
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
-        sevenths = dealt(offsets, 2 * len(x)).reshape(-1, 2) / 7 / 16
-        depth = (dealt(self.quarters, len(x)) / 4 + sevenths[:, 1]) * self.unit * length
-        x = x + sevenths[:, 0] * length
+        shift = shifts(offsets, len(x))
+        depth = (dealt(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
+        x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
         heights = on_lattice(np.interp(x, *line.T)) + rise - depth
         return Panel(np.column_stack([x, heights]), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
-        """Points (n, 2) from left to right. Walls lean by some thirteenths, so that nothing is seen edge-on.
+        """Points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
 
-        No wall stands on a wall, so that no two nodes can coincide.
+        With an offset walls lean and bends are uneven, so that nothing is seen exactly edge-on.
         """
         points, upright = [(0.0, 0.0)], False
-        for (along, up, kind), offset in zip(self.steps, cycle(offsets), strict=False):
+        for index, ((along, up, kind), offset) in enumerate(zip(self.steps, cycle(offsets), strict=False)):
             upright = kind == _WALL and not upright
-            dx, dy = (offset / 13 / 32, (up or 1) / 2) if upright else (along, up * self.bend)
+            dx, dy = (
+                (offset / 13 / 32, (up or 1) / 2)
+                if upright
+                else (along, (up + index % 3 * offset / 13 / 32) * self.bend)
+            )
             points.append((points[-1][0] + dx, points[-1][1] + dy))
         return np.array(points)
 

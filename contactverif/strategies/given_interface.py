@@ -9,8 +9,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
 from contactverif.interface import Interface, Surface
-from contactverif.oracle import gaps
-from contactverif.strategies.parts import OFFSETS, dealt, depth_units, depths, penalties, seeds
+from contactverif.strategies.parts import OFFSETS, depth_units, depths, penalties, seeds, shifts
 
 _QUARTERS = st.integers(1, 8)
 _ON = st.integers(0, 7)  # 0 is no offset
@@ -91,7 +90,7 @@ def states(draw: DrawFn, interface: Interface, smooth: bool) -> Case:
     positions = interface.nodes.copy()
     for waves, part in ((slave_waves, slice(0, n_slave)), (master_waves, slice(n_slave, None))):
         positions[part] += depth / 4 * _waves(interface.nodes[part], waves)
-    positions[:n_slave] += (dealt(offsets, 2 * n_slave) / 7 / 32 * min(depth, shortest)).reshape(-1, 2)
+    positions[:n_slave] += shifts(offsets, n_slave) / 2 * min(depth, shortest)
     positions[:n_slave] += _push(interface, positions, depth)
     return Case(interface, positions.reshape(-1), penalty, {}, seed)
 
@@ -113,16 +112,17 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
 
 def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:
     """Translation (2,) of the slave that brings its deepest node to the penetration `depth`."""
-    count = len(interface.slave)
-    segments = np.repeat(np.arange(count), 2)
-    home, gap = gaps(interface, positions.reshape(-1), segments, np.tile([-1.0, 1.0], count))
-    ends = positions[interface.master.segments[home]]
-    tangents = ends[:, 1] - ends[:, 0]
-    squared = (tangents**2).sum(axis=1)
-    points = positions[interface.slave.segments].reshape(-1, 2)
-    foot = ((points - ends[:, 0]) * tangents).sum(axis=1) / squared
-    outside = (foot < 0) | (foot > 1)
-    deepest = int(np.argmin(np.where(outside & ~outside.all(), np.inf, gap)))
-    normal = np.array([tangents[deepest, 1], -tangents[deepest, 0]]) / np.sqrt(squared[deepest])
-    push: FloatArray = -(gap[deepest] + depth) * normal
+    ends = positions[interface.master.segments]  # (n_segments, 2 ends, dim)
+    along = ends[:, 1] - ends[:, 0]
+    length = np.hypot(*along.T)
+    deepest, push = np.inf, np.zeros(2)
+    for point in positions[: interface.n_slave_nodes]:
+        foot = np.einsum("ij,ij->i", point - ends[:, 0], along) / length**2
+        feet = ends[:, 0] + np.clip(foot, 0, 1)[:, None] * along
+        home = int(np.argmin(np.hypot(*(point - feet).T)))
+        normal = np.array([along[home, 1], -along[home, 0]]) / length[home]
+        gap = float((point - ends[home, 0]) @ normal)
+        beyond = not 0 <= foot[home] <= 1  # counts only where nothing is above the master
+        if gap + beyond * length.sum() < deepest:
+            deepest, push = gap + beyond * length.sum(), -(gap + depth) * normal
     return push

@@ -19,9 +19,10 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.arrays import FloatArray
 from contactverif.errors import MisuseError
 
-# Numerators over 7: a second lattice, coprime to the powers of two.
 SEVENTHS = st.integers(0, 6)
-OFFSETS = st.lists(st.integers(1, 6), min_size=1, max_size=7)  # dealt out in turn, never 0
+# Numerators of offsets from the lattice, dealt out in turn and never 0: over 7 along the slave, over 11 across it,
+# over 13 for the master. All are coprime to the powers of two, and to each other, so that none undoes another.
+OFFSETS = st.lists(st.integers(1, 6), min_size=1, max_size=7)
 _QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (cos, sin)
 
 
@@ -114,6 +115,11 @@ def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> 
     place = st.integers(-furthest, furthest)
     exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
     return st.one_of(st.just(REST), st.builds(Motion, degrees, st.tuples(place, place), exponent))
+
+
+def shifts(offsets: Sequence[int], count: int) -> FloatArray:
+    """Shifts (count, 2) of slave nodes, along and across, of 0 to 1/16."""
+    return dealt(offsets, 2 * count).reshape(-1, 2) / [7.0, 11.0] / 16
 
 
 def dealt(values: Sequence[int], count: int) -> FloatArray:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
-from numpy.typing import NDArray
 
 from contactverif.arrays import FloatArray
 from contactverif.strategies.panels import Panel, on_lattice, shortest
-from contactverif.strategies.parts import dealt, depth_units, depths
+from contactverif.strategies.parts import dealt, depth_units, depths, shifts
 
 RADIUS = 4.0
 
@@ -38,21 +36,21 @@ class Ring:
     unit: float
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
-        """The panel; slave nodes moved by so many sevenths of a small length, 0 for none."""
-        uneven = dealt(offsets, len(self.master)) * (np.arange(len(self.master)) % 3) / 13 / 8  # nothing is edge-on
-        master = self._points(np.add(self.master, uneven), not self.inner_slave)
-        reference = self._points(np.array(self.slave), self.inner_slave)
+        """The panel; slave nodes moved off the lattice by these numerators, 0 for none."""
+        warp = 1 + offsets[0] / 13 / 8  # no two segments at right angles, so that nothing is seen exactly edge-on
+        master = self._points(self.master, not self.inner_slave, warp)
+        reference = self._points(self.slave, self.inner_slave, 1.0)
         length = min(shortest(master), shortest(reference))
         depth = on_lattice(dealt(self.quarters, len(reference)) / 4 * self.unit * length)
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
-        shift = dealt(offsets, reference.size).reshape(-1, 2) / 7 / 16 * length
+        shift = shifts(offsets, len(reference)) * length
         slave = on_lattice(reference + outward * depth[:, None]) + shift
         return Panel(slave, master, reference, closed=self.degrees == 360)
 
-    def _points(self, weights: NDArray[Any], inner: bool) -> FloatArray:
+    def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
         """Points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
-        shares = np.concatenate([[0.0], np.cumsum(weights)]) / np.sum(weights)
-        angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares))
+        shares = np.concatenate([[0.0], np.cumsum(weights)]) / sum(weights)
+        angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
         points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
         return points if inner else points[::-1]
 

@@ -70,12 +70,12 @@ def residual(
     """Nodal forces (n_states, n_nodes, 2) at the positions x (n_states, n_nodes, 2)."""
     forces = np.zeros_like(x)
     for state in range(x.shape[0]):
+        x_now, r = x[state], forces[state]
         for point in range(len(segment)):
             if not active[point]:
                 continue
             a, b = slave[segment[point], 0], slave[segment[point], 1]
             node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
-            x_now, r = x[state], forces[state]
             c_v = c[slot[point]]
 
             x_v = between(node(x_now, a), node(x_now, b), c_v)

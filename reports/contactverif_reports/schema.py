@@ -28,6 +28,7 @@ PARAMETER_UNITS: Mapping[str, str] = {
     "penetration": LENGTH,
     "along": LENGTH,
     "direction": RATIO,
+    "cosine": RATIO,
 }
 
 VERDICTS: Mapping[str, int] = {str(verdict).replace(" ", "_"): int(verdict) for verdict in Verdict}

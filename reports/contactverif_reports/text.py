@@ -16,12 +16,12 @@ _LISTED = 8  # nodes a side whose numbers are written down
 
 
 def as_text(case: Case, width: int = 72) -> str:
-    """The case as text of at most `width` columns (at least 40), lines separated by newlines.
+    """The case as text of at most `width` columns (at least 60), lines separated by newlines.
 
     A flat interface is two lines with their nodes to scale and the lengths between them; any other is a small picture
     and, up to eight nodes a side, a table of current positions.
     """
-    width = max(width, 40)
+    width = max(width, 60)
     course, gaps = Course.of(case), Gaps.of(case)
     lengths = np.concatenate(
         [surface.lengths(case.positions) for surface in (case.interface.slave, case.interface.master)]
@@ -38,7 +38,7 @@ def as_text(case: Case, width: int = 72) -> str:
         notes = [note]
     if unit_name:
         notes.append(f"lengths, positions and gaps in units of {unit_name}")
-    table = [] if course.flat else _table(case, gaps, unit, course.roundoff)
+    table = [] if course.flat else _table(case, gaps, unit, course.roundoff, width)
     if course.flat or not table:
         notes.append(_gaps(gaps, course, unit))
     notes.append(_rest(case))
@@ -69,8 +69,8 @@ def _gaps(gaps: Gaps, course: Course, unit: float) -> str:
     return f"{f'penetration {amount}' if mean < 0 else f'open by {amount}' if mean else 'touching'} {where}"
 
 
-def _table(case: Case, gaps: Gaps, unit: float, roundoff: float) -> list[str]:
-    """Current positions of the nodes, slave left and master right; nothing for more than eight nodes a side."""
+def _table(case: Case, gaps: Gaps, unit: float, roundoff: float, width: int) -> list[str]:
+    """Current positions, slave left and master right if that fits; nothing for more than eight nodes a side."""
     n_slave = case.interface.n_slave_nodes
     if max(n_slave, case.interface.n_nodes - n_slave) > _LISTED:
         return []
@@ -82,6 +82,8 @@ def _table(case: Case, gaps: Gaps, unit: float, roundoff: float) -> list[str]:
         row.append(short(gap / unit, roundoff / unit) if facing else "beyond")
     left = _aligned([[SLAVE_NODE, "x", "y", "gap"], *rows[:n_slave]])
     right = _aligned([[MASTER_NODE, "x", "y"], *rows[n_slave:]])
+    if len(left[0]) + len(right[0]) + 8 > width:
+        return [f"  {row}" for row in [*left, *right]]
     height, indent = max(len(left), len(right)), len(left[0])
     left += [" " * indent] * (height - len(left))
     right += [""] * (height - len(right))

@@ -33,5 +33,5 @@ def test_the_nearest_segment_is_the_rational_one(seed: int) -> None:
 def test_ties_at_a_vertex_go_by_the_foot_and_then_by_number() -> None:
     corner = Interface.from_chains([[0, 5], [1, 5]], [[2, 2], [0, 0], [-2, 2]])  # re-entrant seen from above
     x = corner.nodes.copy()
-    for p, expected in (([0.5, -1.0], 1), ([-0.5, -1.0], 0), ([0.0, -1.0], 0)):
+    for p, expected in (([0.5, -1.0], 0), ([-0.5, -1.0], 1), ([0.0, -1.0], 0)):
         assert found(corner, x, np.array(p)) == expected

@@ -1,0 +1,102 @@
+"""A stored case comes back bit by bit; what is no report is named as what it is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+from made import ERROR, awkward, small_run
+
+from contactverif.case import Case
+from contactverif.errors import MisuseError
+from contactverif.property import Verdict
+from contactverif_reports.read import case_ids, read_case, same_data
+from contactverif_reports.write import write
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    path = tmp_path / "report.nc"
+    write(small_run(), path)
+    return path
+
+
+def same_bits(a: Case, b: Case) -> bool:
+    ours, theirs = a.to_arrays(), b.to_arrays()
+    return list(ours) == list(theirs) and all(
+        ours[name].shape == theirs[name].shape
+        and ours[name].dtype == theirs[name].dtype
+        and ours[name].tobytes() == theirs[name].tobytes()
+        for name in ours
+    )
+
+
+def test_ids_in_the_order_of_the_run(report: Path) -> None:
+    assert case_ids(report) == [
+        "vts-me_n_4.patch.flat.transmission",
+        "vts-me_n_4.tangent.directional.witness",
+        "vts-me_n_4.objectivity",
+    ]
+
+
+def test_every_bit_of_a_case_comes_back(report: Path) -> None:
+    stored = read_case(report, "vts-me_n_4.tangent.directional.witness")
+    assert same_bits(stored.case, awkward())
+    assert np.signbit(stored.case.z[3])
+
+
+def test_what_was_found_comes_back(report: Path) -> None:
+    stored = read_case(report, "vts-me_n_4.patch.flat.transmission")
+    assert (stored.formulation, stored.property_id) == ("vts-me:n=4", "patch.flat.transmission")
+    assert (stored.verdict, stored.reason) == (Verdict.FAIL, "force error 0.25, at most 1e-12")
+    assert (stored.values, stored.tolerances) == ({ERROR.name: 0.25}, {ERROR.name: 1e-12})
+    crashed = read_case(report, "vts-me_n_4.objectivity")
+    assert (crashed.verdict, crashed.values) == (Verdict.CRASHED, {})
+    partly = read_case(report, "vts-me_n_4.tangent.directional.witness")
+    assert list(partly.values) == [ERROR.name]  # the slope was not measured
+
+
+def test_an_unknown_id_suggests_the_nearest(report: Path, tmp_path: Path) -> None:
+    with pytest.raises(MisuseError, match=r"an id like vts-me_n_4\.patch\.flat\.transmission"):
+        read_case(report, "vts-me.patch.flat.transmision")
+    with pytest.raises(MisuseError, match=re.escape("one of vts-me_n_4.patch")):
+        read_case(report, "§")
+    write(small_run(passing=True), tmp_path / "passing.nc")
+    assert case_ids(tmp_path / "passing.nc") == []
+    with pytest.raises(MisuseError, match="this one has none"):
+        read_case(tmp_path / "passing.nc", "x")
+
+
+def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
+    (tmp_path / "text.nc").write_text("not a report")
+    (tmp_path / "cut.nc").write_bytes(report.read_bytes()[:5000])
+    netCDF4.Dataset(tmp_path / "other.nc", "w").close()
+    with netCDF4.Dataset(tmp_path / "newer.nc", "w") as newer:
+        newer.title, newer.schema = "contactverif", "99"
+    with netCDF4.Dataset(tmp_path / "empty.nc", "w") as empty:
+        empty.title, empty.schema = "contactverif", "1"
+    for name, words in {
+        "missing.nc": "does not exist",
+        ".": "is a folder",
+        "text.nc": "no netCDF file",
+        "cut.nc": "no netCDF file",
+        "other.nc": "of something else",
+        "newer.nc": "schema 99; needed schema 1",
+        "empty.nc": "without the group 'counterexamples'",
+    }.items():
+        with pytest.raises(MisuseError, match=words) as error:
+            case_ids(tmp_path / name)
+        assert error.value.argument == "REPORT"
+    with pytest.raises(MisuseError, match="no netCDF file"):
+        same_data(report, tmp_path / "text.nc")
+
+
+def test_a_damaged_case_is_said_to_be_one(report: Path) -> None:
+    with netCDF4.Dataset(report, "a") as file:
+        file["counterexamples/vts-me_n_4.objectivity/case"].renameVariable("z", "zz")
+        file["counterexamples/vts-me_n_4.objectivity/case/zz"].delncattr("case_array")
+    with pytest.raises(MisuseError, match="undamaged"):
+        read_case(report, "vts-me_n_4.objectivity")

@@ -1,0 +1,38 @@
+"""The examples of reports/README.md run."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from made import small_run
+
+from contactverif_reports.write import write
+
+README = Path(__file__).parents[2] / "reports" / "README.md"
+
+
+def test_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(small_run(), "report.nc")
+    examples = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        exec(compile(example, str(README), "exec"), {})
+    printed = capsys.readouterr().out
+    assert "vts-me:n=4   objectivity    crashed" in printed
+    assert "vts-me_n_4.patch.flat.transmission · force error 0.25" in printed
+    assert "slave   ●─2─●─2─●───4───●───4───●" in printed
+    assert len(list(tmp_path.glob("*.svg"))) == 3
+
+
+def test_every_group_and_variable_is_in_the_prose(tmp_path: Path) -> None:
+    import xarray as xr
+
+    write(small_run(), tmp_path / "report.nc")
+    prose = README.read_text(encoding="utf-8")
+    with xr.open_datatree(tmp_path / "report.nc") as tree:
+        for group in tree.subtree:
+            for name in group.to_dataset().data_vars:
+                assert f"`{name}`" in prose or str(name).startswith("parameter_"), f"{group.path}/{name}"

@@ -1,0 +1,292 @@
+"""A report is whole or not there; it opens anywhere; two equal runs give equal data."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from made import ERROR, flat, outcome, question, small_run
+
+from contactverif.errors import MisuseError
+from contactverif.property import Verdict
+from contactverif.result import Row, Run
+from contactverif_reports.read import same_data
+from contactverif_reports.schema import VERDICTS, case_id, group_of
+from contactverif_reports.summary import worst
+from contactverif_reports.write import check_writable, write
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    path = tmp_path / "report.nc"
+    write(small_run(), path)
+    return path
+
+
+def variables(group: netCDF4.Dataset) -> list[netCDF4.Variable]:
+    return [*group.variables.values(), *(entry for child in group.groups.values() for entry in variables(child))]
+
+
+def test_opens_with_xarray(report: Path) -> None:
+    with xr.open_datatree(report) as tree:
+        assert list(tree.children) == [
+            "summary", "patch", "tangent", "invariants", "counterexamples", "timing",
+        ]  # fmt: skip
+        patch = tree["patch/flat_transmission"].to_dataset()
+        assert patch.sizes == {"formulation": 2, "case": 4, "quantity": 1, "detail": 1}
+        verdicts = patch.verdict.sel(formulation="vts-me:n=4").values
+        np.testing.assert_array_equal(verdicts, [0, 0, 1, np.nan])
+        assert patch.value.sel(formulation="vts-me:n=4", quantity=ERROR.name)[2] == 0.25
+        assert patch.reason.sel(formulation="vts-me:n=4")[2] == "force error 0.25, at most 1e-12"
+        assert patch.tolerance_formula.values == [ERROR.tolerance]
+        assert patch.n_master_segments.sel(formulation="vts-ppt").values.tolist() == [1, 1, 1, 1]
+        assert patch.parameter_penetration.units == "m"
+        assert patch.witness.values.tolist() == ["", "C′ №1"]
+        assert tree["tangent/directional"].sizes["quantity"] == 2
+        assert "quantity" not in tree["invariants/objectivity"].sizes
+
+
+def test_root_attributes_are_the_provenance(report: Path) -> None:
+    with xr.open_datatree(report) as tree:
+        assert tree.attrs["seed"] == "7"
+        assert tree.attrs["passed"] == "false"
+        assert tree.attrs["schema"] == "1"
+        assert tree.attrs["Conventions"] == "CF-1.11 UGRID-1.0"
+
+
+def test_summary_counts_every_verdict(report: Path) -> None:
+    with xr.open_datatree(report) as tree:
+        summary = tree["summary"].to_dataset().load()
+    row = summary.sel(formulation="vts-me:n=4", property="patch.flat.transmission")
+    assert row["count"].sel(verdict="pass") == 2
+    assert row["count"].sel(verdict="fail") == 1
+    assert (row.planned, row.judged, row.row_verdict, row.promise) == (4, 3, VERDICTS["fail"], 2)
+    assert (row.worst_value, row.worst_tolerance, row.worst_case) == (0.25, 1e-12, 2)
+    assert summary.sizes["verdict"] == len(Verdict)
+    assert summary.unexpected.sel(formulation="vts-me:n=4", property="objectivity").item() == "crashed"
+    assert summary.provided.sel(formulation="vts-ppt", part="tangent") == 0
+    assert "tangent: not provided" in summary.attrs["parts"]
+    assert summary.not_loaded.values.tolist() == ["mine"]
+    assert "No module named 'mine'" in summary.not_loaded_reason.item()
+
+
+def test_reads_like_documentation(report: Path) -> None:
+    with netCDF4.Dataset(report) as file:
+        for variable in variables(file):
+            assert variable.long_name, variable
+            if variable.dtype.kind == "S":
+                assert variable._Encoding == "utf-8"
+                continue
+            assert variable.units, variable
+            if variable.ndim:
+                assert variable.filters()["zlib"], variable
+                assert variable.filters()["complevel"] == 4
+            if hasattr(variable, "flag_meanings"):
+                assert len(variable.flag_meanings.split()) == len(variable.flag_values)
+            assert variable.dtype is not str  # those crash HDF5 when a file is opened twice
+
+
+def test_counterexample_is_a_ugrid_mesh(report: Path) -> None:
+    with xr.open_datatree(report) as tree:
+        example = tree["counterexamples/vts-me_n_4.patch.flat.transmission"].to_dataset()
+        mesh = example.mesh.attrs
+        assert (mesh["cf_role"], mesh["topology_dimension"]) == ("mesh_topology", 1)
+        assert example[mesh["edge_node_connectivity"]].attrs["start_index"] == 0
+        x, y = (example[name] for name in mesh["node_coordinates"].split())
+        assert x.dims == y.dims == ("node",)
+        assert example.side.values.tolist() == [0] * 4 + [1] * 4
+        np.testing.assert_array_equal(example.current_y.values[:5], -0.125)
+        assert set(tree["counterexamples"].children) == {
+            "vts-me_n_4.patch.flat.transmission", "vts-me_n_4.tangent.directional.witness", "vts-me_n_4.objectivity",
+        }  # fmt: skip
+
+
+def test_same_run_same_data(tmp_path: Path) -> None:
+    run = small_run()
+    slower = [
+        dataclasses.replace(
+            row, seconds=9.0, outcomes=tuple(dataclasses.replace(one, seconds=3.0) for one in row.outcomes)
+        )
+        for row in run.rows
+    ]
+    other = {"created": "2026", "command": "again", "platform": "elsewhere"}
+    write(run, tmp_path / "a.nc")
+    write(dataclasses.replace(run, rows=tuple(slower), provenance={**run.provenance, **other}), tmp_path / "b.nc")
+    assert same_data(tmp_path / "a.nc", tmp_path / "b.nc") == []
+
+
+def test_differences_are_told(tmp_path: Path) -> None:
+    run = small_run()
+    better = outcome(flat([2, 2], [4]), 2e-15)
+    first = dataclasses.replace(run.rows[0], outcomes=(better, *run.rows[0].outcomes[1:]))
+    changed = dataclasses.replace(run, rows=(first, *run.rows[1:]), provenance={**run.provenance, "seed": "8"})
+    write(run, tmp_path / "a.nc")
+    write(changed, tmp_path / "b.nc")
+    assert same_data(tmp_path / "a.nc", tmp_path / "b.nc") == [
+        "/:seed: 7 and 8",
+        "/patch/flat_transmission/value: 1e-15 and 2e-15 at (0, 0, 0), and 0 more",
+    ]
+    write(small_run(passing=True), tmp_path / "b.nc")
+    assert any(line.startswith("/counterexamples/") for line in same_data(tmp_path / "a.nc", tmp_path / "b.nc"))
+
+
+def test_nothing_but_plugins_that_did_not_load(tmp_path: Path) -> None:
+    write(Run((), small_run().not_loaded), tmp_path / "none.nc")
+    with xr.open_datatree(tmp_path / "none.nc") as tree:
+        assert tree["summary"].not_loaded.values.tolist() == ["mine"]
+        assert tree.attrs["passed"] == "false"
+
+
+def test_words_that_netcdf_cannot_hold(tmp_path: Path) -> None:
+    odd = outcome(flat([1], [1]), 1.0, reason="lone \udc80, NUL \0, tab \t, ℓ")
+    row = Row("a b/c:d=é", question("a/b", "timing", ERROR), Verdict.FAIL, True, outcomes=(odd,), shrunk=odd)
+    write(Run((row, dataclasses.replace(row, formulation="a b/c:d=è"))), tmp_path / "odd.nc")
+    with xr.open_datatree(tmp_path / "odd.nc") as tree:
+        assert list(tree["counterexamples"].children) == ["a_b_c_d_.a_b", "a_b_c_d_.a_b-2"]
+        assert tree["timing_/a_b"].reason[0, 0].item() == "lone \\udc80, NUL \\x00, tab \t, ℓ"
+
+
+def test_names() -> None:
+    assert group_of("patch.flat.transmission", "patch") == "/patch/flat_transmission"
+    assert group_of("objectivity", "invariants") == "/invariants/objectivity"
+    assert case_id("two-pass/nts-ar:area=reference", "patch", witness=True) == (
+        "two-pass_nts-ar_area_reference.patch.witness"
+    )
+
+
+def test_worst_is_the_furthest_of_the_decided() -> None:
+    row = small_run().rows[0]
+    found = worst(row)
+    assert found is not None
+    assert (found.case, found.value) == (3, 4e-15)
+    assert worst(dataclasses.replace(row, outcomes=())) is None
+    nan = outcome(flat([1], [1]), float("nan"), Verdict.FAIL)
+    doubtful = outcome(flat([1], [1]), 1.0, Verdict.UNDECIDED)
+    found = worst(dataclasses.replace(row, outcomes=(*row.outcomes, doubtful, nan)))
+    assert found is not None
+    assert found.case == 5
+
+
+def test_an_exception_leaves_what_was_there(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = report.read_bytes()
+
+    def broken(self: xr.DataTree, path: Path, **options: object) -> None:
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(xr.DataTree, "to_netcdf", broken)
+    with pytest.raises(KeyboardInterrupt):
+        write(small_run(passing=True), report)
+    assert report.read_bytes() == before
+    assert os.listdir(report.parent) == [report.name]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None:
+    report = tmp_path / "report.nc"
+    if there:
+        write(small_run(), report)
+        before = report.read_bytes()
+    script = textwrap.dedent("""
+        import sys, time
+        import xarray as xr
+        from made import small_run
+        from contactverif_reports import write as writing
+        whole = xr.DataTree.to_netcdf
+        def slow(self, path, **options):
+            whole(self, path, **options)
+            with open(path, "r+b") as file:
+                file.truncate(5000)
+            print("half-way", flush=True)
+            time.sleep(600)
+        xr.DataTree.to_netcdf = slow
+        writing.write(small_run(passing=True), sys.argv[1])
+    """)
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(report)], cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            assert process.stdout.readline() == "half-way\n"
+        finally:
+            process.kill()
+    left = f".report.nc.{process.pid}.part"
+    assert sorted(os.listdir(tmp_path)) == [left, "report.nc"] if there else [left]
+    if there:
+        assert report.read_bytes() == before
+    mine = tmp_path / f".report.nc.{os.getppid()}.part"  # of a process that is alive
+    other = tmp_path / f".other.nc.{process.pid}.part"
+    mine.touch()
+    other.touch()
+    write(small_run(), report)
+    assert sorted(os.listdir(tmp_path)) == sorted([mine.name, other.name, "report.nc"])
+
+
+def test_reads_while_xarray_has_it_open(report: Path) -> None:
+    from contactverif_reports.read import case_ids, read_case
+
+    with xr.open_datatree(report) as tree:
+        str(tree)
+        for name in case_ids(report) * 3:
+            read_case(report, name)
+        assert tree["summary"].row_verdict.load().notnull().any()
+
+
+def test_replaces_the_file_behind_a_link(tmp_path: Path, report: Path) -> None:
+    link = tmp_path / "link.nc"
+    link.symlink_to(report)
+    write(small_run(passing=True), link)
+    assert link.is_symlink()
+    assert any("passed" in line for line in same_data(report, _written(tmp_path / "c.nc", small_run())))
+
+
+def _written(path: Path, run: Run) -> Path:
+    write(run, path)
+    return path
+
+
+def test_what_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    os.mkfifo(tmp_path / "pipe")
+    for path, words in {
+        tmp_path / "no" / "report.nc": "which is no folder",
+        file / "report.nc": "which is no folder",
+        tmp_path: "a folder",
+        tmp_path / "pipe": "no ordinary file",
+        tmp_path / ("long" * 62): "too long",
+    }.items():
+        with pytest.raises(MisuseError, match=words) as error:
+            check_writable(path)
+        assert error.value.argument == "--report"
+    for path_ in ("", "folder/"):
+        with pytest.raises(MisuseError, match="names no file"):
+            check_writable(path_)
+    check_writable(tmp_path / "new.nc")
+    assert sorted(os.listdir(tmp_path)) == ["file", "pipe"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_may_not_be_written_to(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(MisuseError, match="Permission denied"):
+            check_writable(tmp_path / "new.nc")
+    finally:
+        tmp_path.chmod(0o700)
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump is not installed")
+def test_ncdump_reads_it(report: Path) -> None:
+    header = subprocess.run(["ncdump", "-h", report], capture_output=True, text=True, check=True).stdout
+    assert "tangent: not provided" in header
+    assert 'flag_meanings = "no_promise promised said_to_fail"' in header
