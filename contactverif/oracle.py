@@ -1,8 +1,7 @@
 """Exact answers to judge by. The judge shares no code with the judged: nothing here is used by a plugin.
 
-Three kinds of answers: exact consistent nodal lengths of a flat interface, exact projections (rationals on the stored
-floats), and a float bound on how far a state is from a kink. Exact ones need no square root: lengths are compared by
-their squares.
+Exact consistent nodal lengths of a flat interface, exact projections (rationals on the stored floats; lengths are
+compared by their squares), and a bound in floats on how far a state is from a kink.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from contactverif.interface import Interface, Surface
 
 _PAIRS_AT_ONCE = 2**18  # of points and master segments, so that memory stays small
 _SNAP = 1e-2  # past a free end by this share of the segment, formulations may still see contact
+_Point = tuple[int, int]
 
 
 def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> list[Fraction]:
@@ -74,9 +74,6 @@ def _integers(values: FloatArray) -> tuple[list[int], int]:
     ratios = [value.as_integer_ratio() for value in values.reshape(-1).tolist()]
     scale = max(denominator for _, denominator in ratios)
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
-
-
-_Point = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +132,7 @@ class _Exact:
         return (away * ax + towards * bx) // self.fineness, (away * ay + towards * by) // self.fineness
 
     def ends(self, segment: int) -> tuple[_Point, _Point]:
-        first, second = self.master[segment]
-        return self.nodes[first], self.nodes[second]
+        return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
 
     def direction(self, segment: int) -> _Point:
         return _from(*self.ends(segment))
@@ -185,7 +181,7 @@ def projection_cases(interface: Interface, z: FloatArray, n: int = 2) -> Counter
 
     Keys: "one segment"; the roles "first", "intermediate", "last" of segments where there are several;
     "node exactly hit" by a foot; "beyond an end"; "convex vertex" and "concave vertex" inside an area; "edge-on",
-    where the walk stops before a segment seen edge-on or from behind; "turned away", where nothing is covered.
+    before a segment seen edge-on or from behind, where the walk stops; "turned away", where nothing is covered.
     """
     found: Counter[str] = Counter()
     half = Fraction(1, n)
@@ -239,10 +235,8 @@ def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) ->
 def usual_places(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Contact points to ask about where a plugin names none: nodes, quarter points, middles of the slave segments.
 
-    Returns
-    -------
-    (slave_segment, c, area_from, area_to), each (5 n_segments,): quarter points with the half of the segment around
-    them as area of competence, the others with none (NaN).
+    Returns (slave_segment, c, area_from, area_to), each (5 n_segments,): quarter points with the half of the segment
+    around them as area of competence, the others with none (NaN).
     """
     places = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
     count = len(interface.slave)
@@ -265,7 +259,8 @@ def kink_margin(
     ----------
     z : (n_unknowns,) current positions, flat.
     slave_segment, c : (n_points,) the contact points; −1 or NaN is no point.
-    area_from, area_to : (n_points,) ends of their areas of competence, as `c`; NaN or None where there is none.
+    area_from, area_to : (n_points,) ends of their areas of competence, as `c`; NaN or None where there is none. One
+        exactly at the node where the walk must stop was cut there by the formulation, which is no decision.
 
     Returns
     -------
@@ -370,12 +365,12 @@ def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
             end = outward[free] + (1 if side == 0 else -1) * past * (length[:, None] * tangent)[free]
             least = min(least, float(_margin(end, tangent[free], inverse[free]).min(initial=np.inf)))
         mean = tangent + line.tangent[other]
-        size = np.hypot(mean[:, 0], mean[:, 1])
+        size = np.hypot(*mean.T)
         steep = (inverse + 1 / line.length[other]) / 2
         with np.errstate(divide="ignore", invalid="ignore"):
             bisector = np.minimum(_margin(outward, mean / size[:, None], steep), size / (6 * steep))
-        # The bisector decides as long as the foot stays clear of the segment's other end.
-        inside = (1 if side == 1 else -1) * _dots(points - far[home], tangent)
+            inside = (1 if side == 1 else -1) * _dots(points - far[home], tangent)
+        # The bisector decides as long as the foot stays clear of the other end.
         clear = np.where(inside > 0, _margin(points - far[home], tangent, inverse), 0.0)
         by_vertex = np.minimum(np.where(size > 0, bisector, 0.0), clear)
         at = (rows[~free], other[~free])
@@ -387,20 +382,19 @@ def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
 def _area_margin(line: _Line, home: IntArray, low: FloatArray, high: FloatArray) -> float:
     """The least margin of the decisions on the way from the nearest segments to the ends of the areas."""
     tangent, inverse = line.tangent[home], 1 / line.length[home]
+    roundoff = 64 * UNIT_ROUNDOFF * np.abs(line.first).max()
     turned: BoolArray = _dots(high - low, tangent) <= 0
     least = float(_margin(high - low, tangent, inverse).min(initial=np.inf))
     for side, sign, end, nodes in ((0, -1, low, line.first), (1, 1, high, line.second)):
         going, segment = np.flatnonzero(~turned), home[~turned]
-        for _ in range(len(line.length)):
-            step = end[going] - nodes[segment]
-            least = min(least, float(_margin(step, tangent[going], inverse[going]).min(initial=np.inf)))
-            following = line.neighbours[segment, side]
-            crossed = (sign * _dots(step, tangent[going]) > 0) & (following >= 0)
-            going, segment = going[crossed], following[crossed]
-            along = line.second[segment] - line.first[segment]
-            least = min(least, float(_margin(along, tangent[going], inverse[going]).min(initial=np.inf)))
-            facing = _dots(along, tangent[going]) > 0
-            going, segment = going[facing], segment[facing]
-            if not len(going):
-                break
+        while len(going):
+            frame, step, following = tangent[going], end[going] - nodes[segment], line.neighbours[segment, side]
+            past, along = sign * _dots(step, frame), line.second[following] - line.first[following]
+            facing = (following >= 0) & (_dots(along, frame) > 0)
+            cut = ~facing & (np.abs(past) <= roundoff)
+            least = min(least, float(_margin(step, frame, inverse[going])[~cut].min(initial=np.inf)))
+            seen = (cut | (past > 0)) & (following >= 0)
+            least = min(least, float(_margin(along, frame, inverse[going])[seen].min(initial=np.inf)))
+            onward = facing & (past > 0) & (following != home[going])
+            going, segment = going[onward], following[onward]
     return least

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from itertools import cycle
+from typing import overload
 
 import numpy as np
 from hypothesis import strategies as st
@@ -26,6 +27,10 @@ _DEPTHS = st.integers(1, 8)  # quarters
 _REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # master lengths × 2^-this
 
 
+@overload
+def flat_cases(interface: None = None) -> SearchStrategy[Case]: ...
+@overload
+def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Uniform penetration; every slave point projects inside the master.
 

@@ -33,10 +33,9 @@ def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
     heights, along = nodes @ normal, nodes @ direction
     if max(np.ptp(heights[:n_slave]), np.ptp(heights[n_slave:])) > roundoff:
         return None
+    forward = _forward(interface.slave, along, 1, roundoff) and _forward(interface.master, along, -1, roundoff)
     slave, master = (_stretches(surface, along) for surface in (interface.slave, interface.master))
-    if slave is None or master is None or not _forward(interface.slave, along, 1, roundoff):
-        return None
-    if not _forward(interface.master, along, -1, roundoff) or not all(
+    if not forward or not all(
         any(low >= first - roundoff and high <= last + roundoff for first, last in master) for low, high in slave
     ):
         return None
@@ -47,7 +46,7 @@ def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
 def _flat_states(
     draw: DrawFn, interface: Interface, along: FloatArray, direction: FloatArray, normal: FloatArray, opening: float
 ) -> Case:
-    quarters, unit = draw(_QUARTERS), draw(depth_units())
+    quarters, unit = draw(_QUARTERS), draw(depth_units(finest=6))
     penalty, seed = draw(penalties()), draw(seeds())
     penetration = quarters / 16 * unit * _shortest_segment(interface)
     positions = interface.nodes.copy()
@@ -56,20 +55,12 @@ def _flat_states(
     return Case(interface, positions.reshape(-1), penalty, parameters, seed)
 
 
-def _stretches(surface: Surface, along: FloatArray) -> list[tuple[float, float]] | None:
-    """From where to where each chain goes; None if one is closed."""
-    first = np.flatnonzero(surface.neighbours[:, 0] < 0)
-    last = np.flatnonzero(surface.neighbours[:, 1] < 0)
-    starts = np.searchsorted(
-        np.flatnonzero(surface.neighbours[surface.chain_order, 0] < 0), np.arange(len(surface)), "right"
-    )
-    if len(first) == 0 or len(first) != len(last):
-        return None
-    stretches = []
-    for chain in range(1, starts.max() + 1):
-        places = along[surface.segments[surface.chain_order[starts == chain]]]
-        stretches.append((float(places.min()), float(places.max())))
-    return stretches
+def _stretches(surface: Surface, along: FloatArray) -> list[tuple[float, float]]:
+    """From where to where each open chain goes."""
+    previous, following = surface.neighbours[surface.chain_order].T
+    begins = along[surface.segments[surface.chain_order[previous < 0], 0]]
+    ends = along[surface.segments[surface.chain_order[following < 0], 1]]
+    return [(min(chain), max(chain)) for chain in zip(begins.tolist(), ends.tolist(), strict=True)]
 
 
 def _forward(surface: Surface, along: FloatArray, way: int, roundoff: float) -> bool:

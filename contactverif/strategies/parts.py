@@ -45,9 +45,9 @@ def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
 
 
 @cache
-def depth_units() -> SearchStrategy[float]:
-    """2^-e, e = 0 … 8: what the depths are multiplied by, besides the shortest segment."""
-    return st.integers(0, 8).map(lambda e: 2.0**-e)
+def depth_units(*, finest: int = 8) -> SearchStrategy[float]:
+    """2^-e, e = 0 … `finest`: what the depths are multiplied by, besides the shortest segment."""
+    return st.integers(0, finest).map(lambda e: 2.0**-e)
 
 
 @cache

@@ -58,6 +58,6 @@ class Ring:
 def rings() -> SearchStrategy[Ring]:
     """Arcs of 60° to 180°, and closed rings."""
     weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
-    degrees = st.sampled_from([60, 90, 150, 180, 360])
+    degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
     depth = st.one_of(depths(), depths(lowest=-6))
     return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
