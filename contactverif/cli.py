@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from contactverif.arrays import FloatArray
     from contactverif.case import Case
     from contactverif.interface import Interface
-    from contactverif.property import Property
+    from contactverif.property import Outcome, Property
     from contactverif.subject import Subject
 
 app = typer.Typer(
@@ -24,6 +24,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+# What deeper modules call a thing, and how it is called on the command line.
+_OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {"known failure": "--known"}
 
 PROFILE_HELP = "dev: 100 examples, a fresh seed. ci: 100 examples, seed 0. nightly: 2000 examples, a fresh seed."
 
@@ -44,15 +47,15 @@ def list_(
 def verify(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.", metavar="NAME…"),
+        typer.Argument(help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.", metavar="NAME"),
     ] = None,
     all_: Annotated[bool, typer.Option("--all", help="Every installed formulation.")] = False,
     properties: Annotated[
         list[str] | None,
         typer.Option("--property", "-p", help="Only properties whose id matches; repeatable.", metavar="GLOB"),
     ] = None,
-    examples: Annotated[int | None, typer.Option(help="Random cases a property.", min=1)] = None,
-    seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", min=0)] = None,
+    examples: Annotated[int | None, typer.Option(help="Random cases a property.")] = None,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.")] = None,
     profile: Annotated[str, typer.Option(help=PROFILE_HELP)] = "dev",
     report: Annotated[Path | None, typer.Option(help="Write all that was found to this netCDF file.")] = None,
     pictures: Annotated[
@@ -75,17 +78,21 @@ def verify(
 ) -> None:
     """Ask every property of a formulation; print a table, draw what failed, write a report.
 
-    Exit status 0: nothing failed that was promised, nothing passed that was said to fail, and every property was
-    judged. 1: otherwise. 2: something was asked that cannot be.
+    \bExit status
+      0  nothing failed that was promised, nothing passed that was said to
+         fail, and every property was judged
+      1  otherwise
+      2  something was asked that cannot be
 
-    For example:  contactverif verify vts-ppt --report vts-ppt.nc
-                  contactverif verify nts -p 'patch.*' --seed 7
-                  contactverif verify mine --mesh punch.msh --slave punch --master base
+    \bExamples
+      contactverif verify vts-ppt --report vts-ppt.nc
+      contactverif verify nts -p 'patch.*' --seed 7
+      contactverif verify mine --mesh punch.msh --slave punch --master base
     """
     from contactverif.progress import Bar
     from contactverif.registry import load_formulation, load_properties
     from contactverif.runner import run
-    from contactverif.tables import counterexample, run_table, show, summary
+    from contactverif.tables import RunTable, counterexample, show, show_as_it_is, summary
     from contactverif_reports.draw import figure
     from contactverif_reports.write import check_writable, write
 
@@ -109,11 +116,11 @@ def verify(
             known=reasons,
             progress=bar.told,
         )
-    show(run_table(found))
+    show(RunTable(found))
     for row in found.rows:
         text = counterexample(row, report)
         if text:
-            show(text)
+            show_as_it_is(text)
             if pictures is not None:
                 outcome = row.shrunk or row.witness
                 assert outcome is not None
@@ -129,21 +136,34 @@ def verify(
 
 @app.command()
 def replay(
-    report: Annotated[Path, typer.Argument(help="A report that `verify --report` wrote.")],
+    report: Annotated[Path, typer.Argument(help="A report that verify --report wrote.", metavar="REPORT")],
     case: Annotated[
         str | None, typer.Option(help="Id of a counterexample; without it the ids are listed.", metavar="ID")
     ] = None,
     formulation: Annotated[
-        str | None, typer.Option(help="Judge this formulation on the case instead of the one that failed.")
+        str | None,
+        typer.Option(help="Judge this formulation on the case instead of the one that failed.", metavar="NAME"),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the case to this file, .png or .svg.", metavar="FILE")
     ] = None,
 ) -> None:
-    """Judge one stored counterexample again, with a picture. Exit status 1 if it fails again."""
+    """Judge one stored counterexample again, with a picture.
+
+    \bExit status
+      0  it does not fail any more
+      1  it fails again
+      2  something was asked that cannot be
+
+    \bExamples
+      contactverif replay ppt.nc
+      contactverif replay ppt.nc --case vts-ppt.balance.force
+      contactverif replay ppt.nc --case vts-ppt.balance.force --picture it.svg
+      contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
+    """
     from contactverif.property import Verdict
     from contactverif.tables import replayed, show
-    from contactverif_reports.draw import as_text, figure
+    from contactverif_reports.draw import as_text
     from contactverif_reports.read import case_ids, read_case
 
     if case is None:
@@ -153,14 +173,12 @@ def replay(
     stored = read_case(report, case)
     subject = _subject(formulation or stored.formulation)
     question = _question(stored.property_id)
-    from contactverif.runner import judge_case
-
-    outcome = judge_case(question, stored.case, subject)
+    outcome = _judged(question, stored.case, subject)
+    if picture is not None:  # before anything is printed, in case it cannot be written
+        _draw(subject, question, outcome, picture)
     typer.echo(as_text(stored.case))
     show(replayed(stored, subject.name, outcome))
     if picture is not None:
-        forces = _forces(subject, stored.case)
-        figure(stored.case, picture, title=f"{subject.name}, {question.id}: {outcome.reason or 'pass'}", forces=forces)
         typer.echo(f"picture: {picture}")
     raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)
 
@@ -169,11 +187,11 @@ def _chosen(names: list[str], every: bool) -> list[str]:
     from contactverif.registry import formulation_names
 
     if every and names:
-        raise MisuseError("NAME…", f"{', '.join(names)} and --all", "one of the two")
+        raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")
     if every:
         return list(formulation_names())
     if not names:
-        raise MisuseError("NAME…", "nothing", f"--all, or some of {', '.join(formulation_names())}")
+        raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
     return names
 
 
@@ -231,6 +249,29 @@ def _question(property_id: str) -> Property:
     return question
 
 
+def _judged(question: Property, case: Case, subject: Subject) -> Outcome:
+    """The outcome of a case; also where the property cannot be asked of the formulation."""
+    from contactverif.property import Outcome, Verdict
+    from contactverif.runner import judge_case
+
+    if reason := question.applicable(subject.traits):
+        return Outcome(case, Verdict.NOT_APPLICABLE, reason)
+    if missing := question.needs - subject.provides:
+        return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
+    return judge_case(question, case, subject)
+
+
+def _draw(subject: Subject, question: Property, outcome: Outcome, path: Path) -> None:
+    """The case with the forces of the formulation, as a picture."""
+    from contactverif_reports.draw import figure
+
+    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
+    try:
+        figure(outcome.case, path, title=title, forces=_forces(subject, outcome.case))
+    except MisuseError as error:
+        raise MisuseError("--picture", error.found, error.needed) from None
+
+
 def _forces(subject: Subject, case: Case) -> FloatArray | None:
     """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none."""
     from contactverif.errors import ContractError
@@ -246,10 +287,26 @@ def _forces(subject: Subject, case: Case) -> FloatArray | None:
 def main() -> None:
     """The command `contactverif`: a user's mistake is one line and exit status 2, never a traceback."""
     try:
-        app()
+        status = app(standalone_mode=False)
+    except MisuseError as error:
+        argument = _OPTIONS.get(error.argument, error.argument)
+        _refuse(str(MisuseError(argument, error.found, error.needed)))
     except ContactverifError as error:
-        typer.echo(f"contactverif: {error}", err=True)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("contactverif: stopped; no report was written", err=True)
-        sys.exit(130)
+        _refuse(str(error))
+    except typer.Abort:
+        status = 130
+    except Exception as error:
+        said = getattr(error, "format_message", None)  # an error of usage, of which typer hides the class
+        if said is None:
+            raise
+        command = getattr(getattr(error, "ctx", None), "command_path", "contactverif")
+        _refuse(f"{said()} (see {command} --help)" if said() else "")  # without arguments there was help already
+    if status == 130:  # typer's word for Ctrl-C
+        typer.echo("contactverif: stopped", err=True)
+    sys.exit(status)
+
+
+def _refuse(why: str) -> NoReturn:
+    if why:
+        typer.echo(f"contactverif: {' '.join(why.split())}", err=True)
+    sys.exit(2)

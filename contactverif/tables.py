@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console, RenderableType
+from rich import box
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from contactverif.formulation import Traits
 from contactverif.property import Measurement, Outcome, Property, Verdict, excess
 from contactverif.result import NotLoaded, Row, Run
-from contactverif.subject import Subject
+from contactverif.subject import OPTIONAL_PARTS, Subject
 from contactverif_reports.draw import as_text
 from contactverif_reports.read import StoredCase
 from contactverif_reports.schema import case_id
@@ -22,42 +26,78 @@ from contactverif_reports.schema import case_id
 _STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _PIPE_WIDTH = 140  # columns where no terminal says how many there are
+_COLUMNS = ("property", "promise", "verdict", "judged", "worst", "tolerance")
+_NUMBERS = _COLUMNS[3:]  # at the right end of their columns
 
 
 def show(what: RenderableType) -> None:
     """Print to standard output, as wide as the terminal, or wide enough where there is none."""
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False, soft_wrap=False)
+    told = sys.stdout.isatty() or "COLUMNS" in os.environ
+    # Words of a plugin may hold square brackets, which are no markup.
+    console = Console(width=None if told else _PIPE_WIDTH, highlight=False, markup=False)
     console.print(what)
 
 
-def run_table(found: Run) -> Table:
-    """A line for each formulation and property: what was promised, what it does, how close to the tolerance."""
-    table = Table(title=_asked(found), title_justify="left", title_style="", header_style="bold")
-    for name in ("formulation", "property", "promise", "verdict"):
-        table.add_column(name, no_wrap=True)
-    for name in ("judged", "worst", "tolerance"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("remark")
-    previous = None
-    for row in found.rows:
-        if previous not in (None, row.formulation):
-            table.add_section()
-        value, tolerance, quantity = _worst(row)
-        judged = f"{row.judged}/{row.planned}" if row.planned else "–"
-        table.add_row(
-            "" if row.formulation == previous else row.formulation,
-            row.question.id,
-            _PROMISES[row.promise],
-            Text(str(row.verdict), style=_STYLES.get(row.verdict, "dim")),
-            judged,
-            value,
-            tolerance,
-            _remark(row, quantity),
-        )
-        previous = row.formulation
-    for item in found.not_loaded:
-        table.add_row(item.formulation, "", "", Text(str(Verdict.NOT_LOADED), style="red"), "–", "", "", item.reason)
-    return table
+def show_as_it_is(text: Text) -> None:
+    """Print without folding a line: a drawing, or a command that is to be copied."""
+    Console(highlight=False, markup=False).print(text, soft_wrap=True)
+
+
+@dataclass(frozen=True, slots=True)
+class RunTable:
+    """A line for each formulation and property: what was promised, what it does, how close to the tolerance.
+
+    It needs no more than 80 columns; a remark stands behind its line where there is room, else below it. Which of
+    several quantities came closest is left out where there is none: the drawing of a failure says it again.
+    """
+
+    found: Run
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        yield Text(_asked(self.found))
+        lines = [(row, *_worst(row)) for row in self.found.rows]
+        cells = [_cells(row, value, tolerance) for row, value, tolerance, _ in lines]
+        widths = [max(map(len, column)) for column in zip(_COLUMNS, *cells, strict=True)]
+        if lines:
+            yield Text("")
+            yield Text("  " + _aligned(_COLUMNS, widths), style="bold")
+        at_verdict = 2 + widths[0] + 2 + widths[1] + 2
+        previous = None
+        for (row, _, _, quantity), its_cells in zip(lines, cells, strict=True):
+            if row.formulation != previous:
+                yield Text(row.formulation, style="bold")
+            previous = row.formulation
+            line, remark = "  " + _aligned(its_cells, widths), _remark(row)
+            said = [text for text in (remark, quantity) if text]
+            behind = next(
+                (text for text in ("; ".join(said), remark) if len(line) + 2 + len(text) <= options.max_width), ""
+            )
+            text = Text(f"{line}  {behind}".rstrip(), no_wrap=True, overflow="ignore")
+            text.stylize(_STYLES.get(row.verdict, "dim"), at_verdict, at_verdict + len(its_cells[2]))
+            yield text
+            if remark and not behind:
+                yield _folded(remark, options.max_width)
+        for item in self.found.not_loaded:
+            yield Text(item.formulation, style="bold")
+            yield _folded(f"{Verdict.NOT_LOADED}: {item.reason}", options.max_width, style="red")
+
+
+def _cells(row: Row, value: str, tolerance: str) -> tuple[str, ...]:
+    judged = f"{row.judged}/{row.planned}" if row.planned else "–"
+    return row.question.id, _PROMISES[row.promise], str(row.verdict), judged, value, tolerance
+
+
+def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
+    return "  ".join(
+        cell.rjust(width) if name in _NUMBERS else cell.ljust(width)
+        for name, cell, width in zip(_COLUMNS, cells, widths, strict=True)
+    )
+
+
+def _folded(words: str, width: int, style: str = "") -> Text:
+    """Words of any length below a line, indented."""
+    lines = textwrap.wrap(words, max(width - 6, 20))
+    return Text("\n".join("      " + line for line in lines), style=style, no_wrap=True, overflow="ignore")
 
 
 def counterexample(row: Row, report: Path | None) -> Text | None:
@@ -90,7 +130,7 @@ def summary(found: Run) -> Text:
 
 def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
     """What the report says of a case beside what comes out now."""
-    table = Table(header_style="bold")
+    table = _table("")
     for column in ("", "formulation", "verdict", "reason"):
         table.add_column(column)
     table.add_row("stored", stored.formulation, str(stored.verdict), stored.reason)
@@ -100,22 +140,23 @@ def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
 
 def formulations_table(formulations: Sequence[Subject | NotLoaded], *, every_trait: bool) -> Table:
     """The installed formulations: what each promises, or why it does not load."""
-    table = Table(title="formulations", title_justify="left", title_style="bold", header_style="bold")
+    table = _table("formulations")
     table.add_column("name", no_wrap=True)
     table.add_column("promises")
-    table.add_column("not provided")
     for item in formulations:
         if isinstance(item, NotLoaded):
-            table.add_row(item.formulation, Text(f"not loaded: {item.reason}", style="red"), "")
+            table.add_row(item.formulation, Text(f"not loaded: {item.reason}", style="red"))
             continue
-        missing = ", ".join(part for part in ("pair", "tangent", "contact_points") if part not in item.provides)
-        table.add_row(item.name, "; ".join(_promises(item.traits, every_trait)) or "nothing", missing)
+        said = _promises(item.traits, every_trait) or ["nothing"]
+        missing = ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides)
+        said += [f"not provided: {missing}"] if missing else []
+        table.add_row(item.name, "; ".join(said))
     return table
 
 
 def properties_table(properties: Sequence[Property | NotLoaded]) -> Table:
     """The installed properties: what each asks."""
-    table = Table(title="properties", title_justify="left", title_style="bold", header_style="bold")
+    table = _table("properties")
     table.add_column("id", no_wrap=True)
     table.add_column("asks")
     for item in properties:
@@ -124,6 +165,13 @@ def properties_table(properties: Sequence[Property | NotLoaded]) -> Table:
         else:
             table.add_row(item.id, item.summary)
     return table
+
+
+def _table(title: str) -> Table:
+    """A table without lines that a narrow terminal would break."""
+    return Table(
+        title=title or None, title_justify="left", title_style="bold", header_style="bold", box=box.SIMPLE_HEAD
+    )
 
 
 def _asked(found: Run) -> str:
@@ -153,7 +201,7 @@ def _promises(traits: Traits, every_trait: bool) -> list[str]:
 
 
 def _worst(row: Row) -> tuple[str, str, str]:
-    """Value, tolerance and name of the quantity that came closest to its tolerance, or farthest beyond it."""
+    """Value and tolerance of what came closest to its tolerance, or farthest beyond it; its name if one of several."""
     worst: tuple[float, str, str, str] | None = None
     for outcome in (*row.outcomes, *((row.witness,) if row.witness else ())):
         measured = outcome.measurement
@@ -166,16 +214,16 @@ def _worst(row: Row) -> tuple[str, str, str]:
             far = excess(quantity, value, tolerance)
             if worst is None or far > worst[0]:
                 sign = "≤" if quantity.sense == "at most" else "≥"
-                worst = far, f"{value:.2g}", f"{sign} {tolerance:.2g}", quantity.name
+                name = quantity.name if len(row.question.quantities) > 1 else ""
+                worst = far, f"{value:.2g}", f"{sign} {tolerance:.2g}", name
     return worst[1:] if worst else ("", "", "")
 
 
-def _remark(row: Row, quantity: str) -> str:
+def _remark(row: Row) -> str:
     undecided = sum(outcome.verdict is Verdict.UNDECIDED for outcome in row.outcomes)
     parts = [
         row.unexpected.upper() if row.unexpected else "",
         f"known: {row.known}" if row.known else "",
-        quantity if row.verdict in (Verdict.PASS, Verdict.FAIL) and len(row.question.quantities) > 1 else "",
         row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
         f"{undecided} undecided" if undecided else "",
     ]

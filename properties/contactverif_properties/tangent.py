@@ -6,19 +6,22 @@ central difference alone has an error of its own.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contactverif.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Pairing
-from contactverif.property import Measurement, Property, Quantity
+from contactverif.property import Measurement, Property, Quantity, Verdict, judge
 from contactverif.strategies import smooth_cases
 from contactverif.subject import Guarded, Subject
 from contactverif_properties.kinks import kink_within
 
 N_DIRECTIONS = 8
 CENTRAL_STEPS = (8.0, 1.0, 0.125)  # × the step at which truncation and roundoff of a central difference are equal
-TAYLOR_STEPS = (2.0**-6, 2.0**-10)  # × ℓ
+TAYLOR_STEPS = (2.0**-8, 2.0**-12)  # × ℓ
+SHORTEST_BENDING = 2.0**-10  # × ℓ: over less than this, differences decide nothing
 SLOPE = 1.9
 
 CENTRAL = Quantity(
@@ -41,57 +44,96 @@ COMPLEX = Quantity(
 def directional(case: Case, subject: Subject) -> Measurement:
     """Tangent times eight random directions against differences of the residual, all states in one batch.
 
+    Steps are shares of ℓ, the shortest segment. Where the differences themselves show that the residual bends over a
+    shorter length λ (a segment seen nearly edge-on is as short as it is seen), and only where they fail, a second look
+    takes λ for ℓ in steps and tolerances.
+
     Returns
     -------
     Measurement
         Best central difference over the steps, worst direction, relative to the largest derivative; least slope of the
         Taylor remainder (none where all remainders are roundoff); the complex step where the plugin takes complex
-        positions.
+        positions. Detail: the length that took the place of ℓ.
     """
-    formulation, interface, z = subject.on(case), case.interface, case.z
-    pairing = formulation.pair(interface, z)
+    formulation, shortest = subject.on(case), case.shortest_segment
+    pairing = formulation.pair(case.interface, case.z)
     directions = random_directions(case)
-    shortest, reach = case.shortest_segment, case.largest_coordinate
-    balanced_step = shortest * (UNIT_ROUNDOFF * reach / shortest) ** (1 / 3)
-    central = np.array(CENTRAL_STEPS) * balanced_step
-    taylor = np.array(TAYLOR_STEPS) * shortest
+    derivative = (formulation.tangent(case.interface, pairing, case.z) @ directions.T).T  # (n_directions, n_unknowns)
+    undecided, broken = _pairing_holds(case, formulation, pairing, directions[0])
+
+    def look(length: float) -> tuple[Measurement, float]:
+        values, bending = differences(formulation, case, pairing, directions, derivative, length)
+        conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
+        tolerances = {
+            CENTRAL.name: 30 * conditioning ** (2 / 3),
+            TAYLOR.name: SLOPE,
+            COMPLEX.name: 1e-11 + 64 * conditioning,
+        }
+        if subject.traits.takes_complex:
+            values[COMPLEX.name] = complex_step(formulation, case, pairing, directions, derivative)
+        return Measurement(values, tolerances, undecided, broken, {"length": length}), bending
+
+    first, bending = look(shortest)
+    if bending >= shortest / 2 or judge(DIRECTIONAL, first)[0] is not Verdict.FAIL:
+        return first
+    second, _ = look(max(bending, SHORTEST_BENDING * shortest))
+    if bending < SHORTEST_BENDING * shortest and not undecided:
+        return replace(second, undecided=f"roundoff: the residual bends over {bending:.2g}, too short for differences")
+    return second
+
+
+def differences(
+    formulation: Guarded,
+    case: Case,
+    pairing: Pairing | None,
+    directions: FloatArray,
+    derivative: Array,
+    length: float,
+) -> tuple[dict[str, float], float]:
+    """Central differences and Taylor remainders with steps that suit a function that bends over `length`.
+
+    Returns
+    -------
+    The values of CENTRAL and TAYLOR, and the length over which the residual is seen to bend: the root of its size over
+    its third derivative, from the central differences of two steps, which the tangent has no part in.
+    """
+    reach = case.largest_coordinate
+    central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
+    taylor = np.array(TAYLOR_STEPS) * length
     steps = np.concatenate([central, -central, taylor])
-    batch = z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
-    forces = formulation.residual(interface, pairing, np.concatenate([batch.reshape(-1, z.size), z[None]]))
+    batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
+    states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
+    forces = formulation.residual(case.interface, pairing, states)
     here, moved = forces[-1], forces[:-1].reshape(batch.shape)
-    derivative = (formulation.tangent(interface, pairing, z) @ directions.T).T  # (n_directions, n_unknowns)
 
     n = len(central)
-    differences = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
-    size = max(np.abs(derivative).max(), np.abs(differences).max())
-    values = {CENTRAL.name: 0.0}
-    tolerances = {
-        CENTRAL.name: 30 * (UNIT_ROUNDOFF * reach / shortest) ** (2 / 3),
-        TAYLOR.name: SLOPE,
-        COMPLEX.name: 1e-11 + 64 * UNIT_ROUNDOFF * reach / shortest,
-    }
-    if size > 0:
-        errors = np.abs(differences - derivative).max(axis=2)  # (n_steps, n_directions)
-        values[CENTRAL.name] = float(errors.min(axis=0).max() / size)
-        forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # the longest central step serves here too
-        remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
-        slope = taylor_slope(remainders, steps[forward], floor=1e3 * UNIT_ROUNDOFF * reach * size)
-        if np.isfinite(slope):
-            values[TAYLOR.name] = slope
-        if subject.traits.takes_complex:
-            values[COMPLEX.name] = complex_step(formulation, case, pairing, directions, derivative) / size
-    broken, undecided = "", ""
-    step = float(central[-1])
-    if pairing is not None and not _same_around(formulation, case, pairing, step * directions[0]):
-        undecided = kink_within(case, formulation, pairing, 4 * step, directions[0])
-        if not undecided:
-            if _same_around(formulation, case, pairing, 2.0**-20 * step * directions[0]):
-                undecided = "the pairing changes within the step, where the harness sees no kink"
-            else:
-                broken = "the pairing changes however little the nodes move, and no kink is near"
-    elif pairing is None:
-        undecided = kink_within(case, formulation, pairing, 4 * step, directions[0])
-    return Measurement(values, tolerances, undecided, broken)
+    slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
+    size = max(np.abs(derivative).max(), np.abs(slopes).max())
+    if size == 0:
+        return {CENTRAL.name: 0.0}, np.inf
+    errors = np.abs(slopes - derivative).max(axis=2)  # (n_steps, n_directions)
+    values = {CENTRAL.name: float(errors.min(axis=0).max() / size)}
+    forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # the longest central step serves here too
+    remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
+    slope = taylor_slope(remainders, steps[forward], floor=1e3 * UNIT_ROUNDOFF * reach * size)
+    if np.isfinite(slope):
+        values[TAYLOR.name] = slope
+    third = np.abs(slopes[0] - slopes[1]).max() / (central[0] ** 2 - central[1] ** 2)  # third derivative / 6
+    return values, float(np.sqrt(size / third)) if third > 0 else np.inf
+
+
+def _pairing_holds(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> tuple[str, str]:
+    """Whether the frozen pairing is that of the states around: (why undecided, what is broken), empty if it is."""
+    shortest = case.shortest_segment
+    step = CENTRAL_STEPS[-1] * shortest * (UNIT_ROUNDOFF * case.largest_coordinate / shortest) ** (1 / 3)
+    if pairing is not None and _same_around(formulation, case, pairing, step * direction):
+        return "", ""
+    undecided = kink_within(case, formulation, pairing, 4 * step, direction)
+    if undecided or pairing is None:
+        return undecided, ""
+    if _same_around(formulation, case, pairing, 2.0**-20 * step * direction):
+        return "the pairing changes within the step, where the harness sees no kink", ""
+    return "", "the pairing changes however little the nodes move, and no kink is near"
 
 
 def random_directions(case: Case) -> FloatArray:
@@ -119,10 +161,12 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
 def complex_step(
     formulation: Guarded, case: Case, pairing: Pairing | None, directions: FloatArray, derivative: Array
 ) -> float:
-    """Largest difference of Im R(x + ihd)/h from the derivative; h so small that h² vanishes."""
+    """Largest difference of Im R(x + ihd)/h from the derivative, relative to it; h so small that h² vanishes."""
     h = case.shortest_segment * 2.0**-100
     forces = formulation.residual(case.interface, pairing, case.z + 1j * h * directions)
-    return float(np.abs(forces.imag / h - derivative).max())
+    exact = forces.imag / h
+    size = float(max(np.abs(exact).max(), np.abs(derivative).max()))
+    return float(np.abs(exact - derivative).max()) / size if size > 0 else 0.0
 
 
 def _same_around(formulation: Guarded, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
