@@ -303,7 +303,7 @@ def main() -> None:
         _refuse(f"{said()} (see {command} --help)" if said() else "")  # without arguments there was help already
     if status == 130:  # typer's word for Ctrl-C
         typer.echo("contactverif: stopped", err=True)
-    sys.exit(status)
+    sys.exit(status or 0)
 
 
 def _refuse(why: str) -> NoReturn:

@@ -57,12 +57,13 @@ def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 
 @st.composite
 def _general_cases(draw: DrawFn, smooth: bool) -> Case:
-    makers: list[Broken | Ring] = draw(_PANELS)
+    makers: list[Broken | Ring] = draw(_panels(smooth))
     motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
     # Drawn last, so that the offset shrinks last.
     offset_on = smooth or draw(_ON) > 0
     offsets = draw(OFFSETS) if offset_on else [0]
-    if not offset_on:  # a quarter turn keeps a tie a tie, and a wall upright
+    if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
+        # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
     interface, z, _ = assembled([maker(offsets) for maker in makers], motion)
     return Case(interface, z, penalty, {}, seed)
@@ -80,6 +81,7 @@ class Broken:
     start : x of the slave's first node; the master's is at 0.
     tilt : slope of the slave against the master, turned about its middle, flatter for long chains.
     quarters, unit : penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
+    upright : walls do not lean.
     """
 
     steps: Sequence[tuple[float, int, int]]
@@ -89,6 +91,7 @@ class Broken:
     tilt: float
     quarters: Sequence[int]
     unit: float
+    upright: bool = False
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
         """The panel; nodes moved off the lattice by these numerators, 0 for none."""
@@ -110,14 +113,14 @@ class Broken:
 
         With an offset walls lean and bends are uneven, so that nothing is seen exactly edge-on.
         """
-        points, upright = [(0.0, 0.0)], False
+        points, wall = [(0.0, 0.0)], False
         for index, ((along, up, kind), offset) in enumerate(zip(self.steps, cycle(offsets), strict=False)):
-            upright = kind == _WALL and not upright
-            dx, dy = (
-                (offset / 13 / 32, (up or 1) / 2)
-                if upright
-                else (along, (up + index % 3 * offset / 13 / 32) * self.bend)
-            )
+            wall = kind == _WALL and not wall
+            uneven = offset / 13 / 32
+            if wall:
+                dx, dy = 0.0 if self.upright else uneven, (up or 1) / 2
+            else:
+                dx, dy = along, (up + index % 3 * uneven) * self.bend
             points.append((points[-1][0] + dx, points[-1][1] + dy))
         return np.array(points)
 
@@ -138,5 +141,22 @@ def _broken() -> SearchStrategy[Broken]:
     )
 
 
-_ONE = st.one_of(_broken(), _broken(), rings())
-_PANELS = st.one_of(st.lists(_ONE, min_size=1, max_size=1), st.lists(_ONE, min_size=1, max_size=2))
+def _ledge(floor: Sequence[float], slave: Sequence[float], rise: int, quarters: Sequence[int], unit: float) -> Broken:
+    """A floor whose free end is an upright wall, and a slave that begins on it with a long segment beyond the wall.
+
+    The area of competence of that segment's first quarter point goes past the wall: a walk ends edge-on.
+    """
+    steps = [*((length, 0, 0) for length in floor), (0.0, rise, _WALL)]
+    end = int(sum(floor))
+    return Broken(steps, 0.0, [6.0, *slave], end - min(end, 2), 0.0, quarters, unit, upright=True)
+
+
+@cache
+def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
+    """One or two panels; ledges, which are kinks, only if not smooth."""
+    shapes: list[SearchStrategy[Broken | Ring]] = [_broken(), _broken(), _broken(), rings(), rings()]
+    if not smooth:
+        plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
+        shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
+    one = st.one_of(*shapes)
+    return st.one_of(st.lists(one, min_size=1, max_size=1), st.lists(one, min_size=1, max_size=2))

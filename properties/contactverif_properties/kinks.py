@@ -53,7 +53,7 @@ def dense(tangent: Any) -> FloatArray:
 
 
 def kink_within(case: Case, formulation: Guarded, pairing: Pairing | None, reach: float, direction: FloatArray) -> str:
-    """Empty, or why moving the nodes by `reach` (a length) may change a decision.
+    """Empty, or why moving each coordinate by `reach` (a length) at most may change a decision.
 
     Parameters
     ----------
@@ -62,7 +62,9 @@ def kink_within(case: Case, formulation: Guarded, pairing: Pairing | None, reach
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, pairing, case.z)
         margin = kink_margin(case.interface, case.z, points.slave_segment, points.c, points.area_from, points.area_to)
-        return f"a kink: a decision hangs on {margin:.2g}, less than {reach:.2g}" if margin <= reach else ""
+        if margin <= np.sqrt(2) * reach:  # `reach` is of a coordinate, the margin of a node
+            return f"a kink: a decision hangs on {margin:.2g}, no more than nodes may move"
+        return ""
     here, ahead, behind = (
         formulation.residual(case.interface, formulation.pair(case.interface, z), z)
         for z in (case.z, case.z + reach * direction, case.z - reach * direction)

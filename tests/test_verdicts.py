@@ -1,0 +1,233 @@
+"""What the issue wants to see: what each formulation does, and that a promise which is not true is found out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactverif_nts
+from contactverif.formulation import Traits
+from contactverif.oracle import projection_cases
+from contactverif.property import Measurement, Outcome, Property, Verdict
+from contactverif.registry import formulation_names, load_formulation, load_properties, property_ids
+from contactverif.result import Row
+from contactverif.runner import judge_case, run
+from contactverif.strategies import named_case
+from contactverif.subject import Subject
+
+SEED = 3
+PATCH, FORCE, MOMENT, TANGENT = "patch.flat.transmission", "balance.force", "balance.moment", "tangent.directional"
+
+# What each does not do; everything else it does.
+FAILS: Mapping[str, frozenset[str]] = {
+    "nts": frozenset({PATCH}),
+    "nts-ar": frozenset({PATCH}),
+    "nts-ar:area=reference": frozenset({PATCH}),
+    "vts-g": frozenset({PATCH}),
+    "vts-g:n=3": frozenset({PATCH}),
+    "vts-me": frozenset({PATCH}),
+    "vts-me:n=4": frozenset({PATCH}),
+    "vts-ppt": frozenset({FORCE, MOMENT}),
+    "vts-ppt-basic": frozenset({FORCE, MOMENT, TANGENT}),
+    "vts-ppt-balanced": frozenset(),
+}
+
+
+def the_property(property_id: str) -> Property:
+    (found,) = load_properties([property_id])
+    assert isinstance(found, Property)
+    return found
+
+
+def the_formulation(name: str) -> Subject:
+    found = load_formulation(name)
+    assert isinstance(found, Subject), found
+    return found
+
+
+@cache
+def asked(name: str, property_id: str) -> Row:
+    """100 random cases and, where something failed, the smallest mesh that shows it."""
+    (row,) = run([the_formulation(name)], [the_property(property_id)], examples=100, seed=SEED).rows
+    return row
+
+
+def measured(outcome: Outcome | None) -> Measurement:
+    assert outcome is not None
+    assert outcome.measurement is not None, outcome.reason
+    return outcome.measurement
+
+
+def test_every_formulation_is_in_the_table() -> None:
+    assert set(formulation_names()) <= set(FAILS)
+
+
+@pytest.mark.parametrize("property_id", property_ids())
+@pytest.mark.parametrize("name", FAILS)
+def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> None:
+    row = asked(name, property_id)
+    expected = Verdict.FAIL if property_id in FAILS[name] else Verdict.PASS
+    assert row.verdict is expected, row.reason
+    assert row.promise is (expected is Verdict.PASS)
+    assert not row.unexpected
+    assert row.planned == 100
+    assert row.judged >= 90
+
+
+@pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-g", "vts-me"])
+def test_the_patch_test_fails_on_a_mesh_of_very_few_segments(name: str) -> None:
+    row = asked(name, PATCH)
+    assert row.shrunk is not None
+    assert row.shrunk.verdict is Verdict.FAIL
+    interface = row.shrunk.case.interface
+    assert len(interface.slave) + len(interface.master) <= 3
+    values, tolerances = measured(row.shrunk).values, measured(row.shrunk).tolerances
+    (quantity,) = values
+    assert values[quantity] > 1000 * tolerances[quantity]  # a clear failure, not one by a hair
+
+
+def test_vts_me_fails_where_one_area_of_competence_covers_two_master_segments() -> None:
+    shrunk = asked("vts-me", PATCH).shrunk
+    assert shrunk is not None
+    found = projection_cases(shrunk.case.interface, shrunk.case.z)
+    assert found["first"] >= 1
+    assert found["last"] >= 1
+    assert found["intermediate"] == 0
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic", "vts-ppt-balanced"])
+def test_vts_ppt_passes_the_patch_test_at_roundoff(name: str) -> None:
+    row = asked(name, PATCH)
+    for outcome in row.outcomes:
+        found = measured(outcome)
+        (quantity,) = found.values
+        assert found.values[quantity] < found.tolerances[quantity]
+        penetration = outcome.case.parameter("penetration")
+        assert found.values[quantity] < 2.0**-53 * (8 * outcome.case.largest_coordinate / penetration + 400)
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic"])
+def test_the_printed_vts_ppt_loses_one_minus_the_cosine_of_the_tilt(name: str) -> None:
+    case = named_case("tilted")
+    found = the_property(FORCE).measure(case, the_formulation(name))
+    (defect,) = found.values.values()
+    (tolerance,) = found.tolerances.values()
+    slave = 1 - case.parameter("cosine")
+    forces = printed_forces(name)
+    # The slave's forces point along the master's normal, so that Σ|R| over entries is |ΣR| of the slave.
+    assert np.linalg.norm(forces[:2].sum(axis=0)) == pytest.approx(np.abs(forces[:2]).sum(), rel=1e-12)
+    assert defect == pytest.approx(slave, abs=1e-12)
+    assert defect > 1e6 * tolerance
+    assert asked(name, FORCE).witness is not None
+    assert asked(name, FORCE).verdict is Verdict.FAIL
+
+
+def printed_forces(name: str) -> Any:
+    case = named_case("tilted")
+    formulation = the_formulation(name).on(case)
+    return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
+
+
+def test_the_balanced_vts_ppt_is_cleared_on_the_tilted_case() -> None:
+    for property_id in (FORCE, MOMENT):
+        outcome = judge_case(the_property(property_id), named_case("tilted"), the_formulation("vts-ppt-balanced"))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+def test_random_tilts_find_the_printed_vts_ppt_out_without_the_witness() -> None:
+    failed = [outcome for outcome in asked("vts-ppt", FORCE).outcomes if outcome.verdict is Verdict.FAIL]
+    assert len(failed) > 10
+    assert asked("vts-ppt", FORCE).shrunk is not None
+
+
+def test_the_tangent_of_the_basic_vts_ppt_is_found_out() -> None:
+    row = asked("vts-ppt-basic", TANGENT)
+    assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 10
+    assert row.shrunk is not None
+    found = measured(row.shrunk)
+    assert found.values["central difference"] > 1000 * found.tolerances["central difference"]
+    assert row.witness is not None
+    assert row.witness.verdict is Verdict.FAIL
+    exact = measured(judge_case(the_property(TANGENT), named_case("offset-c"), the_formulation("vts-ppt")))
+    assert exact.values["central difference"] <= exact.tolerances["central difference"]
+
+
+class Claims:
+    """A formulation with other promises."""
+
+    def __init__(self, inner: Any, traits: Traits) -> None:
+        self._inner, self.traits = inner, traits
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+
+def claiming(make: Callable[..., Any], **promises: Any) -> Subject:
+    def claimed(*, penalty: float) -> Claims:
+        inner = make(penalty=penalty)
+        return Claims(inner, replace(inner.traits, **promises))
+
+    return Subject("boaster", claimed)
+
+
+@pytest.mark.parametrize(
+    ("make", "property_id", "promises", "unexpected"),
+    [
+        (contactverif_nts.nts, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised, and fails"),
+        (contactverif_nts.vts_me, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised, and fails"),
+        (contactverif_nts.vts_ppt, FORCE, {"conserves_force": True, "witnesses": {}}, "promised, and fails"),
+        (contactverif_nts.vts_ppt, MOMENT, {"conserves_moment": True, "witnesses": {}}, "promised, and fails"),
+        (contactverif_nts.vts_ppt_basic, TANGENT, {"tangent": "exact", "witnesses": {}}, "promised, and fails"),
+        (
+            contactverif_nts.vts_ppt,
+            PATCH,
+            {"passes_flat_patch": False, "witnesses": {PATCH: "c"}},
+            "said to fail, and passes",
+        ),
+        (
+            contactverif_nts.vts_ppt_balanced,
+            FORCE,
+            {"conserves_force": False, "witnesses": {FORCE: "tilted"}},
+            "said to fail, and passes",
+        ),
+        (
+            contactverif_nts.vts_me,
+            TANGENT,
+            {"tangent": "approximate", "witnesses": {TANGENT: "offset-c"}},
+            "said to fail, and passes",
+        ),
+        (contactverif_nts.vts_ppt, PATCH, {"passes_flat_patch": False, "witnesses": {}}, "crashed"),
+        (
+            contactverif_nts.vts_ppt,
+            PATCH,
+            {"passes_flat_patch": False, "witnesses": {PATCH: "no such case"}},
+            "crashed",
+        ),
+    ],
+)
+def test_a_promise_that_is_not_true_is_found_out(
+    make: Callable[..., Any], property_id: str, promises: dict[str, Any], unexpected: str
+) -> None:
+    found = run([claiming(make, **promises)], [the_property(property_id)], examples=30, seed=SEED)
+    assert found.rows[0].unexpected == unexpected
+    assert not found.passed
+
+
+def test_a_promise_that_is_true_is_kept() -> None:
+    found = run([claiming(contactverif_nts.vts_ppt)], load_properties(), examples=10, seed=SEED)
+    assert found.passed
+
+
+def test_what_promises_nothing_is_never_accused() -> None:
+    nothing = dict.fromkeys(("passes_flat_patch", "tangent", "conserves_force", "conserves_moment"))
+    found = run(
+        [claiming(contactverif_nts.vts_ppt_basic, witnesses={}, **nothing)], load_properties(), examples=30, seed=SEED
+    )
+    verdicts = {row.question.id: row.verdict for row in found.rows}
+    assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == {FORCE, MOMENT, TANGENT}
+    assert found.passed
