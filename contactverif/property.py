@@ -12,6 +12,7 @@ from enum import IntEnum
 from math import isfinite
 from typing import Any, Literal
 
+from contactverif.arrays import FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Traits
 from contactverif.interface import Interface
@@ -89,6 +90,7 @@ class Property:
     needs : parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
     promise : what the traits say: True passes, False does not (with a witness), None nothing.
     applicable : empty, or why the question makes no sense for these traits.
+    exact : where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for pictures.
     """
 
     id: str
@@ -100,6 +102,7 @@ class Property:
     promise: Callable[[Traits], bool | None]
     needs: frozenset[str] = frozenset()
     applicable: Callable[[Traits], str] = lambda traits: ""
+    exact: Callable[[Case], FloatArray] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
