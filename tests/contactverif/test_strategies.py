@@ -18,6 +18,7 @@ from contactverif.interface import Interface
 from contactverif.oracle import kink_margin, projection_cases, usual_places
 from contactverif.strategies import NAMED, flat_cases, general_cases, named_case, smooth_cases, tie_cases
 from contactverif.strategies.parts import lengths
+from contactverif.strategies.rings import Ring
 
 FIXED = settings(derandomize=True, database=None, deadline=None)
 
@@ -227,3 +228,15 @@ def test_the_papers_cases_have_unit_pressure(name: str) -> None:
 def test_an_unknown_name_gets_near_ones() -> None:
     with pytest.raises(MisuseError, match="'c-prime'"):
         named_case("c prim")
+
+
+@pytest.mark.parametrize("strategy", [flat_cases, general_cases, smooth_cases, tie_cases])
+def test_no_segment_has_shrunk_to_a_point(strategy: Callable[[], SearchStrategy[Case]]) -> None:
+    for case in drawn(strategy(), 1000):
+        assert case.shortest_segment > 0
+
+
+def test_a_hole_does_not_shrink_to_a_point() -> None:
+    """Found by 20,000 examples: a hole of four radii whose nodes all sank to the centre."""
+    hole = Ring([1, 1, 1], [1, 1, 1], 180, inner_slave=False, quarters=[4], unit=1.0)
+    assert np.ptp(hole([0]).slave, axis=0).min() > 1
