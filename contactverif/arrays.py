@@ -18,7 +18,13 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 def frozen(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
-    """A contiguous read-only copy of `values` with the given dtype."""
-    array = np.array(values, dtype=dtype, order="C")
-    array.setflags(write=False)
-    return array
+    """A contiguous copy of `values` with the given dtype that nobody can write on.
+
+    It stands on immutable bytes: a plugin cannot make it writeable again and change what others are judged on.
+    """
+    array = np.asarray(values, dtype=dtype)
+    if array.size == 0:
+        array = array.copy()
+        array.setflags(write=False)
+        return array
+    return np.frombuffer(array.tobytes(), dtype=dtype).reshape(array.shape)

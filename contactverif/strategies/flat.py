@@ -20,10 +20,11 @@ from contactverif.case import Case
 from contactverif.interface import Interface
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assembled, shortest
-from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds
+from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
 
 MOST_MASTER_SEGMENTS = 100  # in one chain
 _DEPTHS = st.integers(1, 8)  # quarters
+_SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # how far the slave has come from its reference
 _REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # master lengths × 2^-this
 
 
@@ -52,8 +53,9 @@ def _flat_cases(draw: DrawFn) -> Case:
     sides = draw(_panels())
     quarters, unit = draw(_DEPTHS), draw(depth_units())
     motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
+    slide, shuffle = draw(_SLIDES), draw(shuffles())
     penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
-    interface, z, along = assembled([_panel(*side, penetration) for side in sides], motion)
+    interface, z, along = assembled([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
     parameters = {
         "penetration": np.array(penetration * motion.scale),
         "along": along,
@@ -93,5 +95,5 @@ def _line(x: FloatArray, height: float = 0.0) -> FloatArray:
     return np.column_stack([x, np.full(len(x), height)])
 
 
-def _panel(slave_x: FloatArray, master_x: FloatArray, penetration: float) -> Panel:
-    return Panel(_line(slave_x, -penetration), _line(master_x[::-1]), _line(slave_x))
+def _panel(slave_x: FloatArray, master_x: FloatArray, penetration: float, slide: int) -> Panel:
+    return Panel(_line(slave_x, -penetration), _line(master_x[::-1]), _line(slave_x + slide))

@@ -31,6 +31,7 @@ from contactverif.strategies.parts import (
     penalties,
     seeds,
     shifts,
+    shuffles,
 )
 from contactverif.strategies.rings import Ring, rings
 
@@ -58,14 +59,14 @@ def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 @st.composite
 def _general_cases(draw: DrawFn, smooth: bool) -> Case:
     makers: list[Broken | Ring] = draw(_panels(smooth))
-    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
+    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
     # Drawn last, so that the offset shrinks last.
     offset_on = smooth or draw(_ON) > 0
     offsets = draw(OFFSETS) if offset_on else [0]
     if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
         # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
-    interface, z, _ = assembled([maker(offsets) for maker in makers], motion)
+    interface, z, _ = assembled([maker(offsets) for maker in makers], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)
 
 

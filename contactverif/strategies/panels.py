@@ -48,8 +48,12 @@ def shortest(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).min())
 
 
-def assembled(panels: Sequence[Panel], motion: Motion) -> tuple[Interface, FloatArray, FloatArray]:
+def assembled(panels: Sequence[Panel], motion: Motion, shuffle: int = 0) -> tuple[Interface, FloatArray, FloatArray]:
     """The panels in a row, far apart.
+
+    Parameters
+    ----------
+    shuffle : 0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
 
     Returns
     -------
@@ -60,12 +64,16 @@ def assembled(panels: Sequence[Panel], motion: Motion) -> tuple[Interface, Float
         [getattr(panel, side) + offset for panel, offset in zip(panels, offsets, strict=True)]
         for side in ("slave", "master", "reference")
     )
-    interface = Interface(
-        np.vstack(references + masters) * motion.scale,
-        Surface(_chains(slaves, panels, 0)),
-        Surface(_chains(masters, panels, sum(map(len, slaves)))),
-    )
-    current = np.vstack(slaves + masters)
+    n_slave, n_master = (sum(map(len, side)) for side in (slaves, masters))
+    slave, master = _chains(slaves, panels, 0), _chains(masters, panels, n_slave)
+    order = np.arange(n_slave + n_master)  # the walking number of each node
+    if shuffle:
+        random = np.random.default_rng(shuffle)
+        order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(n_master)])
+        number = np.argsort(order)  # the number of each node on the walk
+        slave, master = (random.permutation(number[side]) for side in (slave, master))
+    interface = Interface(np.vstack(references + masters)[order] * motion.scale, Surface(slave), Surface(master))
+    current = np.vstack(slaves + masters)[order]
     return interface, motion(current).reshape(-1), current[:, 0] * motion.scale
 
 

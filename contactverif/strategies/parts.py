@@ -125,3 +125,9 @@ def shifts(offsets: Sequence[int], count: int) -> FloatArray:
 def dealt(values: Sequence[int], count: int) -> FloatArray:
     """`count` floats, the values in turn."""
     return np.resize(np.asarray(values, dtype=np.float64), count)
+
+
+@cache
+def shuffles() -> SearchStrategy[int]:
+    """Every other mesh is numbered in walking order, 0; the others at random."""
+    return st.one_of(st.just(0), st.integers(0, 255))

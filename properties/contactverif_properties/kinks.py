@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import FloatArray
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Pairing
 from contactverif.oracle import kink_margin
@@ -71,7 +71,8 @@ def kink_within(case: Case, formulation: Guarded, pairing: Pairing | None, reach
     )
     bend = np.abs(ahead - 2 * here + behind).max()
     slope = np.abs(ahead - behind).max() / 2
-    # A smooth function bends by slope × reach/ℓ; a kink by as much as the slope itself.
-    if bend > slope * np.sqrt(reach / case.shortest_segment):
+    # A smooth function bends by slope × reach/ℓ and by what roundoff does; a kink by as much as the slope itself.
+    rounding = 32 * UNIT_ROUNDOFF * case.largest_coordinate / reach
+    if bend > slope * max(np.sqrt(reach / case.shortest_segment), rounding):
         return f"a kink: one-sided differences over {reach:.2g} disagree by {bend / max(slope, bend):.2g}"
     return ""

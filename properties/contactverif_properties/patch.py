@@ -1,4 +1,4 @@
-"""The patch test on an interface alone: is a uniform pressure transmitted exactly, on both sides?"""
+"""The patch test on an interface alone: is a uniform pressure transmitted exactly, on both sides? Is its sum right?"""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from contactverif.arrays import FloatArray
 from contactverif.case import Case
+from contactverif.formulation import Traits
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.property import Measurement, Property
 from contactverif.strategies import flat_cases
@@ -13,6 +14,7 @@ from contactverif.subject import Subject
 from contactverif_properties import roundoff
 
 ERROR = roundoff.gap_quantity("error of a nodal force")
+TOTAL = roundoff.gap_quantity("error of the total force")
 
 
 def exact_forces(case: Case) -> FloatArray:
@@ -48,6 +50,39 @@ def transmitted(case: Case, subject: Subject) -> Measurement:
     return Measurement({ERROR.name: error / size}, {ERROR.name: roundoff.of_gap(case, case.parameter("penetration"))})
 
 
+def resultant(case: Case, subject: Subject) -> Measurement:
+    """The total force on the slave against ε̂ |g| × its area, in the configuration that the traits name.
+
+    The reference is scaled by a power of two, so that the two configurations differ; each method of distributed springs
+    has to get this right, whether it passes the patch test or not.
+
+    Returns
+    -------
+    Measurement
+        |ΣF − ε̂ |g| A n| / (ε̂ |g| A) over the slave nodes, dimensionless; A the current or the reference length.
+    """
+    stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
+    interface = case.interface.at(case.interface.nodes * stretch)
+    formulation = subject.on(case)
+    forces = -formulation.residual(interface, formulation.pair(interface, case.z), case.z).reshape(-1, 2)
+    exact = exact_forces(case)[: interface.n_slave_nodes].sum(axis=0)
+    if subject.traits.area == "reference":
+        exact = exact * stretch
+    error = float(np.linalg.norm(forces[: interface.n_slave_nodes].sum(axis=0) - exact))
+    return Measurement(
+        {TOTAL.name: error / float(np.linalg.norm(exact))},
+        {TOTAL.name: roundoff.of_gap(case, case.parameter("penetration"))},
+    )
+
+
+def _area_is_stated(traits: Traits) -> str:
+    if traits.enforcement != "penalty" or traits.penalty == "nodal":
+        return "there are no distributed springs"
+    if traits.penalty is None or traits.area is None:
+        return "the traits `penalty` and `area` are not both stated, so the total is unknown"
+    return ""
+
+
 FLAT_TRANSMISSION = Property(
     id="patch.flat.transmission",
     family="patch",
@@ -57,4 +92,14 @@ FLAT_TRANSMISSION = Property(
     measure=transmitted,
     promise=lambda traits: traits.passes_flat_patch,
     exact=exact_forces,
+)
+FLAT_RESULTANT = Property(
+    id="patch.flat.resultant",
+    family="patch",
+    summary="a uniform penetration of a flat interface gives the total force penalty × penetration × area",
+    quantities=(TOTAL,),
+    cases=flat_cases,
+    measure=resultant,
+    promise=lambda traits: None if _area_is_stated(traits) else True,
+    applicable=_area_is_stated,
 )

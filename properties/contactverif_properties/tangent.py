@@ -7,6 +7,7 @@ central difference alone has an error of its own.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from contactverif_properties.kinks import kink_within
 N_DIRECTIONS = 8
 CENTRAL_STEPS = (8.0, 1.0, 0.125)  # × the step at which truncation and roundoff of a central difference are equal
 TAYLOR_STEPS = (2.0**-8, 2.0**-12)  # × ℓ
+APART = 8.0  # how many times longer one step of a slope must be than the other
 SHORTEST_BENDING = 2.0**-10  # × ℓ: over less than this, differences decide nothing
 SLOPE = 1.9
 
@@ -131,8 +133,9 @@ def _pairing_holds(case: Case, formulation: Guarded, pairing: Pairing | None, di
     undecided = kink_within(case, formulation, pairing, 4 * step, direction)
     if undecided or pairing is None:
         return undecided, ""
-    if _same_around(formulation, case, pairing, 2.0**-20 * step * direction):
-        return "the pairing changes within the step, where the harness sees no kink", ""
+    least = 2.0**-20 * step * direction
+    if all(_steady(formulation, case, way * least) for way in (1, -1)):
+        return "a kink: the pairing changes here, and is steady on either side", ""
     return "", "the pairing changes however little the nodes move, and no kink is near"
 
 
@@ -144,18 +147,23 @@ def random_directions(case: Case) -> FloatArray:
 
 
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
-    """Slope of log |remainder| against log h: the best between neighbouring steps, the worst over the directions.
+    """Slope of log |remainder| against log h: the best between two steps, the worst over the directions.
 
     `remainders` is (n_steps, n_directions), `steps` (n_steps,), in any order. A remainder below `floor` is roundoff: a
-    direction of which that leaves no slope is exact, and infinity stands for all of them being so.
+    direction of which that leaves no slope is exact, and infinity stands for all of them being so. Two steps count only
+    where one is `APART` times the other: between two that are nearly equal, the slope is noise.
     """
-    order = np.argsort(-steps)
-    remainders, steps = remainders[order], steps[order]
-    decided = remainders[1:] > floor
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = np.log(remainders[:-1] / remainders[1:]) / np.log(steps[:-1] / steps[1:])[:, None]
-    best = np.where(decided, slopes, -np.inf).max(axis=0)
-    return float(best[decided.any(axis=0)].min(initial=np.inf))
+    best = np.full(remainders.shape[1], -np.inf)
+    decided = np.zeros(remainders.shape[1], dtype=bool)
+    for long, short in permutations(range(len(steps)), 2):
+        if steps[long] < APART * steps[short]:
+            continue
+        told = remainders[short] > floor
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = np.log(remainders[long] / remainders[short]) / np.log(steps[long] / steps[short])
+        best = np.where(told, np.maximum(best, slope), best)
+        decided |= told
+    return float(best[decided].min(initial=np.inf))
 
 
 def complex_step(
@@ -170,8 +178,13 @@ def complex_step(
 
 
 def _same_around(formulation: Guarded, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
-    there = (formulation.pair(case.interface, case.z + way * shift) for way in (1, -1))
-    return all(other is not None and pairing.same_as(other) for other in there)
+    return all(formulation.pair(case.interface, case.z + way * shift) == pairing for way in (1, -1))
+
+
+def _steady(formulation: Guarded, case: Case, shift: FloatArray) -> bool:
+    """Whether the pairing stays the same from one small shift to the next, as it does beside a kink."""
+    beside = [formulation.pair(case.interface, case.z + times * shift) for times in (1, 2, 3)]
+    return beside[0] == beside[1] == beside[2]
 
 
 DIRECTIONAL = Property(

@@ -216,7 +216,9 @@ def test_a_crash_is_an_outcome_that_fails_the_run(promise: bool | None) -> None:
     assert segments(row.shrunk) == 8
 
 
-@pytest.mark.parametrize(("error", "how"), [(MemoryError("full"), "memory"), (SystemExit(3), "exit: residual: SystemExit: 3")])
+@pytest.mark.parametrize(
+    ("error", "how"), [(MemoryError("full"), "memory"), (SystemExit(3), "exit: residual: SystemExit: 3")]
+)
 def test_how_it_crashed_is_said(error: BaseException, how: str) -> None:
     def answer(size: int) -> float:
         raise error

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from killing import EXAMPLES, OTHERS, as_lines
-
-KEY = "kills"
+from killing import EXAMPLES, KEY, OTHERS, as_lines
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -16,6 +16,7 @@ from contactverif.subject import Subject
 EXAMPLES = 100  # for the property that is meant to catch it
 OTHERS = 25  # for each of the others
 SEED = 0
+KEY = "kills"  # under which a row of the matrix travels in the report of a test
 
 
 @cache

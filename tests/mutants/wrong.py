@@ -9,7 +9,8 @@ from mutate import Mutant, Wrapped, changed_line
 
 from contactverif import Pairing
 
-PATCH, FORCE, MOMENT = "patch.flat.transmission", "balance.force", "balance.moment"
+PATCH, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
+FORCE, MOMENT = "balance.force", "balance.moment"
 TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
 BALANCED = "vts_ppt_balanced"
 
@@ -192,6 +193,21 @@ MUTANTS = (
     Mutant("tangent that leaves a trace", PURITY, lambda *, penalty: _tangent_leaves_a_trace(penalty)),
     Mutant("interface modified", PURITY, lambda *, penalty: _moves_the_mesh(penalty)),
     Mutant("positions modified", PURITY, lambda *, penalty: _writes_on_its_input(penalty)),
+    line("area measured elsewhere than the trait says", RESULTANT, "ppt",
+         "current_area=current,", "current_area=False,"),
+    line("last node of the last chain forgotten", RESULTANT, "points",
+         "segment = np.concatenate([np.arange(len(slave)), last])",
+         "last = last[:-1]; segment = np.concatenate([np.arange(len(slave)), last])", factory="nts_ar"),
+    line("neighbour taken by its number", RESULTANT, "points",
+         "other = np.concatenate([slave.neighbours[:, 0], ", "other = np.concatenate([np.arange(len(slave)) - 1, ",
+         factory="nts_ar"),
+    line("weights that do not add up to one", RESULTANT, "points", "np.full(n, 1 / n)", "np.full(n, 0.9 / n)",
+         factory="vts_me"),
+    line("search on the reference configuration", PATCH, "ppt",
+         "x = np.array(z).reshape(-1, 2)\n        master = interface.master",
+         "x = np.array(interface.nodes)\n        master = interface.master"),
+    line("next master segment taken by its number", PATCH, "box3",
+         "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
 )  # fmt: skip
 
 # Wrong too, and no property asks after it yet: what is missing is named, and a property that catches one tells so.
@@ -201,12 +217,4 @@ SURVIVORS = (
     line("free end of the master goes on for ever", "patch.dead-zone", "eq6",
          "active[point] = dot(minus(x_v, x1), n) <= 0 and on_surface", "active[point] = dot(minus(x_v, x1), n) <= 0",
          factory="vts_me"),
-    line("area measured elsewhere than the trait says", "the trait `area`", "ppt",
-         "current_area=current,", "current_area=False,"),
-    line("search on the reference configuration", "a slave that slid", "ppt",
-         "x = np.array(z).reshape(-1, 2)\n        master = interface.master",
-         "x = np.array(interface.nodes)\n        master = interface.master"),
-    line("last node of the last chain forgotten", "the resultant of a uniform penetration", "points",
-         "segment = np.concatenate([np.arange(len(slave)), last])",
-         "last = last[:-1]; segment = np.concatenate([np.arange(len(slave)), last])", factory="nts_ar"),
 )  # fmt: skip

@@ -43,10 +43,11 @@ class SegmentToSegment:
         first, second = interface.master.segments.T
         for a, b in interface.slave.segments:
             along = x[b] - x[a]
-            length = np.sqrt(along @ along)
+            square = along @ along
+            length = np.sqrt(square)
             normal = np.array([along[1], -along[0]]) / length  # out of the slave body
-            s_first = (x[first] - x[a]) @ along / length**2  # master nodes on the slave segment, 0 at a, 1 at b
-            s_second = (x[second] - x[a]) @ along / length**2
+            s_first = (x[first] - x[a]) @ along / square  # master nodes on the slave segment, 0 at a, 1 at b
+            s_second = (x[second] - x[a]) @ along / square
             start, end = np.clip(s_second, 0, 1), np.clip(s_first, 0, 1)  # the master runs the other way
             m = np.flatnonzero(start.real < end.real)  # the master segments that face this slave segment
             start, share = start[m], (end - start)[m]

@@ -1,0 +1,67 @@
+"""Formulations of a few lines and meshes to draw by hand: the judge is tested without any code of a plugin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contactverif.case import Case
+from contactverif.formulation import ContactPoints, Traits
+from contactverif.interface import Interface
+from contactverif.subject import Subject
+
+
+class Handmade:
+    """No force at all; what is tested is overridden."""
+
+    def __init__(self, **traits: Any) -> None:
+        self.traits = Traits(**traits)
+        self.penalty = 1.0
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return 0 * z
+
+    def points(self, *, c: float, half_area: float = np.nan) -> ContactPoints:
+        """One point, on the first slave segment."""
+        nan = np.array([np.nan])
+        return ContactPoints(
+            slave_segment=np.array([0]),
+            c=np.array([c]),
+            master_segment=np.array([-1]),
+            xi=nan,
+            position=np.full((1, 2), np.nan),
+            normal=np.full((1, 2), np.nan),
+            gap=nan,
+            pressure=nan,
+            weight=nan,
+            active=np.array([True]),
+            area_from=np.array([c - half_area]),
+            area_to=np.array([c + half_area]),
+        )
+
+
+def subject(plugin: Callable[..., Any], **options: Any) -> Subject:
+    """A formulation on trial: `plugin(**options)` with the penalty as an attribute."""
+
+    def make(*, penalty: float) -> Any:
+        made = plugin(**options)
+        made.penalty = penalty
+        return made
+
+    return Subject("handmade", make)
+
+
+def over_a_node(offset: float, *, gap: float = -1 / 8) -> Case:
+    """One slave segment of length 1 over two master segments of length 2; its middle `offset` right of their node."""
+    slave = np.array([[-0.5, gap], [0.5, gap]]) + [offset, 0]
+    master = np.array([[2.0, 0], [0, 0], [-2, 0]])
+    interface = Interface.from_chains(slave - [0, gap], master)
+    return Case(interface, np.vstack([slave, master]).reshape(-1), 4.0)
+
+
+def case(**other: Any) -> Case:
+    """One slave segment in the middle of one of two master segments: nothing is near a kink."""
+    return replace(over_a_node(6 / 7), **other)

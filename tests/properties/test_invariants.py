@@ -1,0 +1,174 @@
+"""Scaling for each kind of penalty, and objectivity where a state is exactly between two answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from handmade import Handmade, case, over_a_node, subject
+
+from contactverif.formulation import Traits
+from contactverif.property import Verdict
+from contactverif.runner import judge_case, run
+from contactverif_properties.invariants import OBJECTIVITY, SCALED_FORCES, SCALED_TANGENT, SCALING, scaled, turned
+
+SEEDS = range(1, 30)
+
+
+class Springs(Handmade):
+    """A spring between the ends of the slave segment, towards each other; its stiffness is of the kind promised."""
+
+    def stretch(self, z: Any) -> Any:
+        return z[2:4] - z[0:2]
+
+    def area(self, z: Any) -> float:
+        along = self.stretch(z)
+        return float(np.sqrt(along @ along)) if self.traits.penalty == "distributed" else 1.0
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        force = self.penalty * self.area(z) * self.stretch(z)
+        forces[0:2], forces[2:4] = -force, force
+        return forces
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        along, area = self.stretch(z), self.area(z)
+        k = self.penalty * area * np.eye(2)
+        if self.traits.penalty == "distributed":
+            k = k + self.penalty * np.outer(along, along) / area
+        tangent = np.zeros((z.size, z.size))
+        tangent[:4, :4] = np.kron([[1, -1], [-1, 1]], k)
+        return tangent
+
+
+@pytest.mark.parametrize("penalty", ["nodal", "distributed"])
+def test_a_penalty_that_scales_with_its_unit_changes_no_digit(penalty: str) -> None:
+    for seed in SEEDS:
+        found = scaled(case(seed=seed), subject(Springs, penalty=penalty))
+        assert found.values == {SCALED_FORCES.name: 0.0, SCALED_TANGENT.name: 0.0}
+
+
+@pytest.mark.parametrize(("promised", "kept"), [("nodal", "distributed"), ("distributed", "nodal")])
+def test_the_other_kind_of_penalty_does_not(promised: Any, kept: Any) -> None:
+    class Boasts(Springs):
+        def area(self, z: Any) -> float:
+            return float(np.hypot(*self.stretch(z))) if kept == "distributed" else 1.0
+
+    verdicts = [judge_case(SCALING, case(seed=seed), subject(Boasts, penalty=promised)).verdict for seed in SEEDS]
+    assert verdicts.count(Verdict.FAIL) >= 20
+
+
+def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
+    assert "not stated" in SCALING.applicable(Traits())
+    assert SCALING.applicable(Traits(penalty="nodal")) == ""
+    assert SCALING.applicable(Traits(enforcement="multiplier")) == ""
+    found = run([subject(Springs)], [SCALING], examples=3, seed=1)
+    assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
+    assert found.passed
+
+
+def test_an_absolute_tolerance_is_found() -> None:
+    class Careful(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            forces = super().residual(interface, pairing, z)
+            return forces if np.abs(self.stretch(z)).max() > 1e-12 else 0 * z
+
+    verdicts = [judge_case(SCALING, case(seed=seed), subject(Careful, penalty="nodal")).verdict for seed in range(60)]
+    assert Verdict.FAIL in verdicts
+
+
+def test_a_force_that_turns_with_the_state_is_objective() -> None:
+    for seed in SEEDS:
+        outcome = judge_case(OBJECTIVITY, case(seed=seed), subject(Springs, penalty="distributed"))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+def test_a_force_along_an_axis_is_not() -> None:
+    class Axis(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z) * np.resize([1.0, 1.001], z.size)
+
+    class Pointed(Axis):
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.points(c=0.0)
+
+    for seed in SEEDS:
+        assert judge_case(OBJECTIVITY, case(seed=seed), subject(Pointed)).verdict is Verdict.FAIL
+
+
+def test_a_force_along_an_axis_is_not_where_no_contact_points_are_named_either() -> None:
+    class Axis(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z) * np.resize([1.0, 1.001], z.size)
+
+    verdicts = [judge_case(OBJECTIVITY, case(seed=seed), subject(Axis)).verdict for seed in SEEDS]
+    assert verdicts.count(Verdict.FAIL) == len(verdicts)
+
+
+def test_a_tangent_that_does_not_turn_is_found_where_the_forces_do() -> None:
+    class Axis(Springs):
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.diag(np.resize([1.0, 2.0], z.size))
+
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.points(c=0.0)
+
+    outcome = judge_case(OBJECTIVITY, case(seed=1), subject(Axis))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.reason.startswith("turned tangent")
+
+
+class Nearest(Handmade):
+    """Pushes the slave away from the master segment that is nearest to its middle: twice as much from one of them."""
+
+    def side(self, z: Any) -> float:
+        """Positive where the first segment is nearer, in any position: left of the bisector at the middle node."""
+        first, node, last = z[4:6], z[6:8], z[8:10]
+        bisector = (first - node) / np.hypot(*(first - node)) - (last - node) / np.hypot(*(last - node))
+        return float(((z[0:2] + z[2:4]) / 2 - node) @ bisector)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        size = self.penalty * (2.0 if self.side(z) > 0 else 1.0)
+        forces[0:2] = size * (z[2:4] - z[0:2])
+        return forces
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.points(c=0.0)
+
+
+@pytest.mark.parametrize("offset", [0.0, 2.0**-52])
+def test_on_an_exact_bisector_a_turn_decides_nothing(offset: float) -> None:
+    """Rounding the turned nodes puts the point on one side or the other."""
+    verdicts = {judge_case(OBJECTIVITY, over_a_node_with(offset, seed), subject(Nearest)).verdict for seed in SEEDS}
+    assert Verdict.UNDECIDED in verdicts
+    assert verdicts <= {Verdict.UNDECIDED, Verdict.PASS}
+
+
+def test_on_an_exact_bisector_it_says_why() -> None:
+    outcomes = [judge_case(OBJECTIVITY, over_a_node_with(0.0, seed), subject(Nearest)) for seed in SEEDS]
+    reasons = {outcome.reason for outcome in outcomes if outcome.verdict is Verdict.UNDECIDED}
+    assert reasons
+    assert all(reason.startswith("a kink") for reason in reasons)
+
+
+def test_beside_a_bisector_a_wrong_turn_is_no_kink() -> None:
+    class Wrong(Nearest):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z) * np.resize([1.0, 1.001], z.size)
+
+    for seed in SEEDS:
+        assert judge_case(OBJECTIVITY, over_a_node_with(1 / 7, seed), subject(Nearest)).verdict is Verdict.PASS
+        assert judge_case(OBJECTIVITY, over_a_node_with(1 / 7, seed), subject(Wrong)).verdict is Verdict.FAIL
+
+
+def over_a_node_with(offset: float, seed: int) -> Any:
+    return replace(over_a_node(offset), seed=seed)
+
+
+def test_the_same_case_is_always_turned_the_same_way() -> None:
+    who = subject(Springs)
+    assert turned(case(seed=5), who) == turned(case(seed=5), who)
+    assert turned(case(seed=5), who).values != turned(case(seed=6), who).values

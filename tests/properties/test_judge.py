@@ -1,0 +1,135 @@
+"""What all judges have in common: they share no code with what they judge, and forces that are wrong are seen."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from handmade import Handmade, case, subject
+
+from contactverif.property import Verdict
+from contactverif.runner import judge_case
+from contactverif.strategies import named_case
+from contactverif_properties.balance import FORCE, MOMENT
+from contactverif_properties.patch import ERROR, FLAT_TRANSMISSION
+
+
+def test_the_judge_loads_no_code_of_a_plugin() -> None:
+    """Neither when imported, nor when it makes cases and judges."""
+    script = (
+        "import sys\n"
+        "from contactverif.registry import load_properties\n"
+        "from contactverif.runner import run\n"
+        "from contactverif.subject import Subject\n"
+        "class Silent:\n"
+        "    def residual(self, interface, pairing, z): return 0 * z\n"
+        "questions = load_properties()\n"
+        "assert len(questions) >= 7\n"
+        "run([Subject('silent', lambda *, penalty: Silent())], questions, examples=3, seed=1)\n"
+        "print(sorted(name for name in sys.modules if name.startswith(('contactverif_nts', 'contactverif.projection',\n"
+        "    'contactverif.compiled', 'numba'))))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+class Exact(Handmade):
+    """The residual of case a1, which pushes the slave up: 1 and 2 and 1 against 2 and 2; one node off by a factor."""
+
+    def __init__(self, node: int = 0, error: float = 0.0, **traits: Any) -> None:
+        super().__init__(**traits)
+        self.node, self.error = node, error
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.zeros((5, 2))
+        forces[:, 1] = [-1.0, -2.0, -1.0, 2.0, 2.0]
+        forces[self.node, 1] *= 1 + self.error
+        return forces.reshape(-1)
+
+
+def test_exact_forces_pass() -> None:
+    outcome = judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Exact))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+    assert outcome.measurement is not None
+    assert outcome.measurement.values == {ERROR.name: 0.0}
+
+
+@pytest.mark.parametrize("node", range(5))
+@pytest.mark.parametrize("error", [1.0, 1e-6, 1e-12])
+def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) -> None:
+    outcome = judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Exact, node=node, error=error))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    size = [1, 2, 1, 2, 2][node]
+    assert outcome.measurement.values[ERROR.name] == pytest.approx(error * size / 4, rel=1e-3)
+
+
+def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
+    class Wrong(Exact):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return -super().residual(interface, pairing, z)
+
+    assert judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Wrong)).verdict is Verdict.FAIL
+    assert judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Handmade)).verdict is Verdict.FAIL
+
+
+def test_of_a_multiplier_the_distribution_is_judged() -> None:
+    class Twice(Exact):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 2 * super().residual(interface, pairing, z)
+
+    case_a1 = named_case("a1")
+    assert judge_case(FLAT_TRANSMISSION, case_a1, subject(Twice)).verdict is Verdict.FAIL
+    assert judge_case(FLAT_TRANSMISSION, case_a1, subject(Twice, enforcement="multiplier")).verdict is Verdict.PASS
+    uneven = subject(Twice, node=1, error=0.1, enforcement="multiplier")
+    assert judge_case(FLAT_TRANSMISSION, case_a1, uneven).verdict is Verdict.FAIL
+    silent = subject(Handmade, enforcement="multiplier")
+    assert judge_case(FLAT_TRANSMISSION, case_a1, silent).verdict is Verdict.FAIL
+
+
+class Pair(Handmade):
+    """1 up on the first slave node, `back` down on the first master node."""
+
+    def __init__(self, back: float = 1.0, **traits: Any) -> None:
+        super().__init__(**traits)
+        self.back = back
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.zeros((5, 2))
+        forces[0, 1], forces[2, 1] = 1.0, -self.back
+        return forces.reshape(-1)
+
+
+def test_forces_balance_or_lack_what_they_lack() -> None:
+    assert judge_case(FORCE, case(), subject(Pair)).verdict is Verdict.PASS
+    outcome = judge_case(FORCE, case(), subject(Pair, back=0.96))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    assert outcome.measurement.values["force defect"] == pytest.approx(0.04)
+
+
+def test_a_couple_balances_in_force_and_not_in_moment() -> None:
+    """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
+    outcome = judge_case(MOMENT, case(), subject(Pair))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    arm = 2 - (6 / 7 - 1 / 2)
+    assert outcome.measurement.values["moment defect"] == pytest.approx(arm / case().diameter)
+
+
+@pytest.mark.parametrize("question", [FORCE, MOMENT], ids=lambda question: question.id)
+def test_no_force_balances(question: Any) -> None:
+    assert judge_case(question, case(), subject(Handmade)).verdict is Verdict.PASS
+
+
+def test_a_force_on_the_master_alone_is_seen() -> None:
+    class Ghost(Handmade):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            forces = 0 * z
+            forces[-1] = 1e-100
+            return forces
+
+    assert judge_case(FORCE, case(), subject(Ghost)).verdict is Verdict.FAIL

@@ -1,0 +1,116 @@
+"""What the harness takes for a kink: computed from positions where contact points are named, else from differences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from handmade import Handmade, case, over_a_node, subject
+from scipy import sparse
+
+from contactverif.case import Case
+from contactverif_properties.kinks import dense, jump, kink_within
+
+REACH = 1e-6
+
+
+class Pointed(Handmade):
+    """One contact point, in the middle of the slave segment; two methods in one, and the pairing is a lie."""
+
+    half_area = np.nan
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.points(c=0.0, half_area=self.half_area)
+
+
+class Wide(Pointed):
+    """The same with an area of competence of half a segment."""
+
+    half_area = 0.5
+
+
+class Springs(Handmade):
+    """A spring to the master's node on its side; no contact points."""
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        forces[1] = z[1] * (1.0 if z[0] + z[2] > 0 else 3.0)
+        forces[0] = z[0] ** 2
+        return forces
+
+
+def kink(plugin: Any, where: Case, reach: float = REACH) -> str:
+    return kink_within(where, subject(plugin).on(where), None, reach, np.ones(where.z.size))
+
+
+def test_a_point_over_a_master_node_is_at_a_kink() -> None:
+    assert kink(Pointed, over_a_node(0.0)).startswith("a kink: a decision hangs on 0")
+
+
+def test_a_point_away_from_all_decisions_is_not() -> None:
+    assert kink(Pointed, over_a_node(1 / 7)) == ""
+
+
+@pytest.mark.parametrize(("offset", "near"), [(1e-7, True), (1e-4, False), (-1e-7, True), (-1e-4, False)])
+def test_a_point_is_near_a_kink_where_the_nodes_need_not_move_far(offset: float, near: bool) -> None:
+    assert bool(kink(Pointed, over_a_node(offset))) is near
+
+
+def test_touch_is_a_kink() -> None:
+    assert kink(Pointed, over_a_node(6 / 7, gap=0.0))
+    assert kink(Pointed, over_a_node(6 / 7, gap=-1e-7))
+    assert not kink(Pointed, over_a_node(6 / 7, gap=-1e-4))
+
+
+def test_the_end_of_an_area_over_a_master_node_is_a_kink() -> None:
+    """The area of competence is a quarter to either side."""
+    at_end = over_a_node(0.25)
+    assert not kink(Pointed, at_end)
+    assert kink(Wide, at_end)
+    assert not kink(Wide, over_a_node(0.3))
+
+
+def test_a_lie_about_the_contact_point_moves_the_kink_with_it() -> None:
+    """Only the plugin knows where its points are. One that puts them at kinks is undecided, and so never judged."""
+
+    class Elsewhere(Handmade):
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.points(c=-2 * 6 / 7)  # over the node of the master
+
+    assert kink(Elsewhere, case())
+
+
+def test_without_contact_points_one_sided_differences_tell() -> None:
+    assert kink(Springs, over_a_node(0.0)).startswith("a kink: one-sided differences over 1e-06 disagree by ")
+    assert kink(Springs, over_a_node(1e-7))
+    assert kink(Springs, over_a_node(1 / 7)) == ""
+    assert kink(Springs, case()) == ""
+
+
+def test_nothing_in_contact_is_no_kink() -> None:
+    assert kink(Handmade, over_a_node(0.0)) == ""
+
+
+def test_a_jump_is_seen_from_both_sides() -> None:
+    where = over_a_node(0.0)
+    directions = np.ones((1, where.z.size))
+    assert jump(where, subject(Springs).on(where), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
+    beside = over_a_node(1 / 7)
+    assert jump(beside, subject(Springs).on(beside), REACH, directions)[0] < 1e-5
+    assert jump(beside, subject(Springs).on(beside), REACH, directions)[1] == 0
+
+
+def test_a_jump_of_the_tangent_counts_too() -> None:
+    class Stiff(Springs):
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.eye(z.size) * (1.0 if z[0] + z[2] > 0 else 3.0)
+
+    where = over_a_node(0.0)
+    assert jump(where, subject(Stiff).on(where), REACH, np.ones((1, where.z.size)))[1] == pytest.approx(2.0)
+
+
+def test_sparse_and_dense_tangents_are_the_same() -> None:
+    array = np.arange(9.0).reshape(3, 3)
+    assert np.array_equal(dense(sparse.coo_array(array)), array)
+    assert np.array_equal(dense(array), array)

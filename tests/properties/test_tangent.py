@@ -1,0 +1,226 @@
+"""The judge of tangents, on remainders of known slopes and on formulations made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from handmade import Handmade, case, over_a_node, subject
+
+from contactverif.formulation import Traits
+from contactverif.property import Verdict
+from contactverif.runner import judge_case
+from contactverif_properties.tangent import (
+    CENTRAL,
+    COMPLEX,
+    DIRECTIONAL,
+    SLOPE,
+    TAYLOR,
+    directional,
+    random_directions,
+    taylor_slope,
+)
+
+STEPS = np.array([1e-1, 1e-2, 1e-3])
+
+
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0, 3.0])
+def test_the_slope_of_a_power_is_the_power(power: float) -> None:
+    remainders = np.array([2.0, 5.0]) * STEPS[:, None] ** power
+    assert taylor_slope(remainders, STEPS, floor=0.0) == pytest.approx(power)
+    assert taylor_slope(remainders[::-1], STEPS[::-1], floor=0.0) == pytest.approx(power)
+
+
+def test_the_worst_direction_counts() -> None:
+    remainders = np.column_stack([STEPS**2, 1e-6 * STEPS])
+    assert taylor_slope(remainders, STEPS, floor=0.0) == pytest.approx(1.0)
+
+
+def test_the_best_pair_of_steps_counts() -> None:
+    """The last step is in roundoff, which no floor told."""
+    remainders = np.array([[1e-2], [1e-4], [9e-5]])
+    assert taylor_slope(remainders, STEPS, floor=0.0) == pytest.approx(2.0)
+
+
+def test_two_steps_that_are_nearly_equal_tell_no_slope() -> None:
+    """Found by 20,000 examples: with uS/ℓ = 1e-10 two of the steps are 3 % apart, and the slope between them noise."""
+    steps = np.array([3.9e-3, 3.8e-3, 2.4e-4])
+    assert taylor_slope(np.array([[1e-7], [1.2e-7], [1e-12]]), steps, floor=1e-9) == np.inf
+    assert taylor_slope(np.array([[1e-4], [1.2e-4], [4e-7]]), steps, floor=1e-9) == pytest.approx(2, abs=0.1)
+
+
+def test_what_is_below_the_floor_decides_nothing() -> None:
+    remainders = np.column_stack([[1e-2, 1e-4, 1e-12], [1e-13, 1e-14, 1e-15]])
+    assert taylor_slope(remainders, STEPS, floor=1e-10) == pytest.approx(2.0)
+    assert taylor_slope(remainders[:, 1:], STEPS, floor=1e-10) == np.inf
+
+
+def test_the_slope_finds_a_large_error_and_misses_a_small_one() -> None:
+    """Which is why the central difference is asked too."""
+    wrong = STEPS[:, None]
+    assert taylor_slope(wrong + STEPS[:, None] ** 2, STEPS, floor=1e-12) < SLOPE
+    assert taylor_slope(1e-3 * wrong + STEPS[:, None] ** 2, STEPS, floor=1e-12) > SLOPE
+
+
+def test_no_remainder_at_all_is_exact() -> None:
+    assert taylor_slope(np.zeros((3, 2)), STEPS, floor=0.0) == np.inf
+
+
+def test_directions_are_eight_and_as_long_as_their_largest_entry() -> None:
+    directions = random_directions(case(seed=4))
+    assert directions.shape == (8, case().z.size)
+    assert np.array_equal(np.abs(directions).max(axis=1), np.ones(8))
+    assert np.array_equal(directions, random_directions(case(seed=4)))
+    assert not np.array_equal(directions, random_directions(case(seed=5)))
+
+
+def cubes(z: Any) -> Any:
+    return z**3 + z * np.roll(z, 1)
+
+
+def derivative_of_cubes(z: Any) -> Any:
+    k = np.diag(3 * z**2 + np.roll(z, 1))
+    return k + np.diag(z) @ np.roll(np.eye(len(z)), -1, axis=1)
+
+
+class Smooth(Handmade):
+    """A residual that has nothing to do with contact, and its derivative, with an error if asked for."""
+
+    def __init__(self, error: Callable[[Any], Any] = lambda k: k, **traits: Any) -> None:
+        super().__init__(**{"tangent": "exact", "batched": True, **traits})
+        self.error = error
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return cubes(z[..., :]) if z.ndim == 1 else np.apply_along_axis(cubes, -1, z)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.error(derivative_of_cubes(z))
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        return {}
+
+
+def one_entry(size: float) -> Callable[[Any], Any]:
+    def wrong(k: Any) -> Any:
+        k = k.copy()
+        k[0, 0] += size * np.abs(k).max()
+        return k
+
+    return wrong
+
+
+def test_an_exact_tangent_passes_all_three_conditions() -> None:
+    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, takes_complex=True))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+    assert outcome.measurement is not None
+    assert set(outcome.measurement.values) == {CENTRAL.name, TAYLOR.name, COMPLEX.name}
+    assert outcome.measurement.values[TAYLOR.name] == pytest.approx(2.0, abs=0.05)
+
+
+def test_without_complex_numbers_there_is_no_complex_step() -> None:
+    assert COMPLEX.name not in directional(case(), subject(Smooth)).values
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-8])
+def test_an_error_in_one_entry_is_found(size: float) -> None:
+    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, error=one_entry(size)))
+    assert outcome.verdict is Verdict.FAIL
+    assert CENTRAL.name in outcome.reason
+
+
+def test_a_complex_step_finds_what_a_central_difference_cannot() -> None:
+    wrong = one_entry(1e-10)
+    assert judge_case(DIRECTIONAL, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
+    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, error=wrong, takes_complex=True))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.reason.startswith(COMPLEX.name)
+
+
+def test_a_tangent_of_nothing_is_nothing() -> None:
+    class Nothing(Smooth):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 0 * z
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.zeros((z.size, z.size))
+
+    assert judge_case(DIRECTIONAL, case(), subject(Nothing)).verdict is Verdict.PASS
+
+    class TangentOfNothing(Nothing):
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 1e-12 * np.eye(z.size)
+
+    assert judge_case(DIRECTIONAL, case(), subject(TangentOfNothing)).verdict is Verdict.FAIL
+
+
+class Restless(Smooth):
+    """Its pairing is another at every call."""
+
+    calls = 0
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        self.calls += 1
+        return {"call": np.array([self.calls % 5])}
+
+
+def test_a_pairing_that_changes_at_every_call_is_not_excused() -> None:
+    """Neither where the tangent is wrong, nor where it is right: no kink is near."""
+    for error in (one_entry(1.0), one_entry(0.0)):
+        outcome = judge_case(DIRECTIONAL, case(), subject(Restless, error=error))
+        assert outcome.verdict is Verdict.FAIL
+        assert outcome.reason.startswith("the pairing changes however little the nodes move, and no kink is near")
+
+
+def test_nor_where_it_names_its_contact_points() -> None:
+    class Pointed(Restless):
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.points(c=0.1)
+
+    outcome = judge_case(DIRECTIONAL, case(), subject(Pointed, error=one_entry(1.0)))
+    assert outcome.verdict is Verdict.FAIL
+    assert "the pairing changes however little the nodes move" in outcome.reason
+
+
+class Nearest(Handmade):
+    """A spring at one point of the slave, to the height of the master segment that is nearest, kinked over a node."""
+
+    def __init__(self, wrong: float = 0.0, **traits: Any) -> None:
+        super().__init__(**{"tangent": "exact", "batched": True, **traits})
+        self.wrong = wrong
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        """1 where the middle of the first slave segment is right of the middle master node."""
+        middle = (z[0] + z[2]) / 2
+        return {"right": np.array([middle > z[2 * (interface.n_slave_nodes + 1)]])}
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        forces[..., 1] = np.where(pairing["right"][0], 1.0, 3.0) * z[..., 1] ** 2
+        return forces
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        k = np.zeros((z.size, z.size))
+        k[1, 1] = (1 + self.wrong) * np.where(pairing["right"][0], 1.0, 3.0) * 2 * z[1]
+        return k
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.points(c=0.0)
+
+
+def test_a_true_kink_is_undecided_where_it_would_fail() -> None:
+    at_kink, beside = over_a_node(0.0), over_a_node(1 / 7)
+    assert judge_case(DIRECTIONAL, at_kink, subject(Nearest)).verdict is Verdict.PASS  # the frozen pairing is smooth
+    outcome = judge_case(DIRECTIONAL, at_kink, subject(Nearest, wrong=0.1))
+    assert outcome.verdict is Verdict.UNDECIDED
+    assert outcome.reason.startswith("a kink: a decision hangs on ")
+    assert judge_case(DIRECTIONAL, beside, subject(Nearest)).verdict is Verdict.PASS
+    assert judge_case(DIRECTIONAL, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
+
+
+def test_what_provides_no_tangent_is_not_asked() -> None:
+    assert DIRECTIONAL.needs == {"tangent"}
+    assert DIRECTIONAL.promise(Traits()) is None
+    assert DIRECTIONAL.promise(Traits(tangent="approximate")) is False
+    assert DIRECTIONAL.promise(Traits(tangent="exact")) is True
