@@ -92,8 +92,8 @@ def verify(
     from contactverif.progress import Bar
     from contactverif.registry import load_formulation, load_properties
     from contactverif.runner import run
+    from contactverif.subject import Subject
     from contactverif.tables import RunTable, counterexample, show, show_as_it_is, summary
-    from contactverif_reports.draw import figure
     from contactverif_reports.write import check_writable, write
 
     names = _chosen(names or [], all_)
@@ -116,6 +116,9 @@ def verify(
             known=reasons,
             progress=bar.told,
         )
+    if report is not None:  # before anything is shown, so that nothing that was judged is lost
+        write(found, report)
+    drawn = {subject.name: subject for subject in subjects if isinstance(subject, Subject)}
     show(RunTable(found))
     for row in found.rows:
         text = counterexample(row, report)
@@ -125,10 +128,9 @@ def verify(
                 outcome = row.shrunk or row.witness
                 assert outcome is not None
                 path = pictures / f"{_file_name(row.formulation, row.question.id)}.png"
-                figure(outcome.case, path, title=f"{row.formulation}, {row.question.id}: {outcome.reason}")
+                _draw(drawn[row.formulation], row.question, outcome, path)
                 typer.echo(f"    picture: {path}")
     if report is not None:
-        write(found, report)
         typer.echo(f"report: {report}")
     show(summary(found))
     raise typer.Exit(0 if found.passed else 1)
@@ -267,7 +269,8 @@ def _draw(subject: Subject, question: Property, outcome: Outcome, path: Path) ->
 
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
     try:
-        figure(outcome.case, path, title=title, forces=_forces(subject, outcome.case))
+        exact = question.exact(outcome.case) if question.exact is not None else None
+        figure(outcome.case, path, title=title, forces=_forces(subject, outcome.case), exact=exact)
     except MisuseError as error:
         raise MisuseError("--picture", error.found, error.needed) from None
 
@@ -276,8 +279,8 @@ def _forces(subject: Subject, case: Case) -> FloatArray | None:
     """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none."""
     from contactverif.errors import ContractError
 
-    formulation = subject.on(case)
     try:
+        formulation = subject.on(case)
         forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
     except ContractError:
         return None
