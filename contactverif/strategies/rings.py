@@ -42,7 +42,7 @@ class Ring:
         reference = self._points(self.slave, self.inner_slave, 1.0)
         length = min(shortest(master), shortest(reference))
         depth = on_lattice(dealt(self.quarters, len(reference)) / 4 * self.unit * length)
-        depth = np.minimum(depth, RADIUS / 2)  # a hole does not shrink to a point
+        depth = np.clip(depth, -RADIUS / 2, RADIUS / 2)  # neither a hole nor a disc shrinks to a point
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
         shift = shifts(offsets, len(reference)) * length
         slave = on_lattice(reference + outward * depth[:, None]) + shift

@@ -236,7 +236,8 @@ def test_no_segment_has_shrunk_to_a_point(strategy: Callable[[], SearchStrategy[
         assert case.shortest_segment > 0
 
 
-def test_a_hole_does_not_shrink_to_a_point() -> None:
-    """Found by 20,000 examples: a hole of four radii whose nodes all sank to the centre."""
-    hole = Ring([1, 1, 1], [1, 1, 1], 180, inner_slave=False, quarters=[4], unit=1.0)
-    assert np.ptp(hole([0]).slave, axis=0).min() > 1
+@pytest.mark.parametrize(("inner_slave", "quarters"), [(False, 4), (True, -4)])
+def test_neither_a_hole_nor_a_disc_shrinks_to_a_point(inner_slave: bool, quarters: int) -> None:
+    """Found by 20,000 examples: four radii of penetration, or of gap, took all nodes to the centre."""
+    ring = Ring([1, 1, 1], [1, 1, 1], 180, inner_slave=inner_slave, quarters=[quarters], unit=1.0)
+    assert np.ptp(ring([0]).slave, axis=0).min() > 1
