@@ -97,7 +97,8 @@ class Traits:
     symmetric : the tangent is symmetric.
     conserves_force, conserves_moment : slave and master forces balance at any tilt and curvature.
     continuity : how smooth the forces are while a node slides over master vertices, "C0" or "C1".
-    area : the configuration in which areas of competence are measured.
+    area : the configuration in which areas of competence are measured; they add up to the slave's length, so that a
+        uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
     penalty : "nodal" (force per length) or "distributed" (force per length per length of penetration).
     enforcement : how contact is enforced.
     dimensions : numbers of coordinates that it can do.

@@ -98,13 +98,14 @@ class Guarded:
         forces = _asked("residual", self._plugin.residual, interface, pairing, frozen(z, z.dtype.type))
         if not isinstance(forces, np.ndarray):
             raise ContractError(f"residual: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
+        forces = np.array(forces)  # a copy, since the plugin may use its own again; and no subclass with its own rules
         if forces.shape != z.shape:
             raise ContractError(f"residual: returned shape {forces.shape}; needed {z.shape}, that of z")
         if forces.dtype != z.dtype:
             raise ContractError(f"residual: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
         if not np.isfinite(forces).all():
             raise NonFiniteError(f"residual: {_first_bad(forces)}")
-        return forces.copy()  # the plugin may use its own array again
+        return forces
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse coo array."""
@@ -115,7 +116,7 @@ class Guarded:
             raise ContractError(f"tangent: returned shape {tangent.shape}; needed {(z.size, z.size)}")
         if tangent.dtype != np.float64:
             raise ContractError(f"tangent: returned dtype {tangent.dtype}; needed float64")
-        tangent = tangent.copy() if isinstance(tangent, np.ndarray) else tangent.tocoo(copy=True)
+        tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else tangent.tocoo(copy=True)
         entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
         if not np.isfinite(entries).all():
             raise NonFiniteError(f"tangent: {_first_bad(entries)}")

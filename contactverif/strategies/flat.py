@@ -25,6 +25,7 @@ from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motion
 MOST_MASTER_SEGMENTS = 100  # in one chain
 _DEPTHS = st.integers(1, 8)  # quarters
 _SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # how far the slave has come from its reference
+_REPEATS = st.sampled_from([1] * 15 + [2, 4, 12])  # of the slave lengths, for long chains
 _REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # master lengths × 2^-this
 
 
@@ -68,19 +69,25 @@ def _flat_cases(draw: DrawFn) -> Case:
 def _panels() -> SearchStrategy[list[tuple[FloatArray, FloatArray]]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang = st.integers(0, 3)
-    one = st.builds(_places, _REFINEMENTS, lengths(), lengths(), overhang, overhang, SEVENTHS)
+    one = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
     return st.one_of(st.lists(one, min_size=1, max_size=1), st.lists(one, min_size=1, max_size=2))
 
 
 def _places(
-    refinement: int, slave: Sequence[float], master: Sequence[float], left: int, right: int, sevenths: int
+    refinement: int,
+    repeats: int,
+    slave: Sequence[float],
+    master: Sequence[float],
+    left: int,
+    right: int,
+    sevenths: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Ascending x of the nodes of a slave chain and of a master chain that goes beyond it by `left` and `right`.
 
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
     """
-    slave_x = np.concatenate([[0.0], np.cumsum(slave)])
+    slave_x = np.concatenate([[0.0], np.cumsum(np.tile(slave, repeats))])
     end = slave_x[-1] + right
     master_x = [-float(left)]
     for length in cycle(master) if refinement else master:

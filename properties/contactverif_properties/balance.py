@@ -9,7 +9,7 @@ from contactverif.case import Case
 from contactverif.property import Measurement, Property
 from contactverif.subject import Subject
 from contactverif_properties import roundoff
-from contactverif_properties.anywhere import any_cases
+from contactverif_properties.anywhere import any_cases, springs_only
 
 FORCE_DEFECT = roundoff.gap_quantity("force defect")
 MOMENT_DEFECT = roundoff.gap_quantity("moment defect")
@@ -47,6 +47,7 @@ FORCE = Property(
     cases=any_cases,
     measure=force_defect,
     promise=lambda traits: traits.conserves_force,
+    applicable=springs_only,
 )
 MOMENT = Property(
     id="balance.moment",
@@ -56,4 +57,5 @@ MOMENT = Property(
     cases=any_cases,
     measure=moment_defect,
     promise=lambda traits: traits.conserves_moment,
+    applicable=springs_only,
 )

@@ -6,20 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF
+from contactverif.arrays import UNIT_ROUNDOFF, Array
 from contactverif.case import Case
 from contactverif.formulation import Traits
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.strategies import smooth_cases
 from contactverif.subject import Subject
 from contactverif_properties import roundoff
-from contactverif_properties.anywhere import any_cases
-from contactverif_properties.kinks import dense, jump, kink_within
+from contactverif_properties.anywhere import any_cases, springs_only
+from contactverif_properties.kinks import dense, excuse
 
+SCALED_REASON = "powers of two scale the four operations and roots exactly; a power or an angle is rounded anew"
 TURNED_FORCES = Quantity("turned forces", "1", roundoff.TURNED, roundoff.TURNED_REASON)
 TURNED_TANGENT = Quantity("turned tangent", "1", roundoff.TURNED, roundoff.TURNED_REASON)
-SCALED_FORCES = Quantity("scaled forces", "1", "0", "powers of two scale every rounded operation exactly")
-SCALED_TANGENT = Quantity("scaled tangent", "1", "0", "powers of two scale every rounded operation exactly")
+SCALED_FORCES = Quantity("scaled forces", "1", roundoff.TURNED, SCALED_REASON)
+SCALED_TANGENT = Quantity("scaled tangent", "1", roundoff.TURNED, SCALED_REASON)
 LARGEST_EXPONENT = 60
 
 
@@ -36,33 +37,26 @@ def turned(case: Case, subject: Subject) -> Measurement:
     forces_there = formulation.residual(interface, pairing_there, there.z).reshape(-1, 2)
 
     largest = max(case.largest_coordinate, there.largest_coordinate)
-    penetration = roundoff.mean_penetration(case, forces)
-    # Where nothing is in contact, nothing may come of turning: any tolerance does, the value is 0 or infinite.
-    reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment
-    tolerance = UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
-    errors = [float(np.abs(forces_there - forces @ q.T).max()), 0.0]
-    values = {TURNED_FORCES.name: roundoff.share(errors[0], roundoff.slave_forces(case, forces))}
+    tolerance = _turned_tolerance(case, forces, largest)
+    errors = {"forces": float(np.abs(forces_there - forces @ q.T).max())}
+    values = {TURNED_FORCES.name: roundoff.share(errors["forces"], roundoff.slave_forces(case, forces))}
     if "tangent" in formulation.provides:
         blocks = np.kron(np.eye(interface.n_nodes), q)
         tangent = dense(formulation.tangent(interface, pairing, case.z))
         tangent_there = dense(formulation.tangent(interface, pairing_there, there.z))
-        errors[1] = float(np.abs(tangent_there - blocks @ tangent @ blocks.T).max())
-        values[TURNED_TANGENT.name] = roundoff.share(errors[1], float(np.abs(tangent).max()))
-    undecided = ""
-    failing = [number for number, value in enumerate(values.values()) if value > tolerance]
-    if failing:
-        directions = random.uniform(-1, 1, (4, case.z.size))
-        directions /= np.abs(directions).max(axis=1, keepdims=True)
-        rounding = 64 * UNIT_ROUNDOFF * largest  # a turn and a shift round each coordinate a few times
-        undecided = kink_within(case, formulation, pairing, rounding, directions[0])
-        jumps = jump(case, formulation, rounding, directions)
-        if not undecided and all(4 * jumps[number] >= errors[number] for number in failing):
-            undecided = "a kink: moving the nodes by roundoff changes the answer as much"
+        errors["tangent"] = float(np.abs(tangent_there - blocks @ tangent @ blocks.T).max())
+        values[TURNED_TANGENT.name] = roundoff.share(errors["tangent"], float(np.abs(tangent).max()))
+    failing = {
+        what: error for (what, error), value in zip(errors.items(), values.values(), strict=True) if value > tolerance
+    }
+    rounding = 64 * UNIT_ROUNDOFF * largest  # a turn and a shift round each coordinate a few times
+    undecided = excuse(case, formulation, pairing, rounding, failing) if failing else ""
     return Measurement(values, dict.fromkeys(values, tolerance), undecided)
 
 
 def scaled(case: Case, subject: Subject) -> Measurement:
-    """All lengths × 2^k: R × 2^k and K the same, bitwise, for a penalty that scales with its unit."""
+    """All lengths × 2^k: R × 2^k and K the same, for a penalty that scales with its unit; bitwise where nothing but the
+    four operations and square roots is used, and to roundoff where a power or an angle is."""
     interface, random = case.interface, np.random.default_rng(case.seed)
     factor = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1))
     there = replace(case, interface=interface.at(interface.nodes * factor), z=case.z * factor)
@@ -73,20 +67,33 @@ def scaled(case: Case, subject: Subject) -> Measurement:
     pairing, pairing_there = formulation.pair(interface, case.z), rescaled.pair(there.interface, there.z)
     forces = formulation.residual(interface, pairing, case.z)
     forces_there = rescaled.residual(there.interface, pairing_there, there.z)
-    largest = float(np.abs(forces).max())
-    values = {SCALED_FORCES.name: roundoff.share(float(np.abs(forces_there / factor - forces).max()), largest)}
+    errors = {"forces": float(np.abs(forces_there / factor - forces).max())}
+    values = {SCALED_FORCES.name: roundoff.share(errors["forces"], float(np.abs(forces).max()))}
     if "tangent" in formulation.provides:
         tangent = dense(formulation.tangent(interface, pairing, case.z))
         tangent_there = dense(rescaled.tangent(there.interface, pairing_there, there.z))
-        difference = float(np.abs(tangent_there - tangent).max())
-        values[SCALED_TANGENT.name] = roundoff.share(difference, float(np.abs(tangent).max()))
-    return Measurement(values, dict.fromkeys(values, 0.0))
+        errors["tangent"] = float(np.abs(tangent_there - tangent).max())
+        values[SCALED_TANGENT.name] = roundoff.share(errors["tangent"], float(np.abs(tangent).max()))
+    tolerance = _turned_tolerance(case, forces, case.largest_coordinate)
+    failing = {
+        what: error for (what, error), value in zip(errors.items(), values.values(), strict=True) if value > tolerance
+    }
+    rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate
+    undecided = excuse(case, formulation, pairing, rounding, failing) if failing else ""
+    return Measurement(values, dict.fromkeys(values, tolerance), undecided)
+
+
+def _turned_tolerance(case: Case, forces: Array, largest: float) -> float:
+    """u(8X/min(g, ℓ) + 4N). Where nothing is in contact any tolerance does: the value is 0 or infinite."""
+    penetration = roundoff.mean_penetration(case, forces)
+    reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment
+    return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
 
 
 def _penalty_is_stated(traits: Traits) -> str:
-    if traits.enforcement == "penalty" and traits.penalty is None:
+    if traits.penalty is None:
         return "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
-    return ""
+    return springs_only(traits)
 
 
 OBJECTIVITY = Property(
@@ -97,11 +104,12 @@ OBJECTIVITY = Property(
     cases=smooth_cases,
     measure=turned,
     promise=lambda traits: True,
+    applicable=springs_only,
 )
 SCALING = Property(
     id="scaling",
     family="invariants",
-    summary="another unit of length changes no digit: no absolute tolerance is hidden",
+    summary="another unit of length changes nothing: no absolute tolerance is hidden",
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=any_cases,
     measure=scaled,

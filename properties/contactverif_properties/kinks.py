@@ -19,6 +19,24 @@ from contactverif.oracle import kink_margin
 from contactverif.subject import Guarded
 
 
+def excuse(case: Case, formulation: Guarded, pairing: Pairing | None, reach: float, errors: dict[str, float]) -> str:
+    """Empty, or why what failed may be the fault of rounding the positions by `reach`, at a kink.
+
+    Parameters
+    ----------
+    errors : {"forces" or "tangent": largest error of an entry}, of what failed.
+    """
+    directions = np.random.default_rng(case.seed).uniform(-1, 1, (4, case.z.size))
+    directions /= np.abs(directions).max(axis=1, keepdims=True)
+    near = kink_within(case, formulation, pairing, reach, directions[0])
+    if near:
+        return near
+    jumps = dict(zip(("forces", "tangent"), jump(case, formulation, reach, directions), strict=True))
+    if all(4 * jumps[what] >= error for what, error in errors.items()):
+        return "a kink: moving the nodes by roundoff changes the answer as much"
+    return ""
+
+
 def jump(case: Case, formulation: Guarded, reach: float, directions: FloatArray) -> tuple[float, float]:
     """How much the largest entries of forces and tangent change when the nodes move by `reach`, either way.
 

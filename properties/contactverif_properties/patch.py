@@ -12,6 +12,7 @@ from contactverif.property import Measurement, Property
 from contactverif.strategies import flat_cases
 from contactverif.subject import Subject
 from contactverif_properties import roundoff
+from contactverif_properties.anywhere import springs_only
 
 ERROR = roundoff.gap_quantity("error of a nodal force")
 TOTAL = roundoff.gap_quantity("error of the total force")
@@ -33,19 +34,14 @@ def transmitted(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        Largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless. For a barrier or a multiplier
-        method both are shares of their sum on the slave, since its size is not ε̂ |g|.
+        Largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless.
 
     Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20; exact forces in rationals (`contactverif.oracle`).
     """
     formulation = subject.on(case)
     forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
     exact = exact_forces(case)
-    n_slave = case.interface.n_slave_nodes
-    size = float(np.linalg.norm(exact[:n_slave].sum(axis=0)))
-    if subject.traits.enforcement != "penalty":
-        exact, forces = exact / size, forces / float(np.linalg.norm(forces[:n_slave].sum(axis=0)))
-        size = 1.0
+    size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
     error = float(np.linalg.norm(forces - exact, axis=1).max())
     return Measurement({ERROR.name: error / size}, {ERROR.name: roundoff.of_gap(case, case.parameter("penetration"))})
 
@@ -76,11 +72,11 @@ def resultant(case: Case, subject: Subject) -> Measurement:
 
 
 def _area_is_stated(traits: Traits) -> str:
-    if traits.enforcement != "penalty" or traits.penalty == "nodal":
+    if traits.penalty == "nodal":
         return "there are no distributed springs"
     if traits.penalty is None or traits.area is None:
         return "the traits `penalty` and `area` are not both stated, so the total is unknown"
-    return ""
+    return springs_only(traits)
 
 
 FLAT_TRANSMISSION = Property(
@@ -91,6 +87,7 @@ FLAT_TRANSMISSION = Property(
     cases=flat_cases,
     measure=transmitted,
     promise=lambda traits: traits.passes_flat_patch,
+    applicable=springs_only,
     exact=exact_forces,
 )
 FLAT_RESULTANT = Property(

@@ -17,6 +17,7 @@ from contactverif.formulation import Pairing
 from contactverif.property import Measurement, Property, Quantity, Verdict, judge
 from contactverif.strategies import smooth_cases
 from contactverif.subject import Guarded, Subject
+from contactverif_properties.anywhere import springs_only
 from contactverif_properties.kinks import kink_within
 
 N_DIRECTIONS = 8
@@ -54,14 +55,15 @@ def directional(case: Case, subject: Subject) -> Measurement:
     -------
     Measurement
         Best central difference over the steps, worst direction, relative to the largest derivative; least slope of the
-        Taylor remainder (none where all remainders are roundoff); the complex step where the plugin takes complex
+        Taylor remainder (none where all remainders are roundoff, or the residual itself has no
+        such slope, as across a kink that no pairing freezes); the complex step where the plugin takes complex
         positions. Detail: the length that took the place of ℓ.
     """
     formulation, shortest = subject.on(case), case.shortest_segment
     pairing = formulation.pair(case.interface, case.z)
     directions = random_directions(case)
     derivative = (formulation.tangent(case.interface, pairing, case.z) @ directions.T).T  # (n_directions, n_unknowns)
-    undecided, broken = _pairing_holds(case, formulation, pairing, directions[0])
+    undecided = _why_undecided(case, formulation, pairing, directions[0])
 
     def look(length: float) -> tuple[Measurement, float]:
         values, bending = differences(formulation, case, pairing, directions, derivative, length)
@@ -73,7 +75,7 @@ def directional(case: Case, subject: Subject) -> Measurement:
         }
         if subject.traits.takes_complex:
             values[COMPLEX.name] = complex_step(formulation, case, pairing, directions, derivative)
-        return Measurement(values, tolerances, undecided, broken, {"length": length}), bending
+        return Measurement(values, tolerances, undecided, details={"length": length}), bending
 
     first, bending = look(shortest)
     if bending >= shortest / 2 or judge(DIRECTIONAL, first)[0] is not Verdict.FAIL:
@@ -117,26 +119,31 @@ def differences(
     values = {CENTRAL.name: float(errors.min(axis=0).max() / size)}
     forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # the longest central step serves here too
     remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
-    slope = taylor_slope(remainders, steps[forward], floor=1e3 * UNIT_ROUNDOFF * reach * size)
+    floor = 1e3 * UNIT_ROUNDOFF * reach * size
+    slope = taylor_slope(remainders, steps[forward], floor)
+    if slope < SLOPE:  # against the residual's own derivative: where that is no better, the residual is not smooth
+        own = np.take_along_axis(slopes, errors.argmin(axis=0)[None, :, None], axis=0)[0]
+        smooth = np.abs(moved[forward] - here - steps[forward, None, None] * own).max(axis=2)
+        if taylor_slope(smooth, steps[forward], floor) < SLOPE:
+            slope = np.inf
     if np.isfinite(slope):
         values[TAYLOR.name] = slope
     third = np.abs(slopes[0] - slopes[1]).max() / (central[0] ** 2 - central[1] ** 2)  # third derivative / 6
     return values, float(np.sqrt(size / third)) if third > 0 else np.inf
 
 
-def _pairing_holds(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> tuple[str, str]:
-    """Whether the frozen pairing is that of the states around: (why undecided, what is broken), empty if it is."""
+def _why_undecided(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> str:
+    """Empty, or why the frozen pairing may not be that of the states around. A restless pairing is no excuse."""
     shortest = case.shortest_segment
     step = CENTRAL_STEPS[-1] * shortest * (UNIT_ROUNDOFF * case.largest_coordinate / shortest) ** (1 / 3)
     if pairing is not None and _same_around(formulation, case, pairing, step * direction):
-        return "", ""
+        return ""
     undecided = kink_within(case, formulation, pairing, 4 * step, direction)
     if undecided or pairing is None:
-        return undecided, ""
-    least = 2.0**-20 * step * direction
-    if all(_steady(formulation, case, way * least) for way in (1, -1)):
-        return "a kink: the pairing changes here, and is steady on either side", ""
-    return "", "the pairing changes however little the nodes move, and no kink is near"
+        return undecided
+    if all(_steady(formulation, case, way * 2.0**-10 * step * direction) for way in (1, -1)):
+        return "a kink: the pairing changes here, and is steady on either side"
+    return ""
 
 
 def random_directions(case: Case) -> FloatArray:
@@ -196,4 +203,5 @@ DIRECTIONAL = Property(
     measure=directional,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
+    applicable=springs_only,
 )
