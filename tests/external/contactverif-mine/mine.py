@@ -72,6 +72,7 @@ class Exact(SegmentToSegment):
         conserves_force=True,
         conserves_moment=True,
         tangent="exact",
+        area="current",
         penalty="distributed",
         takes_complex=True,
     )
