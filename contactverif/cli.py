@@ -97,14 +97,15 @@ def verify(
     from contactverif_reports.write import check_writable, write
 
     names = _chosen(names or [], all_)
-    interface = _interface(mesh, slave, master, flip)
-    questions = load_properties(properties or ["*"])
-    subjects = [load_formulation(name) for name in names]
-    reasons = dict(_reason(text) for text in known or [])
     if report is not None:
         check_writable(report)
     if pictures is not None:
         _folder(pictures)
+    target, folder = (path and path.absolute() for path in (report, pictures))  # a plugin may change where we are
+    interface = _interface(mesh, slave, master, flip)
+    questions = load_properties(properties or ["*"])
+    subjects = [load_formulation(name) for name in names]
+    reasons = dict(_reason(text) for text in known or [])
     with Bar() as bar:
         found = run(
             subjects,
@@ -116,20 +117,20 @@ def verify(
             known=reasons,
             progress=bar.told,
         )
-    if report is not None:  # before anything is shown, so that nothing that was judged is lost
-        write(found, report)
+    if target is not None:  # before anything is shown, so that nothing that was judged is lost
+        write(found, target)
     drawn = {subject.name: subject for subject in subjects if isinstance(subject, Subject)}
     show(RunTable(found))
     for row in found.rows:
         text = counterexample(row, report)
         if text:
             show_as_it_is(text)
-            if pictures is not None:
+            if pictures is not None and folder is not None:
                 outcome = row.shrunk or row.witness
                 assert outcome is not None
-                path = pictures / f"{_file_name(row.formulation, row.question.id)}.png"
-                _draw(drawn[row.formulation], row.question, outcome, path)
-                typer.echo(f"    picture: {path}")
+                name = f"{_file_name(row.formulation, row.question.id)}.png"
+                _draw(drawn[row.formulation], row.question, outcome, folder / name)
+                typer.echo(f"    picture: {pictures / name}")
     if report is not None:
         typer.echo(f"report: {report}")
     show(summary(found))

@@ -86,6 +86,21 @@ class Pairing(Mapping[str, NDArray[Any]]):
         )
 
 
+_WORDS: dict[str, tuple[object, ...]] = {
+    "passes_flat_patch": (True, False, None),
+    "tangent": ("exact", "approximate", None),
+    "symmetric": (True, False, None),
+    "conserves_force": (True, False, None),
+    "conserves_moment": (True, False, None),
+    "continuity": ("C0", "C1", None),
+    "area": ("reference", "current", None),
+    "penalty": ("nodal", "distributed", None),
+    "enforcement": ("penalty", "multiplier", "barrier"),
+    "batched": (True, False),
+    "takes_complex": (True, False),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Traits:
     """What a formulation promises. None promises nothing; False says "does not" and names a witness.
@@ -106,6 +121,10 @@ class Traits:
     takes_complex : `residual` takes complex positions, so that a complex step works.
     witnesses : {property id: name of a case} for each promise "does not"; the case always runs.
     source : where the formulation is published.
+
+    Raises
+    ------
+    MisuseError : for a word that is none of these, such as a misspelt promise.
     """
 
     passes_flat_patch: bool | None = None
@@ -122,6 +141,13 @@ class Traits:
     takes_complex: bool = False
     witnesses: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        for name, words in _WORDS.items():
+            if getattr(self, name) not in words:
+                raise MisuseError(f"Traits.{name}", repr(getattr(self, name)), f"one of {', '.join(map(repr, words))}")
+        if not isinstance(self.witnesses, Mapping):
+            raise MisuseError("Traits.witnesses", repr(self.witnesses), "{property id: name of a case}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

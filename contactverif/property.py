@@ -65,6 +65,7 @@ class Measurement:
     undecided : empty, or why a failure would not be the formulation's fault (roundoff, a kink).
     broken : empty, or a breach that no number tells, in words.
     details : further numbers worth keeping, {name: number}.
+    idle : nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
     """
 
     values: Mapping[str, float]
@@ -72,6 +73,7 @@ class Measurement:
     undecided: str = ""
     broken: str = ""
     details: Mapping[str, float] = field(default_factory=dict)
+    idle: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

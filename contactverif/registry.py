@@ -108,7 +108,9 @@ def _loaded(name: str, entries: Sequence[EntryPoint]) -> Any:
         return NotLoaded(name, f"registered {len(entries)} times: {', '.join(map(_origin, entries))}")
     try:
         return entries[0].load()
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         return NotLoaded(name, f"{type(error).__name__}: {error}")
 
 

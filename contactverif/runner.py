@@ -202,6 +202,8 @@ def _overall(row: Row) -> tuple[Verdict, str]:
         why = Counter(outcome.reason for outcome in row.outcomes if not outcome.decided).most_common(1)
         cause = f"most often because {why[0][0]}" if why else "no more cases could be made"
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
+    if everything and all(outcome.measurement is not None and outcome.measurement.idle for outcome in everything):
+        return Verdict.NOT_JUDGED, "no case gave any force: nothing was judged"
     return Verdict.PASS, ""
 
 

@@ -44,7 +44,9 @@ class Subject:
         if not isinstance(traits, Traits):
             raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.formulation.Traits")
         self.traits: Traits = traits
-        self.provides = frozenset(part for part in OPTIONAL_PARTS if callable(getattr(plugin, part, None)))
+        self.provides = frozenset(
+            part for part in OPTIONAL_PARTS if callable(_asked(part, getattr, plugin, part, None))
+        )
 
     def penalty(self, case: Case) -> float:
         """The penalty in this formulation's own kind: ε̂ as it is, or ε̂ × the mean slave segment if nodal."""
@@ -81,7 +83,7 @@ class Guarded:
         if "pair" not in self.provides:
             return None
         answer = _asked("pair", self._plugin.pair, interface, frozen(z, np.float64))
-        pairing = answer if isinstance(answer, Pairing) else Pairing(answer)
+        pairing = answer if isinstance(answer, Pairing) else _asked("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
 
@@ -127,14 +129,22 @@ class Guarded:
         points = _asked("contact_points", self._plugin.contact_points, interface, pairing, frozen(z, np.float64))
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
+        for name, surface in (("slave_segment", interface.slave), ("master_segment", interface.master)):
+            numbers = getattr(points, name)
+            if numbers.size and not -1 <= numbers.min() <= numbers.max() < len(surface):
+                outlier = numbers.min() if numbers.min() < -1 else numbers.max()
+                raise ContractError(f"contact_points: {name} {outlier}; needed −1 to {len(surface) - 1}")
         return points
 
 
 def _asked(verb: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """What the plugin answers; whatever it raises becomes a PluginError that says where."""
     try:
-        return function(*arguments, **options)
-    except (Exception, SystemExit) as error:
+        with np.errstate():  # what the plugin does to numpy's ways with errors ends here
+            return function(*arguments, **options)
+    except (KeyboardInterrupt, ContractError):
+        raise
+    except BaseException as error:
         raise PluginError(f"{verb}: {type(error).__name__}: {error}") from error
 
 

@@ -150,7 +150,7 @@ def test_a_wrong_tangent_is_found_out(ask: Ask, tmp_path: Path) -> None:
     for text, property_id in ((wrong, "tangent.directional"), (fixed_step, "scaling")):
         assert text != source
         install(tmp_path / "site", text)
-        answer = ask("contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", QUICK)
+        answer = ask("contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "40")
         assert answer.returncode == 1
         assert rows(answer.stdout) == [(property_id, "passes", "fail")]
         assert "PROMISED, AND FAILS" in answer.stdout

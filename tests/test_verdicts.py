@@ -256,3 +256,35 @@ def test_a_cut_that_begins_exactly_here_is_a_kink_and_no_broken_pairing() -> Non
     nudged = z.ravel() + 1e-9 * np.array([1, 0] + 6 * [0])
     assert formulation.pair(interface, nudged) != formulation.pair(interface, z.ravel() - (nudged - z.ravel()))
     assert judge_case(question, case, balanced).verdict is Verdict.PASS
+
+
+def test_a_formulation_that_does_nothing_is_not_judged() -> None:
+    class Nothing:
+        traits = Traits(
+            passes_flat_patch=False,
+            conserves_force=True,
+            conserves_moment=True,
+            tangent="exact",
+            penalty="nodal",
+            witnesses={"patch.flat.transmission": "a1"},
+        )
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 0 * z
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.zeros((z.size, z.size))
+
+    found = run([Subject("nothing", lambda *, penalty: Nothing())], load_properties(), profile="ci", examples=20)
+    assert not found.passed
+    judged = {row.question.id: row.verdict for row in found.rows}
+    assert judged.pop("patch.flat.transmission") is Verdict.FAIL
+    assert judged.pop("patch.flat.resultant") is Verdict.NOT_APPLICABLE
+    assert set(judged.values()) == {Verdict.NOT_JUDGED}
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_node_lost_at_a_free_end_by_roundoff_is_undecided(seed: int) -> None:
+    without_tau = load_formulation("nts-ar:tau=0")
+    found = run([without_tau], load_properties(["patch.flat.resultant"]), examples=300, seed=seed)
+    assert found.rows[0].verdict is Verdict.PASS, found.rows[0].reason

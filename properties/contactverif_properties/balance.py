@@ -26,7 +26,7 @@ def force_defect(case: Case, subject: Subject) -> Measurement:
     forces = _forces(case, subject)
     defect = roundoff.share(float(np.linalg.norm(forces.sum(axis=0))), roundoff.slave_forces(case, forces))
     tolerance = roundoff.of_gap(case, roundoff.mean_penetration(case, forces))
-    return Measurement({FORCE_DEFECT.name: defect}, {FORCE_DEFECT.name: tolerance})
+    return Measurement({FORCE_DEFECT.name: defect}, {FORCE_DEFECT.name: tolerance}, idle=not forces.any())
 
 
 def moment_defect(case: Case, subject: Subject) -> Measurement:
@@ -36,7 +36,7 @@ def moment_defect(case: Case, subject: Subject) -> Measurement:
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
     defect = roundoff.share(moment, case.diameter * roundoff.slave_forces(case, forces))
     tolerance = roundoff.of_gap(case, roundoff.mean_penetration(case, forces))
-    return Measurement({MOMENT_DEFECT.name: defect}, {MOMENT_DEFECT.name: tolerance})
+    return Measurement({MOMENT_DEFECT.name: defect}, {MOMENT_DEFECT.name: tolerance}, idle=not forces.any())
 
 
 FORCE = Property(

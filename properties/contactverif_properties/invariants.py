@@ -51,7 +51,7 @@ def turned(case: Case, subject: Subject) -> Measurement:
     }
     rounding = 64 * UNIT_ROUNDOFF * largest  # a turn and a shift round each coordinate a few times
     undecided = excuse(case, formulation, pairing, rounding, failing) if failing else ""
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided)
+    return Measurement(values, dict.fromkeys(values, tolerance), undecided, idle=not forces.any())
 
 
 def scaled(case: Case, subject: Subject) -> Measurement:
@@ -80,7 +80,7 @@ def scaled(case: Case, subject: Subject) -> Measurement:
     }
     rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate
     undecided = excuse(case, formulation, pairing, rounding, failing) if failing else ""
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided)
+    return Measurement(values, dict.fromkeys(values, tolerance), undecided, idle=not forces.any())
 
 
 def _turned_tolerance(case: Case, forces: Array, largest: float) -> float:

@@ -64,6 +64,7 @@ def pure(case: Case, subject: Subject) -> Measurement:
             BATCHED.name: roundoff.of_gap(case, roundoff.mean_penetration(case, first)),
         },
         broken="; ".join(broken),
+        idle=not (first.any() or alone.any()),
     )
 
 

@@ -7,7 +7,7 @@ central difference alone has an error of its own.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def directional(case: Case, subject: Subject) -> Measurement:
     pairing = formulation.pair(case.interface, case.z)
     directions = random_directions(case)
     derivative = (formulation.tangent(case.interface, pairing, case.z) @ directions.T).T  # (n_directions, n_unknowns)
-    undecided = _why_undecided(case, formulation, pairing, directions[0])
+    undecided, broken = _why_undecided(case, formulation, pairing, directions[0])
 
     def look(length: float) -> tuple[Measurement, float]:
         values, bending = differences(formulation, case, pairing, directions, derivative, length)
@@ -75,7 +75,8 @@ def directional(case: Case, subject: Subject) -> Measurement:
         }
         if subject.traits.takes_complex:
             values[COMPLEX.name] = complex_step(formulation, case, pairing, directions, derivative)
-        return Measurement(values, tolerances, undecided, details={"length": length}), bending
+        measured = Measurement(values, tolerances, undecided, broken, {"length": length}, idle=bending == np.inf)
+        return measured, bending
 
     first, bending = look(shortest)
     if bending >= shortest / 2 or judge(DIRECTIONAL, first)[0] is not Verdict.FAIL:
@@ -132,18 +133,24 @@ def differences(
     return values, float(np.sqrt(size / third)) if third > 0 else np.inf
 
 
-def _why_undecided(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> str:
-    """Empty, or why the frozen pairing may not be that of the states around. A restless pairing is no excuse."""
+def _why_undecided(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> tuple[str, str]:
+    """Whether the frozen pairing is that of the states around: (why undecided, what is broken), empty if it is.
+
+    A pairing that is another at every place, however near, holds numbers and not decisions, and on such a one no
+    difference shows what is missing. One that changes its mind here and there, as ties by roundoff do, is no breach.
+    """
     shortest = case.shortest_segment
     step = CENTRAL_STEPS[-1] * shortest * (UNIT_ROUNDOFF * case.largest_coordinate / shortest) ** (1 / 3)
     if pairing is not None and _same_around(formulation, case, pairing, step * direction):
-        return ""
+        return "", ""
     undecided = kink_within(case, formulation, pairing, 4 * step, direction)
     if undecided or pairing is None:
-        return undecided
+        return undecided, ""
     if all(_steady(formulation, case, way * 2.0**-10 * step * direction) for way in (1, -1)):
-        return "a kink: the pairing changes here, and is steady on either side"
-    return ""
+        return "a kink: the pairing changes here, and is steady on either side", ""
+    if all(_restless(formulation, case, scale * step * direction) for scale in (1, 2.0**-5, 2.0**-10)):
+        return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
+    return "", ""
 
 
 def random_directions(case: Case) -> FloatArray:
@@ -192,6 +199,12 @@ def _steady(formulation: Guarded, case: Case, shift: FloatArray) -> bool:
     """Whether the pairing stays the same from one small shift to the next, as it does beside a kink."""
     beside = [formulation.pair(case.interface, case.z + times * shift) for times in (1, 2, 3)]
     return beside[0] == beside[1] == beside[2]
+
+
+def _restless(formulation: Guarded, case: Case, shift: FloatArray) -> bool:
+    """Whether no two of some neighbouring states, on either side, have the same pairing."""
+    found = [formulation.pair(case.interface, case.z + times * shift) for times in range(-2, 4)]
+    return all(one != other for one, other in combinations(found, 2))
 
 
 DIRECTIONAL = Property(

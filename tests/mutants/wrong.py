@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from mutate import Mutant, Wrapped, changed_line
 
+import contactverif_nts
 from contactverif import Pairing
 
 PATCH, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
@@ -57,6 +59,45 @@ def _writes_on_its_input(penalty: float) -> Any:
         return answer(interface, pairing, z)
 
     return Wrapped(penalty, residual=residual)
+
+
+def _numbers_in_the_pairing(penalty: float) -> Any:
+    """ξ and the area as bits of a double: frozen with the pairing, so that no difference shows a forgotten Δξ."""
+    inner = contactverif_nts.vts_me(penalty=penalty)
+
+    def bits(values: Any) -> Any:
+        return np.unpackbits(np.ascontiguousarray(values, float).view(np.uint8)).astype(bool)
+
+    class Encoded:
+        traits = replace(inner.traits, takes_complex=False, batched=False)
+
+        def pair(self, interface: Any, z: Any) -> Any:
+            pairing = inner.pair(interface, z)
+            points = inner.contact_points(interface, pairing, z)
+            return {**pairing, "xi": bits(points.xi), "area": bits(points.weight)}
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            x, forces = z.reshape(-1, 2), np.zeros_like(z).reshape(-1, 2)
+            xi, area = (np.packbits(pairing[name]).view(float) for name in ("xi", "area"))
+            for point in np.flatnonzero(pairing["active"]):
+                a, b = interface.slave.segments[pairing["segment"][point]]
+                one, two = interface.master.segments[pairing["master"][point]]
+                c = inner.c[pairing["slot"][point]]
+                t = (x[two] - x[one]) / np.linalg.norm(x[two] - x[one])
+                normal = np.array([t[1], -t[0]])
+                v = (1 - c) / 2 * x[a] + (1 + c) / 2 * x[b]
+                force = penalty * ((v - x[one]) @ normal) * area[point] * normal
+                shares = ((a, (1 - c) / 2), (b, (1 + c) / 2), (one, xi[point] - 1), (two, -xi[point]))
+                for node, share in shares:
+                    forces[node] += share * force
+            return forces.reshape(-1)
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            columns = [self.residual(interface, pairing, z + 2e-6 * d) for d in np.eye(z.size)]
+            others = [self.residual(interface, pairing, z - 2e-6 * d) for d in np.eye(z.size)]
+            return (np.column_stack(columns) - np.column_stack(others)) / 4e-6
+
+    return Encoded()
 
 
 def _single_precision(penalty: float) -> Any:
@@ -188,6 +229,7 @@ MUTANTS = (
          nth=0, factory="vts_ppt", free_end="extend"),
     line("a batch of one state many times", PURITY, "box3",
          "now, r = x[state], forces[state]", "now, r = x[0], forces[state]"),
+    Mutant("numbers encoded in the pairing", TANGENT, lambda *, penalty: _numbers_in_the_pairing(penalty)),
     Mutant("pairing kept from the first call", PURITY, lambda *, penalty: _remembers(penalty)),
     Mutant("pairing that changes at every call", PURITY, lambda *, penalty: _restless(penalty)),
     Mutant("tangent that leaves a trace", PURITY, lambda *, penalty: _tangent_leaves_a_trace(penalty)),
