@@ -124,7 +124,7 @@ class Traits:
 
     Raises
     ------
-    MisuseError : for a word that is none of these, such as a misspelt promise.
+    ContractError : for a word that is none of these, such as a misspelt promise.
     """
 
     passes_flat_patch: bool | None = None
@@ -145,9 +145,12 @@ class Traits:
     def __post_init__(self) -> None:
         for name, words in _WORDS.items():
             if getattr(self, name) not in words:
-                raise MisuseError(f"Traits.{name}", repr(getattr(self, name)), f"one of {', '.join(map(repr, words))}")
+                found, needed = repr(getattr(self, name)), ", ".join(map(repr, words))
+                raise ContractError(f"Traits.{name}: found {found}; needed one of {needed}")
         if not isinstance(self.witnesses, Mapping):
-            raise MisuseError("Traits.witnesses", repr(self.witnesses), "{property id: name of a case}")
+            raise ContractError(
+                f"Traits.witnesses: found a {type(self.witnesses).__name__}; needed {{property id: name of a case}}"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,9 @@ import pytest
 
 from contactverif import registry
 from contactverif.errors import MisuseError
+from contactverif.formulation import Traits
 from contactverif.property import Property
-from contactverif.registry import load_formulation, load_formulations, load_properties
+from contactverif.registry import load_formulation, load_formulations, load_properties, subject_of
 from contactverif.result import NotLoaded
 from contactverif.subject import Subject
 
@@ -281,3 +282,19 @@ def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     found = load_formulation("misspelt")
     assert isinstance(found, NotLoaded)
     assert "AttributeError" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("traits", "said"),
+    [
+        ({"tangent": "exactly"}, "Traits.tangent: found 'exactly'; needed one of 'exact', 'approximate', None"),
+        ({"witnesses": ["a1"]}, "Traits.witnesses: found a list; needed {property id: name of a case}"),
+    ],
+)
+def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], said: str) -> None:
+    def make(*, penalty: float) -> Any:
+        return Traits(**traits)
+
+    found = subject_of("misspelt", make)
+    assert isinstance(found, NotLoaded)
+    assert found.reason == said
