@@ -6,7 +6,7 @@ import secrets
 from dataclasses import dataclass, replace
 
 from contactverif.errors import MisuseError
-from contactverif.registry import unknown
+from contactverif.names import unknown
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,14 @@ from __future__ import annotations
 import difflib
 import inspect
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
 from contactverif.errors import ContractError, MisuseError
+from contactverif.names import parsed, unknown
 from contactverif.property import Property
 from contactverif.result import NotLoaded
 from contactverif.subject import Subject
@@ -24,6 +25,7 @@ from contactverif.subject import Subject
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
 
+_FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _RESERVED = ("penalty", "inner")  # given by the harness, never as options
 
 
@@ -83,15 +85,6 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     return tuple(_property(name) for name in chosen)
 
 
-def unknown(argument: str, name: str, names: Iterable[str]) -> MisuseError:
-    """The error for a name that is none of the names: it suggests the nearest, or lists all if none is near."""
-    every = sorted(names)
-    near = difflib.get_close_matches(name, every, n=3)
-    if near:
-        return MisuseError(argument, repr(name), f"a name that exists; the nearest: {', '.join(near)}")
-    return MisuseError(argument, repr(name), f"one of {', '.join(every)}" if every else "a name, but there is none")
-
-
 def _installed(group: str) -> dict[str, list[EntryPoint]]:
     """Entry points by name, sorted; more than one under a name where two of them disagree."""
     found: dict[str, list[EntryPoint]] = {}
@@ -136,7 +129,7 @@ def _by_its_name(name: str) -> Subject | NotLoaded:
 def _factory(text: str) -> Callable[..., Any] | NotLoaded:
     """`make(*, penalty)` for the text, options and inner formulation filled in."""
     outer, slash, inner_text = text.partition("/")
-    name, options = _parsed(outer)
+    name, options = parsed("formulation", outer, _FORM)
     installed = _installed(FORMULATIONS)
     if name not in installed:
         raise unknown("formulation", name, installed)
@@ -168,34 +161,6 @@ def _parameters(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
         return inspect.signature(make).parameters
     except (TypeError, ValueError):  # written in C: it has to say itself what it does not like
         return {}
-
-
-def _parsed(text: str) -> tuple[str, dict[str, Any]]:
-    """Name and options of `name:option=value,option=value`."""
-    name, colon, rest = text.partition(":")
-    form = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
-    if not name:
-        raise MisuseError("formulation", repr(text), form)
-    options: dict[str, Any] = {}
-    for part in rest.split(",") if colon else ():
-        option, equals, value = part.partition("=")
-        if not (option and equals and value):
-            raise MisuseError("formulation", f"{part!r} in {text!r}", form)
-        if option in options:
-            raise MisuseError("formulation", f"{option} twice in {text!r}", "each option once")
-        options[option] = _value(value)
-    return name, options
-
-
-def _value(text: str) -> bool | int | float | str:
-    if text in ("true", "false"):
-        return text == "true"
-    for number in (int, float):
-        try:
-            return number(text)
-        except ValueError:
-            pass
-    return text
 
 
 def _check_options(

@@ -16,10 +16,10 @@ from contactverif.case import Case
 from contactverif.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.generate import SHRINK_CALLS, Drawn, draw_cases, shrink
 from contactverif.interface import Interface
+from contactverif.names import unknown
 from contactverif.profile import PROFILES, Profile, profile_named
 from contactverif.property import Outcome, Property, Verdict, excess, judge
 from contactverif.provenance import provenance
-from contactverif.registry import unknown
 from contactverif.result import JUDGED_SHARE, NotLoaded, Row, Run
 from contactverif.strategies import named_case
 from contactverif.subject import OPTIONAL_PARTS, Subject

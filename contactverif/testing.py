@@ -20,10 +20,11 @@ from typing import Any, TypeVar
 import pytest
 
 from contactverif.errors import MisuseError
+from contactverif.names import unknown
 from contactverif.profile import Profile, profile_named
 from contactverif.property import Outcome, Property, Verdict
 from contactverif.pytest_plugin import MARK
-from contactverif.registry import load_formulation, load_properties, subject_of, unknown
+from contactverif.registry import load_formulation, load_properties, subject_of
 from contactverif.result import NotLoaded, Row
 from contactverif.runner import run
 from contactverif.subject import Subject

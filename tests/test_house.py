@@ -42,10 +42,11 @@ class Room:
 
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
-INSIDE = ("contracts", "compiled", "projection", "mesh", "strategies", "oracle", "run", "reports")
+BODIES = ("bulk", "scene", "newton")
+INSIDE = ("contracts", "compiled", "projection", "mesh", *BODIES, "strategies", "oracle", "run", "reports")
 ROOMS = {
     "contracts": Room(
-        ("", "arrays", "errors", "interface", "formulation", "case", "property", "subject", "result"),
+        ("", "arrays", "errors", "names", "interface", "formulation", "case", "property", "subject", "result", "body"),
         ("contracts",),
         ("numpy", "scipy.sparse"),
         QUIET,
@@ -53,14 +54,19 @@ ROOMS = {
     "compiled": Room(("compiled",), (), ("numba",), QUIET),
     "projection": Room(("projection",), ("contracts", "compiled"), ("numpy", "numba"), QUIET),
     "mesh": Room(("mesh",), ("contracts",), ("numpy", "meshio")),
-    "strategies": Room(("strategies",), ("contracts", "strategies", "oracle"), ("numpy", "hypothesis"), QUIET),
+    "bulk": Room(("bulk",), ("contracts",), ("numpy", "scipy", "skfem"), QUIET),
+    "scene": Room(("scene", "blocks", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET),
+    "newton": Room(("newton",), ("contracts", "scene"), ("numpy", "scipy"), QUIET),
+    "strategies": Room(("strategies",), ("contracts", "scene", "strategies", "oracle"), ("numpy", "hypothesis"), QUIET),
     "oracle": Room(("oracle",), ("contracts", "oracle"), ("numpy",), QUIET),
     "plugins": Room((), ("contracts", "compiled", "projection"), ("numpy", "scipy", "numba"), QUIET),
-    "properties": Room((), ("contracts", "oracle", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET),
+    "properties": Room(
+        (), ("contracts", "oracle", "scene", "newton", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
+    ),
     "reports": Room((), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib")),
     "run": Room(
         ("registry", "runner", "generate", "profile", "provenance"),
-        ("contracts", "strategies", "run"),
+        ("contracts", "scene", "strategies", "run"),
         ("numpy", "hypothesis"),
     ),
     "front": Room(  # knows everything, but no formulation and no property by name; imported by nobody
