@@ -1,7 +1,7 @@
 """An elastic body as data: mesh, material, supports, loads, and the part of its boundary that may touch something.
 
-What is wrong with a body is said here, once; what a body does under load is in `bulk`. Vectors of supports and loads are
-in the body's own axes, so that a roller on an inclined side is a fixed component like any other.
+What is wrong with a body is said here, once; what a body does under load is in `bulk`. Vectors of supports and loads
+are in the body's own axes, so that a roller on an inclined side is a fixed component like any other.
 """
 
 from __future__ import annotations

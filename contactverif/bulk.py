@@ -1,8 +1,8 @@
 """What an elastic body does under load: stiffness, condensation onto its contact boundary, and recovery of the inside.
 
-scikit-fem gives meshes, shape functions, mappings and quadrature; the form of linear elasticity is contracted here in one
-go over all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene. The
-stiffness knows nothing of any contact formulation: its nodal forces judge them all.
+scikit-fem gives meshes, shape functions, mappings and quadrature; the form of linear elasticity is contracted here in
+one go over all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene.
+The stiffness knows nothing of any contact formulation: its nodal forces judge them all.
 """
 
 from __future__ import annotations
@@ -77,10 +77,10 @@ def stiffness(body: Body) -> tuple[sparse.csr_array, FloatArray]:
     """K (2 n_nodes, 2 n_nodes) in the body's axes, and the gradients of shape functions at the Gauss points."""
     gradients, areas = _shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
     n_cells, n_points, n_corners, _ = gradients.shape
-    strains = np.zeros((n_cells, n_points, 3, n_corners, 2))  # of unit displacements
-    strains[:, :, 0, :, 0] = strains[:, :, 2, :, 1] = gradients[..., 0]
-    strains[:, :, 1, :, 1] = strains[:, :, 2, :, 0] = gradients[..., 1]
-    strains = strains.reshape(n_cells, n_points, 3, 2 * n_corners)
+    unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # strains of unit displacements
+    unit[:, :, 0, :, 0] = unit[:, :, 2, :, 1] = gradients[..., 0]
+    unit[:, :, 1, :, 1] = unit[:, :, 2, :, 0] = gradients[..., 1]
+    strains = unit.reshape(n_cells, n_points, 3, 2 * n_corners)
     blocks = np.matmul(strains.swapaxes(2, 3), elasticity(body) @ strains * areas[..., None, None]).sum(axis=1)
     unknowns = (2 * body.cells[:, :, None] + np.arange(2)).reshape(n_cells, -1)
     rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
@@ -137,7 +137,7 @@ def _solved(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
         return right
     try:
         if sparse.issparse(matrix):
-            answer = splu(matrix.tocsc()).solve(right)
+            answer: FloatArray = splu(matrix.tocsc()).solve(right)
         else:
             answer = linalg.solve(matrix, right, assume_a="pos", check_finite=False)
     except (linalg.LinAlgError, linalg.LinAlgWarning, RuntimeError):
@@ -153,7 +153,8 @@ def _loose(body: Body) -> MisuseError:
 
 
 def _dense(matrix: Any) -> FloatArray:
-    return matrix.toarray() if sparse.issparse(matrix) else matrix
+    array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else matrix
+    return array
 
 
 def loose_modes(body: Body) -> list[str]:
@@ -213,9 +214,10 @@ def body_from_mesh(
         components = {"along": [0], "across": [1], "both": [0, 1]}.get(which)
         if components is None:
             raise MisuseError(f"supports[{tag!r}]", repr(which), "'along', 'across' or 'both'")
-        held = np.ix_(np.unique(edges[tag]), components)
-        fixed[held] = True
-        imposed[held] = np.asarray((moved or {}).get(tag, (0.0, 0.0)))[components]
+        held = np.unique(edges[tag])
+        for component in components:
+            fixed[held, component] = True
+            imposed[held, component] = (moved or {}).get(tag, (0.0, 0.0))[component]
     load = np.zeros(points.shape)
     for tag, pressure in (pressures or {}).items():
         first, second = edges[tag].T

@@ -1,8 +1,8 @@
 """The scenes that have a name: those of the reference paper. Data, with their source and with what we had to choose.
 
-Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1. Lengths along the interface are the paper's where it prints
-them (B, C; A1 as in `formulations`). The paper prints no heights, materials, lateral supports or dimensions of A2 and of
-Examples 1 and 1bis: those are chosen, and `chosen` says so.
+Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1. Lengths along the interface are the paper's where it
+prints them (A1, B, C). It prints no heights, materials, lateral supports or dimensions of A2 and of Examples 1 and
+1bis: those are chosen, and `chosen` says so.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def made(
     pressure : on top; the scene's own by default.
     degrees : by which all of it is turned, counter-clockwise.
     sides : on rollers, or free to strain, so that the contact area changes.
-    lowered : how deep the slave is pushed in the first guess of a solution, 0 to begin where they touch; p/ε̂ by default.
+    lowered : how deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default.
 
     Raises
     ------

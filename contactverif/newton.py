@@ -26,6 +26,8 @@ ROUNDINGS = 4.0  # of a residual: how many units of roundoff of its largest term
 STALLED = 4  # iterations without a smaller residual
 GONE = 1e8  # times the largest residual so far, or the size of the interface: it will not come back
 
+PARTS = ("pair", "residual", "tangent", "solve")  # of the time
+
 
 class End(IntEnum):
     """How a solution ended. The numbers are those of a report."""
@@ -117,9 +119,7 @@ class System:
     scene: Scene
     formulation: Guarded
     factor: float = 1.0
-    seconds: dict[str, float] = field(
-        default_factory=lambda: dict.fromkeys(("pair", "residual", "tangent", "solve"), 0.0)
-    )
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(PARTS, 0.0))
 
     def pair(self, q: FloatArray) -> Pairing | None:
         """Who touches whom at q."""
@@ -266,12 +266,14 @@ class _Record:
         self.conditions.append(np.nan)
 
     def trace(self, scene: Scene, end: End, seconds: dict[str, float]) -> Trace:
-        floats = (self.factors, self.residuals, self.energies, self.floors)
         return Trace(
-            scene,
-            end,
-            frozen(np.array(self.q), np.float64),
-            *(frozen(values, np.float64) for values in floats),
+            scene=scene,
+            end=end,
+            q=frozen(np.array(self.q), np.float64),
+            factors=frozen(self.factors, np.float64),
+            residuals=frozen(self.residuals, np.float64),
+            energies=frozen(self.energies, np.float64),
+            floors=frozen(self.floors, np.float64),
             changes=frozen(self.changes, np.int64),
             conditions=frozen(self.conditions, np.float64),
             seconds=seconds,

@@ -1,7 +1,8 @@
 """A scene: elastic bodies around an interface, as little of them as can matter, and how a `Case` keeps it.
 
-Bodies are condensed onto their contact boundaries, so that what remains are the free components q of the nodes there. A
-body that no other can reach is no part of the interface and none of q: nothing of it is visited while contact is solved.
+Bodies are condensed onto their contact boundaries, so that what remains are the free components q of the nodes there.
+A body that no other can reach is no part of the interface and none of q: nothing of it is visited while contact is
+solved.
 """
 
 from __future__ import annotations
