@@ -68,23 +68,28 @@ class Body:
         for name in ("cells", "contact"):
             numbers = getattr(self, name)
             if numbers.size and not 0 <= numbers.min() <= numbers.max() < n_nodes:
-                self._refuse(name, f"node number {numbers.max()}", f"numbers from 0 to {n_nodes - 1}")
+                outlier = numbers.min() if numbers.min() < 0 else numbers.max()
+                self._refuse(name, f"node number {outlier}", f"numbers from 0 to {n_nodes - 1}")
         if not len(self.contact):
             self._refuse("contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)")
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
+        for name, low, high, needed in (
+            ("young", 0.0, np.inf, "Young's modulus > 0"),
+            ("poisson", -1.0, 0.5, _POISSON),
+        ):
+            number = np.asarray(getattr(self, name))
+            if number.shape != () or number.dtype.kind not in "fiu" or not (self.rigid or low < number < high):
+                self._refuse(name, f"{getattr(self, name)!r}", needed)
+            object.__setattr__(self, name, float(number))
         if self.rigid:
             if not self.fixed.all():
                 self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
-            return
-        for name, number, fits, needed in (
-            ("young", self.young, 0 < self.young < np.inf, "Young's modulus > 0"),
-            ("poisson", self.poisson, -1 < self.poisson < 0.5, _POISSON),
-        ):
-            if not fits:
-                self._refuse(name, f"{number!r}", needed)
-        self._check_cells()
-        self._check_contact()
+        else:
+            self._check_cells()
+            self._check_contact()
+        if any(len(set(ends)) < len(ends) for ends in self.contact.T.tolist()):
+            self._refuse("contact", "two edges that begin or end at one node", "each edge once, in chains")
 
     @property
     def rigid(self) -> bool:
@@ -107,7 +112,7 @@ class Body:
         return self.young * (1 - self.poisson) / ((1 + self.poisson) * (1 - 2 * self.poisson))
 
     def _corners(self) -> int:
-        shape = np.shape(self.cells)
+        shape = _array(f"{self.name}: cells", self.cells).shape
         return shape[1] if len(shape) == 2 and shape[1] in _CORNERS else 4
 
     def _settle(self, name: str, dtype: Any, shape: tuple[int, ...], default: Any = None) -> None:
@@ -117,9 +122,8 @@ class Body:
             raw = np.full(shape, default)
         if name == "cells" and raw.size == 0:
             raw = np.zeros((0, self._corners()), np.int64)
-        fits = raw.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, raw.shape, strict=True))
-        if not fits:
-            self._refuse(name, f"shape {raw.shape}", f"({', '.join('n' if k < 0 else str(k) for k in shape)})")
+        if not _fits(raw, shape):
+            self._refuse(name, f"shape {raw.shape}", _words(shape))
         kinds = {np.float64: "fiu", np.int64: "iu", np.bool_: "b"}[dtype]
         if raw.dtype.kind not in kinds:
             self._refuse(name, f"dtype {raw.dtype}", f"{np.dtype(dtype).name}")
@@ -143,6 +147,9 @@ class Body:
         n_nodes = len(self.nodes)
         following = np.roll(self.cells, -1, axis=1)
         edges = self.cells * n_nodes + following  # each edge as one number, the cell on its left
+        ordered = np.sort(edges, axis=None)
+        if (ordered[1:] == ordered[:-1]).any():
+            self._refuse("cells", "two cells on the same side of an edge", "cells that do not overlap")
         inside = np.isin(edges, following * n_nodes + self.cells)
         outer = edges[~inside]
         wrong = np.flatnonzero(~np.isin(self.contact[:, 0] * n_nodes + self.contact[:, 1], outer))
@@ -194,9 +201,10 @@ def block(
     ------
     MisuseError : as `Body` does, and for grid lines that do not ascend.
     """
-    x, y = (np.asarray(values, dtype=np.float64) for values in (x, y))
+    x, y = _floats(f"{name}: x", x, (-1,)), _floats(f"{name}: y", y, (-1,))
+    axis, shift = _floats(f"{name}: axis", axis, (2,)), _floats(f"{name}: shift", shift, (2,))
     for word, values in (("x", x), ("y", y)):
-        if values.ndim != 1 or len(values) < 2 or not (np.diff(values) > 0).all():
+        if len(values) < 2 or not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
             raise MisuseError(f"{name}: {word}", f"{values.tolist()}", "at least two ascending coordinates")
     if contact not in ("bottom", "top"):
         raise MisuseError(f"{name}: contact", repr(contact), "'bottom' or 'top'")
@@ -227,7 +235,7 @@ def block(
         fixed=fixed,
         imposed=imposed,
         load=load,
-        axis=np.asarray(axis, dtype=np.float64),
+        axis=axis,
         start=np.array([0.0, down * lowered * scale]),
         name=name,
     )
@@ -237,14 +245,14 @@ def rigid(
     points: ArrayLike, *, axis: ArrayLike = (1.0, 0.0), moved: ArrayLike = (0.0, 0.0), name: str = "rigid"
 ) -> Body:
     """A rigid surface through the points (n, 2) in walking order, the body on the left; `moved` is imposed on it."""
-    nodes = np.asarray(points, dtype=np.float64)
+    nodes = _floats(f"{name}: points", points, (-1, 2))
     numbers = np.arange(len(nodes))
     return Body(
         nodes=nodes,
         cells=np.zeros((0, 4), np.int64),
         contact=np.column_stack([numbers[:-1], numbers[1:]]),
         fixed=np.ones(nodes.shape, bool),
-        imposed=np.broadcast_to(np.asarray(moved, dtype=np.float64), nodes.shape),
+        imposed=np.broadcast_to(_floats(f"{name}: moved", moved, (2,)), nodes.shape),
         axis=np.asarray(axis, dtype=np.float64),
         name=name,
     )
@@ -268,6 +276,24 @@ def _lengths(x: FloatArray, low: float, high: float) -> FloatArray:
     weights[1:] += towards_second
     weights[:-1] += part - towards_second
     return weights
+
+
+def _fits(array: NDArray[Any], shape: tuple[int, ...]) -> bool:
+    return array.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, array.shape, strict=True))
+
+
+def _words(shape: tuple[int, ...]) -> str:
+    lengths = ["n" if length < 0 else str(length) for length in shape]
+    return f"shape ({lengths[0]},)" if len(shape) == 1 else f"shape ({', '.join(lengths)})"
+
+
+def _floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    raw = _array(argument, values)
+    if raw.dtype.kind not in "fiu":
+        raise MisuseError(argument, f"dtype {raw.dtype}", "numbers")
+    if not _fits(raw, shape):
+        raise MisuseError(argument, f"shape {raw.shape}", _words(shape))
+    return raw.astype(np.float64)
 
 
 def _array(argument: str, values: ArrayLike) -> NDArray[Any]:

@@ -14,7 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 import skfem
-from scipy import linalg, sparse
+from scipy import sparse
+from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from contactverif.arrays import FloatArray, IntArray
@@ -23,6 +24,7 @@ from contactverif.errors import MisuseError
 
 KEPT = 512  # condensed bodies, so that penalties and formulations of one run share them
 DENSE = 600  # unknowns up to which a matrix without structure is as quick to factorise
+_LEFT = 2.0**-40  # of a diagonal entry after elimination: less than 1e2 u of a loose part, 1e6 u of a long thin bar
 _MODES = ("move along its first axis", "move along its second axis", "turn")
 
 
@@ -100,6 +102,13 @@ def _shapes(body: Body) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(gradients.transpose(2, 3, 0, 1)), np.asarray(basis.dx)
 
 
+def free_on_contact(body: Body) -> IntArray:
+    """Free components (n,) on the contact boundary, 2 × node + component in the body's axes, ascending."""
+    on_contact = np.zeros(body.fixed.shape, bool)
+    on_contact[body.contact_nodes] = True
+    return np.flatnonzero((on_contact & ~body.fixed).reshape(-1))
+
+
 @lru_cache(maxsize=KEPT)
 def condense(body: Body) -> Condensed:
     """The body condensed onto the free components of its contact boundary; once for each body.
@@ -108,11 +117,10 @@ def condense(body: Body) -> Condensed:
     ------
     MisuseError : if a part of the body hangs on nothing even while its contact boundary is held.
     """
-    fixed = body.fixed.reshape(-1)
-    on_contact = np.zeros(body.fixed.shape, bool)
-    on_contact[body.contact_nodes] = True
-    unknowns = np.flatnonzero(on_contact.reshape(-1) & ~fixed)
-    interior = np.flatnonzero(~on_contact.reshape(-1) & ~fixed)
+    unknowns = free_on_contact(body)
+    free = ~body.fixed.reshape(-1)
+    free[unknowns] = False
+    interior = np.flatnonzero(free)
     imposed = body.imposed.reshape(-1)
     if body.rigid:
         none = np.zeros((0, 0))
@@ -135,14 +143,20 @@ def _solved(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
     """The interior's answer (n_interior, …) to unit displacements of the unknowns and to loads."""
     if not len(right):
         return right
-    try:
-        if sparse.issparse(matrix):
-            answer: FloatArray = splu(matrix.tocsc()).solve(right)
-        else:
-            answer = linalg.solve(matrix, right, assume_a="pos", check_finite=False)
-    except (linalg.LinAlgError, linalg.LinAlgWarning, RuntimeError):
-        raise _loose(body) from None
-    if not np.isfinite(answer).all():
+    if sparse.issparse(matrix):
+        try:
+            factors = splu(matrix.tocsc())
+        except RuntimeError:  # scipy's word for an exactly singular matrix
+            raise _loose(body) from None
+        left = np.abs(factors.U.diagonal()[factors.perm_c])
+        answer: FloatArray = factors.solve(right)
+    else:
+        factor, info = lapack.dpotrf(matrix, lower=1)
+        if info != 0:
+            raise _loose(body)
+        left = factor.diagonal() ** 2
+        answer, _ = lapack.dpotrs(factor, right, lower=1)
+    if not (left > _LEFT * matrix.diagonal()).all():
         raise _loose(body)
     return answer
 
@@ -203,28 +217,47 @@ def body_from_mesh(
     ------
     MisuseError : if the mesh has no such boundary, or as `Body` does.
     """
-    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
-    if points.shape[1] != 2 or cells.shape[1] not in (3, 4):
+    if getattr(mesh, "elem", None) not in (skfem.ElementTriP1, skfem.ElementQuad1):
         raise MisuseError("mesh", f"a {type(mesh).__name__}", "a MeshTri or a MeshQuad of first order")
+    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
     corners = points[cells]
     cells = np.where((_signed_areas(corners) < 0)[:, None], cells[:, ::-1], cells)
-    edges = {tag: _edges(mesh, cells, tag) for tag in {contact, *supports, *(pressures or {})}}
+    if not isinstance(supports, Mapping):
+        raise MisuseError("supports", f"a {type(supports).__name__}", "{boundary: 'along', 'across' or 'both'}")
+    edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *(pressures or {})])}
     fixed, imposed = np.zeros(points.shape, bool), np.zeros(points.shape)
     for tag, which in supports.items():
         components = {"along": [0], "across": [1], "both": [0, 1]}.get(which)
         if components is None:
             raise MisuseError(f"supports[{tag!r}]", repr(which), "'along', 'across' or 'both'")
-        held = np.unique(edges[tag])
+        held, move = np.unique(edges[tag]), _moved(tag, (moved or {}).get(tag, (0.0, 0.0)), components)
         for component in components:
             fixed[held, component] = True
-            imposed[held, component] = (moved or {}).get(tag, (0.0, 0.0))[component]
+            imposed[held, component] = move[component]
+    if loose := set(moved or {}) - set(supports):
+        raise MisuseError(f"moved[{min(loose)!r}]", "no supports there", "a boundary that supports name")
     load = np.zeros(points.shape)
     for tag, pressure in (pressures or {}).items():
+        if np.ndim(pressure) != 0 or np.asarray(pressure).dtype.kind not in "fiu":
+            raise MisuseError(f"pressures[{tag!r}]", repr(pressure), "a number")
         first, second = edges[tag].T
         along = points[second] - points[first]
         for end in (first, second):
             np.add.at(load, end, pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]]))
     return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
+
+
+def _moved(tag: str, move: Any, components: list[int]) -> FloatArray:
+    """The displacement (2,) of a boundary, 0 where nothing is fixed."""
+    try:
+        displacement = np.array(move, dtype=np.float64)
+    except (TypeError, ValueError):
+        displacement = np.zeros(0)
+    if displacement.shape != (2,):
+        raise MisuseError(f"moved[{tag!r}]", repr(move), "two numbers, along and across")
+    if displacement[[component for component in (0, 1) if component not in components]].any():
+        raise MisuseError(f"moved[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
+    return displacement
 
 
 def _signed_areas(corners: FloatArray) -> FloatArray:
@@ -239,6 +272,8 @@ def _edges(mesh: Any, cells: IntArray, tag: str) -> IntArray:
     if tag not in tags:
         there = f"one of {', '.join(sorted(tags))}" if tags else "a mesh with named boundaries (mesh.with_boundaries)"
         raise MisuseError("mesh", f"no boundary {tag!r}", there)
+    if not len(tags[tag]):
+        raise MisuseError("mesh", f"no edges on boundary {tag!r}", "a boundary that has some")
     wanted = {tuple(sorted(edge)) for edge in np.asarray(mesh.facets).T[np.asarray(tags[tag])].tolist()}
     following = np.roll(cells, -1, axis=1)
     every = np.stack([cells, following], axis=-1).reshape(-1, 2).tolist()

@@ -119,7 +119,9 @@ class Traits:
     dimensions : numbers of coordinates that it can do.
     batched : `residual` takes a batch of states, z (..., n_unknowns).
     takes_complex : `residual` takes complex positions, so that a complex step works.
-    witnesses : {property id: name of a case} for each promise "does not"; the case always runs.
+    witnesses : {property id: name of a case} for each promise "does not"; the case always runs. The beginning of an id
+        stands for all below it: "patch" is the witness of "patch.flat.solve" too. A property that solves bodies takes
+        the scene of that name ("c-prime", or with options "c-prime:penalty=1e4").
     source : where the formulation is published.
 
     Raises
@@ -141,6 +143,14 @@ class Traits:
     takes_complex: bool = False
     witnesses: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
+
+    def witness(self, property_id: str) -> str | None:
+        """The name of the case that shows that the property fails, None where there is none."""
+        parts = property_id.split(".")
+        for n in range(len(parts), 0, -1):
+            if (name := self.witnesses.get(".".join(parts[:n]))) is not None:
+                return name
+        return None
 
     def __post_init__(self) -> None:
         for name, words in _WORDS.items():

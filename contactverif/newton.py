@@ -24,7 +24,8 @@ from contactverif.subject import Guarded
 ITERATIONS = 40
 ROUNDINGS = 4.0  # of a residual: how many units of roundoff of its largest terms count as zero
 STALLED = 4  # iterations without a smaller residual
-GONE = 1e8  # times the largest residual so far, or the size of the interface: it will not come back
+NEARLY = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
+GONE = 1e8  # times the first residual: it will not come back
 
 PARTS = ("pair", "residual", "tangent", "solve")  # of the time
 
@@ -72,7 +73,9 @@ class Trace:
     factors : (n_iterates,) share of loads and imposed displacements, 1 at the last load step.
     residuals : (n_iterates,) largest entry of S q − g + R, a force.
     energies : (n_iterates,) |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
-    floors : (n_iterates,) what roundoff alone makes of the residual.
+    floors : (n_iterates,) what roundoff alone makes of the residual, a force.
+    roundings : (n_iterates,) largest entry of the residual over what roundoff makes of that entry; up to 1 is
+        converged.
     changes : (n_iterates,) entries of the pairing that differ from the iterate before; −1 where there is no pairing
         or none before.
     conditions : (n_iterates,) estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last.
@@ -86,6 +89,7 @@ class Trace:
     residuals: FloatArray
     energies: FloatArray
     floors: FloatArray
+    roundings: FloatArray
     changes: IntArray
     conditions: FloatArray
     seconds: dict[str, float]
@@ -119,6 +123,7 @@ class System:
     scene: Scene
     formulation: Guarded
     factor: float = 1.0
+    own_tangent: bool = True
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(PARTS, 0.0))
 
     def pair(self, q: FloatArray) -> Pairing | None:
@@ -137,26 +142,27 @@ class System:
         self.seconds["residual"] += perf_counter() - start
         return residual
 
-    def matrix(self, q: FloatArray, pairing: Pairing | None) -> tuple[Any, float]:
-        """S + ∂R/∂q (n_free, n_free), and the largest row sum of the contact tangent, per length.
+    def matrix(self, q: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
+        """S + ∂R/∂q (n_free, n_free), and what the roundoff of positions and forces makes of the residual (n_free,).
 
         A formulation without a tangent is differentiated on the frozen pairing.
         """
         start = perf_counter()
         scene, spread = self.scene, self.scene.spread
         z = scene.positions(q, self.factor)
-        if "tangent" in self.formulation.provides:
+        if self.own_tangent and "tangent" in self.formulation.provides:
             tangent = self.formulation.tangent(scene.interface, pairing, z)
         else:
-            tangent = self._differences(pairing, z)
+            tangent = self.differences(pairing, z)
         if isinstance(spread, np.ndarray):
             tangent = tangent.toarray() if sparse.issparse(tangent) else tangent
         else:
             tangent = sparse.csr_array(tangent)
         matrix = scene.stiffness + spread.T @ tangent @ spread
-        rows = float(abs(tangent).sum(axis=1).max(initial=0.0)) if tangent.shape[0] else 0.0
+        bulk = abs(scene.stiffness) @ np.abs(q) + self.factor * np.abs(scene.load)
+        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + abs(spread).T @ (abs(tangent) @ np.abs(z)))
         self.seconds["tangent"] += perf_counter() - start
-        return matrix, rows
+        return matrix, floor
 
     def step(self, matrix: Any, residual: FloatArray) -> tuple[FloatArray | None, float]:
         """The Newton step, None where the matrix has no inverse in floats, and an estimate of 1/cond."""
@@ -168,14 +174,8 @@ class System:
             return None, condition
         return step, condition
 
-    def floor(self, q: FloatArray, rows: float) -> float:
-        """What the roundoff of positions and forces alone makes of the residual, a force."""
-        scene = self.scene
-        positions = np.abs(scene.positions(q, self.factor)).max()
-        bulk = (abs(scene.stiffness) @ np.abs(q)).max(initial=0.0) + np.abs(scene.load).max(initial=0.0)
-        return float(ROUNDINGS * UNIT_ROUNDOFF * (bulk + rows * positions))
-
-    def _differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
+    def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
+        """Derivative (n_unknowns, n_unknowns) of the contact forces at the positions z, by central differences."""
         shortest = min(side.lengths(z.reshape(-1, 2)).min() for side in self._sides())
         h = shortest * (UNIT_ROUNDOFF * np.abs(z).max() / shortest) ** (1 / 3)
         shifts = h * np.eye(z.size)
@@ -195,6 +195,7 @@ def solve(
     start: FloatArray | None = None,
     load_steps: int = 1,
     iterations: int = ITERATIONS,
+    own_tangent: bool = True,
 ) -> Trace:
     """Solve the scene with full Newton steps, in one load step unless more are asked for.
 
@@ -204,6 +205,7 @@ def solve(
     start : (n_free,) first iterate; the scene's own by default.
     load_steps : loads and imposed displacements grow in that many equal steps, each solved from the one before.
     iterations : linear systems solved at most, in each load step.
+    own_tangent : the formulation's, if it has one; else its residual is differentiated on the frozen pairing.
 
     Raises
     ------
@@ -212,7 +214,7 @@ def solve(
     if load_steps < 1 or iterations < 1:
         name, number = ("load_steps", load_steps) if load_steps < 1 else ("iterations", iterations)
         raise MisuseError(name, f"{number}", "at least 1")
-    system, record = System(scene, formulation), _Record()
+    system, record = System(scene, formulation, own_tangent=own_tangent), _Record()
     q = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     end = End.CONVERGED
     for number in range(1, load_steps + 1):
@@ -228,8 +230,8 @@ def _load_step(system: System, record: _Record, q: FloatArray, iterations: int) 
     for iteration in range(iterations + 1):
         pairing = system.pair(q)
         residual = system.residual(q, pairing)
-        matrix, rows = system.matrix(q, pairing)
-        record.add(q, system.factor, residual, system.floor(q, rows), _changed(pairing, before))
+        matrix, floor = system.matrix(q, pairing)
+        record.add(q, system.factor, residual, floor, _changed(pairing, before))
         end = _end(record, first)
         if end is not None:
             return end, q
@@ -253,14 +255,19 @@ class _Record:
     residuals: list[float] = field(default_factory=list)
     energies: list[float] = field(default_factory=list)
     floors: list[float] = field(default_factory=list)
+    roundings: list[float] = field(default_factory=list)
     changes: list[int] = field(default_factory=list)
     conditions: list[float] = field(default_factory=list)
 
-    def add(self, q: FloatArray, factor: float, residual: FloatArray, floor: float, changes: int) -> None:
+    def add(self, q: FloatArray, factor: float, residual: FloatArray, floor: FloatArray, changes: int) -> None:
         self.q.append(q)
         self.factors.append(factor)
         self.residuals.append(float(np.abs(residual).max(initial=0.0)))
-        self.floors.append(floor)
+        self.floors.append(float(floor.max(initial=0.0)))
+        # an entry without any term has no roundoff, and nothing but zero will do
+        self.roundings.append(
+            float(np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor).max(initial=0.0))
+        )
         self.changes.append(changes)
         self.energies.append(np.nan)
         self.conditions.append(np.nan)
@@ -274,6 +281,7 @@ class _Record:
             residuals=frozen(self.residuals, np.float64),
             energies=frozen(self.energies, np.float64),
             floors=frozen(self.floors, np.float64),
+            roundings=frozen(self.roundings, np.float64),
             changes=frozen(self.changes, np.int64),
             conditions=frozen(self.conditions, np.float64),
             seconds=seconds,
@@ -282,17 +290,16 @@ class _Record:
 
 def _end(record: _Record, first: int) -> End | None:
     """What the iterates of a load step, which begin at `first`, say about its end; None to go on."""
-    residuals, floors, q = record.residuals[first:], record.floors[first:], record.q[first:]
-    now = residuals[-1]
-    if now <= floors[-1]:
+    residuals, roundings, q = record.residuals[first:], record.roundings[first:], record.q[first:]
+    if roundings[-1] <= 1:
         return End.CONVERGED
-    if not np.isfinite(now) or now > GONE * max(residuals[0], floors[-1] / UNIT_ROUNDOFF):
+    if not np.isfinite(residuals[-1]) or residuals[-1] > GONE * max(residuals[0], record.floors[first]):
         return End.DIVERGED
     if len(q) > 4:
         back, steps = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)], np.abs(q[-1] - q[-2]).max()
-        if max(back) <= 2.0**-20 * steps and min(residuals[-4:]) > 1e3 * floors[-1]:
+        if max(back) <= 2.0**-20 * steps and min(roundings[-4:]) > NEARLY:
             return End.CYCLE
-    if len(residuals) > STALLED and min(residuals[-STALLED:]) >= min(residuals[:-STALLED]) <= 1e3 * floors[-1]:
+    if len(q) > STALLED and min(roundings[-STALLED:]) >= min(roundings[:-STALLED]) <= NEARLY:
         return End.STAGNATED
     return None
 

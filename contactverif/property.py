@@ -15,7 +15,6 @@ from typing import Any, Literal
 from contactverif.arrays import FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Traits
-from contactverif.interface import Interface
 from contactverif.subject import Subject
 
 
@@ -87,11 +86,12 @@ class Property:
     summary : what is asked, in one line.
     quantities : what is measured.
     cases : makes a hypothesis strategy of `Case`; given an interface, random states on that one, or None where the
-        property cannot be asked of it.
+        property cannot be asked of it. Where the property is one of bodies, it is given the case of a scene instead.
     measure : numbers from a case; raises what the plugin raises.
     needs : parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
     promise : what the traits say: True passes, False does not (with a witness), None nothing.
     applicable : empty, or why the question makes no sense for these traits.
+    bodies : the cases are scenes, solved; else they are states of an interface alone.
     exact : where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for pictures.
     """
 
@@ -99,11 +99,12 @@ class Property:
     family: str
     summary: str
     quantities: tuple[Quantity, ...]
-    cases: Callable[[Interface | None], Any]
+    cases: Callable[[Any], Any]
     measure: Callable[[Case, Subject], Measurement]
     promise: Callable[[Traits], bool | None]
     needs: frozenset[str] = frozenset()
     applicable: Callable[[Traits], str] = lambda traits: ""
+    bodies: bool = False
     exact: Callable[[Case], FloatArray] | None = None
 
 
@@ -166,6 +167,8 @@ def judge(question: Property, measurement: Measurement) -> tuple[Verdict, str]:
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
         return Verdict.FAIL, "; ".join(failures)
+    if measurement.undecided and not measured:  # nothing to judge, and a reason why
+        return Verdict.UNDECIDED, measurement.undecided
     if untold:  # the judge's fault, not the formulation's: neither a pass nor an accusation
         return Verdict.UNDECIDED, untold
     return Verdict.PASS, ""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 from time import perf_counter
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
@@ -21,7 +21,7 @@ from contactverif.profile import PROFILES, Profile, profile_named
 from contactverif.property import Outcome, Property, Verdict, excess, judge
 from contactverif.provenance import provenance
 from contactverif.result import JUDGED_SHARE, NotLoaded, Row, Run
-from contactverif.strategies import named_case
+from contactverif.strategies import named_case, named_scene
 from contactverif.subject import OPTIONAL_PARTS, Subject
 
 __all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
@@ -48,6 +48,7 @@ def run(
     examples: int | None = None,
     seed: int | None = None,
     interface: Interface | None = None,
+    scene: Case | None = None,
     known: Mapping[str, str] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Run:
@@ -58,6 +59,8 @@ def run(
     subjects, properties : as the registry loads them; what did not load is reported and fails the run.
     profile, examples, seed : how much is asked; examples and seed overrule the profile.
     interface : ask everything on this one, with random states, instead of on random interfaces.
+    scene : ask what needs bodies of this one alone, and all else on its interface. That it passes there breaks no
+        promise to fail.
     known : {property id: why its failure is known}.
     progress : called after every case.
 
@@ -77,7 +80,9 @@ def run(
             raise unknown("known failure", property_id, asked)
     settled = (profile_named(profile) if isinstance(profile, str) else profile).settled(examples=examples, seed=seed)
     assert settled.seed is not None
-    plan = _Plan(settled.examples, settled.seed, interface, known, progress or (lambda _: None), {})
+    if scene is not None:
+        interface = scene.interface
+    plan = _Plan(settled.examples, settled.seed, interface, scene, known, progress or (lambda _: None), {})
     return Run(
         rows=tuple(_row(plan, subject, question) for subject in loaded for question in questions),
         not_loaded=not_loaded,
@@ -129,6 +134,7 @@ class _Plan:
     examples: int
     seed: int
     interface: Interface | None
+    scene: Case | None
     known: Mapping[str, str]
     progress: Callable[[Progress], None]
     drawn: dict[str, Drawn]
@@ -136,6 +142,14 @@ class _Plan:
     def key(self, question: Property) -> str:
         """The seed of a property, which does not depend on what else is asked."""
         return f"{self.seed}/{question.id}"
+
+    def strategy(self, question: Property) -> SearchStrategy[Case] | None:
+        """Of its cases; None where it cannot be asked of what is given."""
+        if not question.bodies:
+            return cast("SearchStrategy[Case] | None", question.cases(self.interface))
+        if self.interface is not None and self.scene is None:
+            return None
+        return cast("SearchStrategy[Case] | None", question.cases(self.scene))
 
 
 def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
@@ -150,9 +164,11 @@ def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
         return replace(row, verdict=Verdict.NOT_PROVIDED, reason=f"{', '.join(sorted(missing))}: not provided")
-    strategy = question.cases(plan.interface)
+    strategy = plan.strategy(question)
     if strategy is None:
-        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="cannot be asked of this interface")
+        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="cannot be asked of what is given")
+    if plan.scene is not None and row.promise is False:  # some scene fails, this one need not
+        row = replace(row, promise=None)
     try:
         witness_case = _witness(subject, question) if row.promise is False else None
     except MisuseError as error:
@@ -184,12 +200,12 @@ def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
 
 
 def _witness(subject: Subject, question: Property) -> Case:
-    name = subject.traits.witnesses.get(question.id)
+    name = subject.traits.witness(question.id)
     if name is None:
         raise MisuseError(
             "witnesses", f"none for {question.id}, which {subject.name} says it does not pass", "the name of a case"
         )
-    return named_case(name)
+    return named_scene(name) if question.bodies else named_case(name)
 
 
 def _overall(row: Row) -> tuple[Verdict, str]:

@@ -17,7 +17,7 @@ from scipy import linalg, sparse
 
 from contactverif.arrays import FloatArray, IntArray
 from contactverif.body import Body
-from contactverif.bulk import DENSE, KEPT, Condensed, condense, loose_modes
+from contactverif.bulk import DENSE, KEPT, Condensed, condense, free_on_contact, loose_modes
 from contactverif.case import Case
 from contactverif.errors import MisuseError
 from contactverif.interface import Interface, Surface
@@ -98,9 +98,14 @@ class Scene:
         return Interface(nodes, Surface(np.vstack(segments[True])), Surface(np.vstack(segments[False])))
 
     @cached_property
+    def unknowns(self) -> tuple[IntArray, ...]:
+        """What q is made of: the free components on the contact boundary of each body within reach."""
+        return tuple(free_on_contact(self.bodies[index]) for index in self.reached)
+
+    @cached_property
     def part(self) -> tuple[slice, ...]:
         """Where each body within reach has its unknowns in q."""
-        ends = np.cumsum([0, *(len(body.unknowns) for body in self.condensed)]).tolist()
+        ends = np.cumsum([0, *map(len, self.unknowns)]).tolist()
         return tuple(slice(start, end) for start, end in itertools.pairwise(ends))
 
     @property
@@ -127,14 +132,15 @@ class Scene:
         """(n_unknowns of the interface, n_free): what unit values of q do to the positions."""
         rows, columns, values = [], [], []
         first = 0
-        for body, part in zip(self.condensed, self.part, strict=True):
-            nodes, components = np.divmod(body.unknowns, 2)
-            row = 2 * (first + np.searchsorted(body.body.contact_nodes, nodes))
+        for index, unknowns, part in zip(self.reached, self.unknowns, self.part, strict=True):
+            body = self.bodies[index]
+            nodes, components = np.divmod(unknowns, 2)
+            row = 2 * (first + np.searchsorted(body.contact_nodes, nodes))
             for direction in (0, 1):
                 rows.append(row + direction)
                 columns.append(np.arange(part.start, part.stop))
-                values.append(body.body.frame[direction, components])
-            first += len(body.body.contact_nodes)
+                values.append(body.frame[direction, components])
+            first += len(body.contact_nodes)
         shape = (self.interface.n_unknowns, self.n_free)
         matrix = sparse.csr_array(
             (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
@@ -144,13 +150,15 @@ class Scene:
     @cached_property
     def moved(self) -> FloatArray:
         """(n_unknowns,) what the imposed displacements do to the positions."""
-        parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in map(self._body, self.reached)]
+        bodies = [self.bodies[index] for index in self.reached]
+        parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in bodies]
         return np.vstack(parts).reshape(-1)
 
     @cached_property
     def start(self) -> FloatArray:
         """(n_free,) the first guess of q."""
-        return np.concatenate([body.body.start[body.unknowns % 2] for body in self.condensed])
+        pairs = zip(self.reached, self.unknowns, strict=True)
+        return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Current positions (n_unknowns,), flat, with imposed displacements × factor."""
@@ -180,9 +188,6 @@ class Scene:
         arrays = {_BODIES + name: values for name, values in _packed(self).items()}
         z = self.positions(self.start)
         return Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
-
-    def _body(self, index: int) -> Body:
-        return self.bodies[index]
 
     def _every(self, q: FloatArray, factor: float) -> list[tuple[Condensed, FloatArray]]:
         own = dict(zip(self.reached, (q[part] for part in self.part), strict=True))

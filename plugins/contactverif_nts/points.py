@@ -206,7 +206,7 @@ def _traits(passes: bool, witness: str, penalty: str, area_from: int | None, sym
         penalty=penalty,  # type: ignore[arg-type]
         batched=True,
         takes_complex=True,
-        witnesses={"patch.flat.transmission": witness},
+        witnesses={"patch": witness},
         source=_PAPER,
     )
 

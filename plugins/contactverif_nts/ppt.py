@@ -170,7 +170,7 @@ def vts_ppt_basic(*, penalty: float, n: int = 2, free_end: str = "truncate", tau
 
     Parameters are those of `vts_ppt`.
     """
-    witnesses = {**_PRINTED.witnesses, "tangent.directional": "offset-c"}
+    witnesses = {**_PRINTED.witnesses, "tangent.directional": "offset-c", "newton": "example-1bis"}
     return replace(
         vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau),
         consistent=False,

@@ -1,0 +1,181 @@
+"""Random scenes: two elastic blocks pressed together, for the solved patch test, its variants, and Newton's method.
+
+Lengths are small integers, E and scales powers of two times small integers; all shrink to one cell a block, E = 1,
+ν = 0, no motion. Penalties come as ε̂ h / E, so that "moderate" means the same for every mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import accumulate, takewhile
+from math import ldexp
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.arrays import FloatArray
+from contactverif.blocks import Placing, two_blocks
+from contactverif.case import Case
+from contactverif.catalogue import MODERATE, scene_named
+from contactverif.scene import Scene, has_bodies
+from contactverif.strategies.parts import Motion, lengths, motions, seeds
+
+VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
+INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
+POSITIONS = 200  # of a punch that slides over one master segment
+_LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
+_POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
+_STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
+_MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
+
+
+@cache
+def _widths() -> SearchStrategy[list[float]]:
+    plain = lengths(graded=False)
+    wide = st.lists(st.builds(ldexp, st.integers(1, 7).map(float), st.integers(-5, 3)), min_size=1, max_size=6)
+    return st.one_of(plain, plain, plain, plain, wide)
+
+
+def named_scene(text: str) -> Case:
+    """The scene of the catalogue that the text names, with its options, as a case.
+
+    Raises
+    ------
+    MisuseError : if there is none.
+    """
+    return scene_named(text, "scene").case()
+
+
+def block_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
+    """Two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
+
+    Given a scene, that scene alone; None if its pressure is not known.
+    """
+    return _two_blocks() if given is None else _itself(given, "compliance")
+
+
+def variant_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
+    """The patch test's variants: each case has the parameter "variant", an index into VARIANTS.
+
+    Given a scene, that scene alone; None if its pressure is not known.
+    """
+    return _variants() if given is None else _itself(given, "compliance")
+
+
+def solid_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
+    """A tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink.
+
+    Given a scene, that scene alone.
+    """
+    return _tilted() if given is None else _itself(given)
+
+
+def _itself(given: Case, *facts: str) -> SearchStrategy[Case] | None:
+    fits = has_bodies(given) and all(fact in given.parameters for fact in facts)
+    return st.just(given) if fits else None
+
+
+@st.composite
+def _two_blocks(draw: DrawFn) -> Case:
+    slave, master = draw(_widths()), draw(_widths())
+    layers = draw(_LAYERS), draw(_LAYERS)
+    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
+    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    x = _grid(slave)
+    return _case(x, _cut(master, x[-1]), layers, young, poisson, motion, seed, strain=strain)
+
+
+@st.composite
+def _variants(draw: DrawFn) -> Case:
+    variant = draw(st.integers(0, len(VARIANTS) - 1))
+    slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
+    layers = draw(_LAYERS), draw(_LAYERS)
+    strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(seeds())
+    ratio = 10.0 ** draw(st.integers(-6, 6)) if VARIANTS[variant] == "unequal materials" else 1.0
+    degrees = draw(st.sampled_from(INCLINATIONS)) if VARIANTS[variant] == "inclined" else 0.0
+    position = draw(st.integers(0, POSITIONS - 1)) if VARIANTS[variant] == "sliding" else 0
+    beside = (draw(st.integers(1, 4)), draw(st.integers(1, 4))) if VARIANTS[variant] in ("sliding", "punch") else (0, 0)
+    x = _grid(slave)
+    master_x = _cut(master, x[-1] + sum(beside)) - beside[0]
+    if position:
+        x = x - position / POSITIONS * min(float(master_x[1] - master_x[0]), beside[0])
+    return _case(
+        x,
+        master_x,
+        layers,
+        (1.0, ratio),
+        poisson,
+        Placing((float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))),
+        seed,
+        pressure=strain * min(1.0, ratio),
+        rigid_master=VARIANTS[variant] == "rigid master",
+        variant=variant,
+    )
+
+
+@st.composite
+def _tilted(draw: DrawFn) -> Case:
+    slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
+    layers = draw(_LAYERS), draw(_LAYERS)
+    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
+    strain, motion, seed = draw(st.integers(5, 8).map(lambda e: 2.0**-e)), draw(motions(furthest=16)), draw(seeds())
+    tilt, sevenths = draw(st.integers(1, 6)), draw(st.integers(1, 6))
+    stiff = draw(st.sampled_from([1.0, 10.0, 0.125, 100.0]))
+    x = _grid(slave)
+    # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
+    moved = x + sevenths / 7 + np.resize([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4
+    master_x = _cut(master, x[-1] + 4) - 1
+    return _case(moved, master_x, layers, young, poisson, motion, seed, strain=strain, tilt=tilt / 13, stiff=stiff)
+
+
+def _case(
+    slave_x: FloatArray,
+    master_x: FloatArray,
+    layers: tuple[list[int], list[int]],
+    young: tuple[float, float],
+    poisson: tuple[float, float],
+    placing: Motion | Placing,
+    seed: int,
+    *,
+    strain: float = 0.0,
+    pressure: float | None = None,
+    tilt: float = 0.0,
+    stiff: float = MODERATE,
+    rigid_master: bool = False,
+    variant: int | None = None,
+) -> Case:
+    """`strain` and `tilt` make an imposed approach of the slave's top, unless a pressure is given."""
+    if isinstance(placing, Motion):
+        place = Placing(tuple(placing.direction.tolist()), placing.shift, placing.scale)
+    else:
+        place = placing
+    slave_y, master_y = _grid(layers[0]), _grid(layers[1])
+    approach = None if pressure is not None else strain * (slave_y[-1] + master_y[-1])
+    segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * place.scale
+    scene = two_blocks(
+        slave_x,
+        slave_y,
+        master_x,
+        master_y - master_y[-1],
+        young=young,
+        poisson=poisson,
+        penalty=stiff * young[0] / segment,
+        pressure=pressure,
+        approach=approach,
+        tilt=tilt * (approach or 0.0),
+        rigid_master=rigid_master,
+        placing=place,
+    )
+    facts = scene.facts if variant is None else {**scene.facts, "variant": np.array(float(variant))}
+    return Scene(scene.bodies, penalty=scene.penalty, facts=facts).case(seed=seed)
+
+
+def _grid(segments: Sequence[float]) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(segments)])
+
+
+def _cut(segments: Sequence[float], end: float) -> FloatArray:
+    """Grid lines from 0 to `end`: what the segments do not cover is one more, and what is too much is cut."""
+    return np.array([0.0, *takewhile(lambda x: x < end, accumulate(segments)), end])

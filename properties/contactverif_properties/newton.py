@@ -1,0 +1,217 @@
+"""Does Newton's method converge at the order that the tangent promises? In one step, and over a whole solution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil, inf, log, log2
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.case import Case
+from contactverif.formulation import Pairing
+from contactverif.newton import System, Trace, solve
+from contactverif.property import Measurement, Property, Quantity
+from contactverif.scene import scene_of
+from contactverif.strategies import solid_cases
+from contactverif.subject import Subject
+from contactverif_properties.anywhere import springs_only
+from contactverif_properties.kinks import dense, kink_within
+
+DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # 3e-2 … 1e-5, × the shortest segment
+DIRECTIONS = 2
+AT_LEAST = 3  # distances that a slope is taken from, the nearest ones
+RISING = 0.02  # of the slope between neighbours: it has not settled yet
+LINEAR, QUADRATIC = 1.1, 1.9
+NEAR = 1e-4  # of the first residual: from there on the order shows
+WANDERS = 10  # iterations of one pairing in which Newton's method with an exact tangent ends, or never will
+
+ORDER = Quantity(
+    "order of one step",
+    "1",
+    "1.9",
+    "|u1 − u*| falls like |u0 − u*|² from states of the same pairing; 2 less what is left of the third power",
+    "at least",
+)
+TAIL = Quantity(
+    "iterations at the end",
+    "1",
+    "⌈log2(log ρ_end / log ρ)⌉ + 3",
+    "once the pairing has settled and the residual is at ρ ≤ 1e-4 of the first, each step doubles digits; 3 to spare",
+)
+
+
+def one_step(case: Case, subject: Subject) -> Measurement:
+    """One Newton step from states at a known distance of a solution, whose pairing is that of the solution.
+
+    Returns
+    -------
+    Measurement
+        Slope of log |u1 − u*| over log |u0 − u*|, at the nearest distances at which |u1 − u*| is not yet roundoff, the
+        lower one of two random directions; missing where the step meets the solution exactly. Details: the rate where
+        the slope is 1 (and beside it the spectral radius of I − K⁻¹ ∂R/∂u, with the derivative taken by differences),
+        and how many steps were looked at.
+
+    Source: verification 16. Triples of residuals, which this replaces, are wrong in up to one of five scenes.
+    """
+    scene = scene_of(case)
+    system = System(scene, subject.on(case))
+    trace = solve(scene, system.formulation)
+    if not trace.converged:  # a wrong tangent may never get there
+        trace = solve(scene, system.formulation, own_tangent=False)
+    if not trace.converged:
+        return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.words}")
+    solution = trace.solution
+    pairing = system.pair(solution)
+    matrix, _ = system.matrix(solution, pairing)
+    step, condition = system.step(matrix, np.zeros(scene.n_free))
+    if step is None:
+        return Measurement({}, {}, details=ended(trace), undecided="the matrix has no inverse at the solution")
+    z = scene.positions(solution)
+    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution).max() + np.abs(scene.moved).max())
+    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(z).max()))
+    length = case.shortest_segment
+    slopes, rates, looked = [], [], 0
+    for direction in _directions(case.seed, scene.n_free):
+        before, after = [], []
+        for distance in DISTANCES:
+            u = solution + distance * length * direction
+            if not _same(system, case, pairing, u, distance * length):
+                continue
+            matrix, _ = system.matrix(u, pairing)
+            step, _ = system.step(matrix, -system.residual(u, pairing))
+            looked += 1
+            error = inf if step is None else float(np.abs(u + step - solution).max())
+            before.append(distance * length)
+            after.append(error)
+        slope, rate = order(np.array(before), np.array(after), floor)
+        slopes.append(slope)
+        rates.append(rate)
+    details = {**ended(trace), "steps": float(looked)}
+    told = [slope for slope in slopes if not np.isnan(slope)]
+    if not told:
+        return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
+    least = min(told)
+    if least < QUADRATIC:
+        details["rate"] = max(rate for rate in rates if not np.isnan(rate))
+        details["spectral radius"] = spectral_radius(system, solution, pairing)
+    if least == inf:
+        return Measurement({}, {}, details=details, idle=True)
+    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details)
+
+
+def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
+    """Slope of log after over log before at the nearest distances above the floor, and the rate after/before there.
+
+    Distances descend. Infinite where even the longest one ends at the floor: one step is exact. NaN where too little
+    was seen, or where the slope is below 2 and still rising towards it as the distances fall.
+    """
+    if not len(before):
+        return np.nan, np.nan
+    told = after > floor
+    if not told.any():
+        return inf, 0.0
+    # once at the floor, always: what rises again at a shorter distance is noise
+    last = int(np.argmin(told)) if not told.all() else len(told)
+    before, after = before[:last][-AT_LEAST:], after[:last][-AT_LEAST:]
+    if len(before) < AT_LEAST:
+        return np.nan, np.nan
+    if not np.isfinite(after).all():
+        return 0.0, inf
+    slopes = np.diff(np.log(after)) / np.diff(np.log(before))
+    if LINEAR < slopes[-1] < QUADRATIC and slopes[-1] > slopes[0] + RISING:
+        return np.nan, np.nan
+    return float(slopes.mean() if slopes[-1] < QUADRATIC else slopes[-1]), float(after[-1] / before[-1])
+
+
+def spectral_radius(system: System, q: FloatArray, pairing: Pairing | None) -> float:
+    """Of I − K⁻¹ K_true, the rate of Newton's method with the matrix K; K_true by central differences of the residual.
+
+    Source: Zavarise & De Lorenzis (2009), Fig. 30, where it is the rate of the basic version.
+    """
+    scene = system.scene
+    matrix, _ = system.matrix(q, pairing)
+    contact = system.differences(pairing, scene.positions(q, system.factor))
+    exact = scene.stiffness + scene.spread.T @ contact @ scene.spread
+    return float(np.abs(linalg.eigvals(np.eye(len(q)) - linalg.solve(dense(matrix), dense(exact)))).max())
+
+
+def trajectory(case: Case, subject: Subject) -> Measurement:
+    """The end of a whole solution: how many iterations from a small residual down to roundoff.
+
+    Returns
+    -------
+    Measurement
+        Iterations from the first iterate that has the final pairing and a residual of at most 1e-4 of the first, to the
+        end. Undecided where the pairing changes to the last, which is normal on kinked surfaces and no verdict against
+        anybody. Details: how it ended, iterations, iterates at which the pairing changed.
+    """
+    trace = solve(scene_of(case), subject.on(case))
+    details = ended(trace)
+    last = len(trace.residuals) - 1
+    settled = int(np.flatnonzero(trace.changes > 0)[-1]) if (trace.changes > 0).any() else 0
+    if not trace.converged and last - settled < WANDERS:
+        return Measurement({}, {}, details=details, undecided=f"the pairing does not settle: {trace.end.words}")
+    near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
+    near = near[near >= settled]
+    begin = int(near[0]) if len(near) else settled
+    begins, ends = (
+        max(r / trace.residuals[0], np.finfo(float).tiny) for r in (trace.residuals[begin], trace.floors[-1])
+    )
+    allowed = ceil(log2(max(log(ends) / log(min(begins, NEAR)), 1.0))) + 3
+    details["finite"] = float(trace.converged and last - begin <= 1)
+    taken = float(last - begin) if trace.converged else inf
+    return Measurement({TAIL.name: taken}, {TAIL.name: float(allowed)}, details=details)
+
+
+def ended(trace: Trace) -> dict[str, float]:
+    """How a solution ended, for the details of a measurement."""
+    return {
+        "end": float(trace.end),
+        "iterations": float(trace.n_iterations),
+        "changes of pairing": float((trace.changes > 0).sum()),
+        "last residual in roundoffs": float(trace.roundings[-1]),
+    }
+
+
+def _directions(seed: int, size: int) -> FloatArray:
+    directions = np.random.default_rng(seed).uniform(-1, 1, (DIRECTIONS, size))
+    scaled: FloatArray = directions / np.abs(directions).max(axis=1, keepdims=True)
+    return scaled
+
+
+def _same(system: System, case: Case, pairing: Pairing | None, u: FloatArray, reach: float) -> bool:
+    """Whether the state pairs as the solution does; where no pairing says so, whether differences see no kink there."""
+    if pairing is not None:
+        return system.pair(u) == pairing
+    z = system.scene.positions(u)
+    direction = np.random.default_rng(case.seed).uniform(-1, 1, z.size)
+    direction /= np.abs(direction).max()
+    return not kink_within(replace(case, z=z), system.formulation, None, reach, direction)
+
+
+NEWTON_ORDER = Property(
+    id="newton.order",
+    family="newton",
+    summary="one Newton step from near a solution ends at a distance of second order",
+    quantities=(ORDER,),
+    cases=solid_cases,
+    measure=one_step,
+    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    needs=frozenset({"tangent"}),
+    applicable=springs_only,
+    bodies=True,
+)
+NEWTON_HISTORY = Property(
+    id="newton.history",
+    family="newton",
+    summary="a whole solution: once the pairing has settled, the residual falls to roundoff in a few iterations",
+    quantities=(TAIL,),
+    cases=solid_cases,
+    measure=trajectory,
+    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    needs=frozenset({"tangent"}),
+    applicable=springs_only,
+    bodies=True,
+)

@@ -1,0 +1,220 @@
+"""The patch test solved: elastic bodies under a uniform pressure that is known exactly, at moderate and high penalty.
+
+Both are asked because they say different things. At a moderate penalty a wrong distribution of forces bends the bodies;
+as the penalty grows, methods that only interpolate the gap well lock into the right pressure and seem to pass. The
+slope of the error over the penalty, a detail of every measurement, tells the two apart: 0 fails, −1 passes because it
+locks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.blocks import exact_unknowns, pressure_of
+from contactverif.case import Case
+from contactverif.newton import NEARLY, Trace, solve
+from contactverif.oracle import uniform_pressure_weights
+from contactverif.property import Measurement, Property, Quantity
+from contactverif.scene import Scene, scene_of
+from contactverif.strategies import block_cases, variant_cases
+from contactverif.subject import Guarded, Subject
+from contactverif_properties.anywhere import springs_only
+
+HIGH = 1e3  # × the moderate penalty of a case
+ITERATIONS = 25  # a method that transmits a uniform pressure needs one; one that does not a few more, or none is enough
+NEAR = 2.0**-10  # × the penetration: less far from the exact solution, it is the same one
+
+TOLERANCE = "1e-11 + 1e-13 ε̂h/E + 5e-15/r + 16 u X ε̂/p"
+REASON = (
+    "the matrix has the condition ε̂h/E, E of the softer body; r is the ratio of the shortest segment to the longest; "
+    "a gap p/ε̂ is a difference of positions X"
+)
+PRESSURE_TOLERANCE = "1e-11 + 1e-13 ε̂h/E + 5e-15/r + 16 u X ε̂/(p r)"
+PRESSURE_REASON = f"{REASON}; on the shortest segment, the roundoff of the longest one's nodal force"
+GAP_TOLERANCE = f"({TOLERANCE}) (1 + ε̂ ΣH/M)"
+GAP_REASON = (
+    f"{REASON}; where no spring sees a height, the bodies hold it, which give way by ΣH/M under a unit pressure"
+)
+QUANTITIES = (
+    Quantity("stress", "1", TOLERANCE, REASON),
+    Quantity("slave forces", "1", TOLERANCE, REASON),
+    Quantity("master forces", "1", TOLERANCE, REASON),
+    Quantity("gap", "1", GAP_TOLERANCE, GAP_REASON),
+    Quantity("pressure", "1", PRESSURE_TOLERANCE, PRESSURE_REASON),
+)
+HIGH_QUANTITIES = tuple(replace(quantity, name=f"{quantity.name}, high penalty") for quantity in QUANTITIES)
+
+
+def solved(case: Case, subject: Subject) -> Measurement:
+    """Stress, forces on both sides, gap and reported pressure against the exact ones, at two penalties.
+
+    Returns
+    -------
+    Measurement
+        As `at_penalty`, for the penalty of the case and for one that is HIGH times larger. Details: how each solution
+        ended, and the slope of the stress error over the penalties.
+    """
+    moderate = at_penalty(case, subject, case.penalty)
+    high = at_penalty(case, subject, HIGH * case.penalty)
+    errors = moderate.values["stress"], high.values["stress"]
+    slope = float(np.log(errors[1] / errors[0]) / np.log(HIGH)) if min(errors) > 0 else 0.0
+
+    def named(numbers: object) -> dict[str, float]:
+        assert isinstance(numbers, dict)
+        return {f"{name}, high penalty": number for name, number in numbers.items()}
+
+    return Measurement(
+        {**moderate.values, **named(high.values)},
+        {**moderate.tolerances, **named(high.tolerances)},
+        undecided=moderate.undecided or high.undecided,
+        details={**moderate.details, **named(high.details), "slope over penalties": slope},
+    )
+
+
+def solved_once(case: Case, subject: Subject) -> Measurement:
+    """The same at the penalty of the case alone."""
+    return at_penalty(case, subject, case.penalty)
+
+
+def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
+    """The solved scene against the exact solution, as numbers without dimension.
+
+    Returns
+    -------
+    Measurement
+        stress: largest entry of σ − σ_exact at the Gauss points, over p. Slave and master forces: largest of a node, of
+        what the bodies need to be in balance (a rigid body: of what the formulation gives), over p L. gap: largest
+        error of a node's height over the other surface, over p/ε̂. pressure: largest error of what the formulation says
+        its contact points carry, over p; missing where it says nothing, or is nodal and so knows forces only.
+    """
+    scene, pressure = scene_of(case), pressure_of(case, penalty)
+    formulation = subject.on(replace(case, penalty=penalty))
+    exact = exact_unknowns(scene, pressure, penalty)
+    trace, q = solution(scene, formulation, exact, pressure / penalty)
+    z = scene.positions(q)
+    here = replace(case, z=z, penalty=penalty)
+    slave, master = force_errors(here, scene, formulation, q, pressure)
+    values = {
+        "stress": stress_error(scene, q, pressure),
+        "slave forces": slave,
+        "master forces": master,
+        "gap": gap_error(here, pressure / penalty),
+    }
+    if "contact_points" in formulation.provides and subject.traits.penalty != "nodal":
+        points = formulation.contact_points(case.interface, formulation.pair(case.interface, z), z)
+        found = np.where(points.active, points.pressure, 0.0)
+        values["pressure"] = float(np.abs(found - pressure).max() / pressure) if len(found) else np.inf
+    of_mesh, of_gap, ratio = tolerance_parts(here, scene, pressure)
+    tolerances = dict.fromkeys(values, of_mesh + of_gap)
+    tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
+    if "pressure" in values:
+        tolerances["pressure"] = of_mesh + of_gap / ratio
+    return Measurement(values, tolerances, details=_ended(trace))
+
+
+def solution(scene: Scene, formulation: Guarded, exact: FloatArray, penetration: float) -> tuple[Trace, FloatArray]:
+    """Newton's trace from the first guess of the scene, and the unknowns (n_free,) of the solution that is judged.
+
+    The patch test asks whether the exact solution is one of the formulation's. So where Newton ends elsewhere (it need
+    not converge with an approximate tangent, and large motions have other solutions too), it begins again at the exact
+    one: a formulation that passes is in balance there and does not move. One that is not is judged where it comes
+    nearest to balance afterwards.
+    """
+    trace = solve(scene, formulation, iterations=ITERATIONS)
+    if trace.converged and np.abs(trace.solution - exact).max(initial=0.0) <= NEAR * penetration:
+        return trace, trace.solution
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS)
+    balanced = again.roundings[0] <= NEARLY or len(again.q) == 1
+    return trace, again.q[0] if balanced else again.q[1 + np.argmin(again.roundings[1:])]
+
+
+def stress_error(scene: Scene, q: FloatArray, pressure: float) -> float:
+    """Largest entry of σ − σ_exact at the Gauss points of all bodies, over p."""
+    largest = 0.0
+    for body, stresses in zip(scene.bodies, scene.stresses(q), strict=True):
+        exact = [-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0]
+        largest = max(largest, float(np.abs(stresses - exact).max(initial=0.0)))
+    return largest / pressure
+
+
+def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, pressure: float) -> tuple[float, float]:
+    """Largest error of a nodal force on the slave and on the master, over p L."""
+    forces = scene.nodal_forces(q)
+    by_contact = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
+    first = 0
+    for index in scene.reached:
+        last = first + len(scene.bodies[index].contact_nodes)
+        if scene.bodies[index].rigid:
+            forces[first:last] = by_contact[first:last]
+        first = last
+    errors = np.linalg.norm(forces - exact_forces(case, pressure), axis=1) / (pressure * case.slave_length)
+    n_slave = case.interface.n_slave_nodes
+    return float(errors[:n_slave].max()), float(errors[n_slave:].max())
+
+
+def exact_forces(case: Case, pressure: float) -> FloatArray:
+    """The consistent forces (n_nodes, 2) by which the pressure pushes the nodes, exact to their last digit."""
+    weights = uniform_pressure_weights(case.interface, case.parameters["along"])
+    along = case.parameters["direction"]
+    normal = np.array([-along[1], along[0]])  # out of the master
+    sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
+    forces: FloatArray = pressure * (sides * weights)[:, None] * normal
+    return forces
+
+
+def gap_error(case: Case, penetration: float) -> float:
+    """Largest departure of a node's height from a plane slave at `penetration` below a plane master, over it."""
+    along = case.parameters["direction"]
+    heights = case.positions @ [-along[1], along[0]]
+    n_slave = case.interface.n_slave_nodes
+    level = heights[n_slave:].mean()
+    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
+    return float(errors.max() / penetration)
+
+
+def tolerance_parts(case: Case, scene: Scene, pressure: float) -> tuple[float, float, float]:
+    """The two summands of TOLERANCE in the state of the case, of the mesh and of the gap, and the ratio r."""
+    interface = case.interface
+    young = min(body.young for body in scene.bodies if not body.rigid)
+    lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
+    h, ratio = float(interface.slave.lengths(interface.nodes).mean()), float(lengths.min() / lengths.max())
+    of_mesh = 1e-11 + 1e-13 * case.penalty * h / young + 5e-15 / ratio
+    return of_mesh, 16 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure, ratio
+
+
+def exact_picture(case: Case) -> FloatArray:
+    """For pictures: the exact forces (n_nodes, 2) at the penalty of the case."""
+    return exact_forces(case, pressure_of(case, case.penalty))
+
+
+def _ended(trace: Trace) -> dict[str, float]:
+    return {"end": float(trace.end), "iterations": float(trace.n_iterations)}
+
+
+FLAT_SOLVE = Property(
+    id="patch.flat.solve",
+    family="patch",
+    summary="two elastic blocks under a uniform pressure: exact stress, forces on both sides, gap, at two penalties",
+    quantities=(*QUANTITIES, *HIGH_QUANTITIES),
+    cases=block_cases,
+    measure=solved,
+    promise=lambda traits: traits.passes_flat_patch,
+    applicable=springs_only,
+    bodies=True,
+    exact=exact_picture,
+)
+VARIANTS = Property(
+    id="patch.variants",
+    family="patch",
+    summary="the same on a rigid master, with unequal materials, inclined, slid along, and under a narrow punch",
+    quantities=QUANTITIES,
+    cases=variant_cases,
+    measure=solved_once,
+    promise=lambda traits: traits.passes_flat_patch,
+    applicable=springs_only,
+    bodies=True,
+    exact=exact_picture,
+)
