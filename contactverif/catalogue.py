@@ -11,7 +11,7 @@ import inspect
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import cos, inf, isfinite, radians, sin
 from typing import Any, Literal
 
 import numpy as np
@@ -115,7 +115,7 @@ SCENES: Mapping[str, NamedScene] = {
         "Example 1bis, Fig. 34",
         f"the meshes; {_MATERIAL}",
         [2, 2, 2],
-        [2.4, 2.4, 2.4, 2.4, 2.4],
+        [1.625, 1.75, 1.75, 1.75, 1.75, 1.75, 1.625],
         slave_from=-3.0,
         master_from=-6.0,
         pressure=1.0,
@@ -172,16 +172,16 @@ def made(
     ------
     MisuseError : for a value that cannot be.
     """
+    if name not in SCENES:
+        raise unknown("scene", name, SCENES)
+    numbers = {"young": young, "ratio": ratio, "poisson": poisson, "degrees": degrees}
+    optional = {"penalty": penalty, "pressure": pressure, "lowered": lowered}
+    given = {option: value for option, value in optional.items() if value is not None}
+    for option, value in {"refine": refine, **numbers, "sides": sides, **given}.items():
+        if needed := _refused(option, value):
+            raise MisuseError(f"{option} of scene {name}", repr(value), needed)
     drawing = SCENES[name]
     p = drawing.pressure if pressure is None else pressure
-    numbers = {"penalty": penalty, "young": young, "ratio": ratio, "pressure": p}
-    for option, value in numbers.items():
-        if value is not None and not 0 < value < np.inf:
-            raise MisuseError(f"{option} of scene {name}", f"{value:g}", "a number > 0")
-    if not 1 <= refine <= _FINEST:
-        raise MisuseError(f"refine of scene {name}", f"{refine}", f"a whole number from 1 to {_FINEST}")
-    if not np.isfinite(degrees):
-        raise MisuseError(f"degrees of scene {name}", f"{degrees}", "a finite angle")
     slave_x, master_x = (
         _grid(start, lengths, refine)
         for start, lengths in ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
@@ -212,11 +212,21 @@ def _refused(option: str, value: Any) -> str:
     if option == "sides":
         return "" if value in ("rollers", "free") else "rollers or free"
     if option == "refine":
-        return "" if isinstance(value, int) and not isinstance(value, bool) else "a whole number"
-    return "a number" if isinstance(value, bool | str) else ""
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        return "" if whole and 1 <= value <= _FINEST else f"a whole number from 1 to {_FINEST}"
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return "a number"
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number that no float can hold
+        number = inf
+    if option in _ABOVE_ZERO:
+        return "" if 0 < number < inf else "a number > 0"
+    return "" if isfinite(number) else "a finite number"
 
 
 OPTIONS = tuple(inspect.signature(made).parameters)[1:]
+_ABOVE_ZERO = ("penalty", "young", "ratio", "pressure")
 _FINEST = 64
 
 

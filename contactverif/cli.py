@@ -11,11 +11,8 @@ import typer
 from contactverif.errors import ContactverifError, MisuseError
 
 if TYPE_CHECKING:
-    from contactverif.arrays import FloatArray
     from contactverif.case import Case
     from contactverif.interface import Interface
-    from contactverif.property import Outcome, Property
-    from contactverif.subject import Subject
 
 app = typer.Typer(
     help="Tells whether a contact formulation is right: random interfaces, exact answers, shrunk failures.",
@@ -75,6 +72,9 @@ def verify(
         str | None, typer.Option(help="Physical group of line elements that is the master.", metavar="TAG")
     ] = None,
     flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's surfaces.")] = False,
+    scene: Annotated[
+        str | None, typer.Option(help="Ask on this scene: c, c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")
+    ] = None,
 ) -> None:
     """Ask every property of a formulation; print a table, draw what failed, write a report.
 
@@ -88,7 +88,9 @@ def verify(
       contactverif verify vts-ppt --report vts-ppt.nc
       contactverif verify nts -p 'patch.*' --seed 7
       contactverif verify mine --mesh punch.msh --slave punch --master base
+      contactverif verify vts-me --scene c -p 'patch.*'
     """
+    from contactverif.drawing import draw_case
     from contactverif.progress import Bar
     from contactverif.registry import load_formulation, load_properties
     from contactverif.runner import run
@@ -102,6 +104,7 @@ def verify(
     if pictures is not None:
         _folder(pictures)
     target, folder = (path and path.absolute() for path in (report, pictures))  # a plugin may change where we are
+    chosen = _scene(scene, mesh)
     interface = _interface(mesh, slave, master, flip)
     questions = load_properties(properties or ["*"])
     subjects = [load_formulation(name) for name in names]
@@ -114,6 +117,7 @@ def verify(
             examples=examples,
             seed=seed,
             interface=interface,
+            scene=chosen,
             known=reasons,
             progress=bar.told,
         )
@@ -129,7 +133,7 @@ def verify(
                 outcome = row.shrunk or row.witness
                 assert outcome is not None
                 name = f"{_file_name(row.formulation, row.question.id)}.png"
-                _draw(drawn[row.formulation], row.question, outcome, folder / name)
+                draw_case(drawn[row.formulation], row.question, outcome, folder / name)
                 typer.echo(f"    picture: {pictures / name}")
     if report is not None:
         typer.echo(f"report: {report}")
@@ -164,6 +168,8 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --picture it.svg
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
+    from contactverif.asked import judged, the_formulation, the_property
+    from contactverif.drawing import draw_case
     from contactverif.property import Verdict
     from contactverif.tables import replayed, show
     from contactverif_reports.draw import as_text
@@ -174,16 +180,71 @@ def replay(
         typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     stored = read_case(report, case)
-    subject = _subject(formulation or stored.formulation)
-    question = _question(stored.property_id)
-    outcome = _judged(question, stored.case, subject)
+    subject = the_formulation(formulation or stored.formulation)
+    question = the_property(stored.property_id)
+    outcome = judged(question, stored.case, subject)
     if picture is not None:  # before anything is printed, in case it cannot be written
-        _draw(subject, question, outcome, picture)
+        draw_case(subject, question, outcome, picture)
     typer.echo(as_text(stored.case))
     show(replayed(stored, subject.name, outcome))
     if picture is not None:
         typer.echo(f"picture: {picture}")
     raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)
+
+
+@app.command()
+def draw(
+    report: Annotated[
+        Path | None, typer.Argument(help="A report that verify --report wrote.", metavar="REPORT")
+    ] = None,
+    case: Annotated[str | None, typer.Option(help="Id of a counterexample of the report.", metavar="ID")] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="A scene instead; `contactverif scenes` lists them.", metavar="NAME[:OPTIONS]")
+    ] = None,
+    formulation: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--formulation", "-f", help="Who solves it, repeatable; of a case: who failed it.", metavar="NAME"
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Draw to this file, .png or .svg.", metavar="FILE")] = None,
+    vtu: Annotated[Path | None, typer.Option(help="Write the solved scene for ParaView, .vtu.", metavar="FILE")] = None,
+) -> None:
+    """Solve a scene and draw it: deformed bodies, contact pressure, residuals.
+
+    Displacements and penetration are magnified; the figure says how much.
+    Several formulations come side by side, those that did not converge too.
+    A counterexample without bodies is drawn with its forces, as it stands.
+
+    \bExit status
+      0  drawn
+      1  a formulation could not be asked; the others are drawn
+      2  something was asked that cannot be
+
+    \bExamples
+      contactverif draw --scene c -f vts-ppt --out c.png --vtu c.vtu
+      contactverif draw --scene c:degrees=30 -f nts -f vts-ppt --out both.svg
+      contactverif draw ppt.nc --case vts-ppt.balance.force --out it.png
+    """
+    from contactverif import drawing
+
+    targets = drawing.Targets(out, vtu)
+    raise typer.Exit(0 if drawing.draw(report, case, scene, formulation or [], targets) else 1)
+
+
+@app.command()
+def scenes() -> None:
+    """List the scenes that have a name, with drawings, and their options.
+
+    \bExamples
+      contactverif scenes
+      contactverif draw --scene b -f vts-me -f vts-ppt --out b.png
+      contactverif verify vts-ppt --scene c-prime:refine=4 -p 'patch.*'
+    """
+    from contactverif.gallery import Gallery
+    from contactverif.tables import show
+
+    show(Gallery())
 
 
 def _chosen(names: list[str], every: bool) -> list[str]:
@@ -212,6 +273,16 @@ def _interface(mesh: Path | None, slave: str | None, master: str | None, flip: b
     return read_interface(mesh, slave=slave, master=master, flip=flip)
 
 
+def _scene(scene: str | None, mesh: Path | None) -> Case | None:
+    if scene is None:
+        return None
+    from contactverif.catalogue import scene_named
+
+    if mesh is not None:
+        raise MisuseError("--scene", f"{scene} and --mesh {mesh}", "one of the two")
+    return scene_named(scene).case()
+
+
 def _reason(text: str) -> tuple[str, str]:
     property_id, equals, reason = text.partition("=")
     if not (property_id and equals and reason):
@@ -230,62 +301,6 @@ def _file_name(formulation: str, property_id: str) -> str:
     from contactverif_reports.schema import case_id
 
     return case_id(formulation, property_id)
-
-
-def _subject(name: str) -> Subject:
-    from contactverif.registry import load_formulation
-    from contactverif.result import NotLoaded
-
-    subject = load_formulation(name)
-    if isinstance(subject, NotLoaded):
-        raise MisuseError("formulation", f"{name}, which does not load ({subject.reason})", "one that loads")
-    return subject
-
-
-def _question(property_id: str) -> Property:
-    from contactverif.registry import load_properties
-    from contactverif.result import NotLoaded
-
-    (question,) = load_properties([property_id])
-    if isinstance(question, NotLoaded):
-        raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
-    return question
-
-
-def _judged(question: Property, case: Case, subject: Subject) -> Outcome:
-    """The outcome of a case; also where the property cannot be asked of the formulation."""
-    from contactverif.property import Outcome, Verdict
-    from contactverif.runner import judge_case
-
-    if reason := question.applicable(subject.traits):
-        return Outcome(case, Verdict.NOT_APPLICABLE, reason)
-    if missing := question.needs - subject.provides:
-        return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
-    return judge_case(question, case, subject)
-
-
-def _draw(subject: Subject, question: Property, outcome: Outcome, path: Path) -> None:
-    """The case with the forces of the formulation, as a picture."""
-    from contactverif_reports.draw import figure
-
-    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
-    try:
-        exact = question.exact(outcome.case) if question.exact is not None else None
-        figure(outcome.case, path, title=title, forces=_forces(subject, outcome.case), exact=exact)
-    except MisuseError as error:
-        raise MisuseError("--picture", error.found, error.needed) from None
-
-
-def _forces(subject: Subject, case: Case) -> FloatArray | None:
-    """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none."""
-    from contactverif.errors import ContractError
-
-    try:
-        formulation = subject.on(case)
-        forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
-    except ContractError:
-        return None
-    return -forces.reshape(case.interface.nodes.shape)
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 from scipy.linalg import lapack
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, frozen
 from contactverif.errors import MisuseError
@@ -160,7 +160,9 @@ class System:
             tangent = sparse.csr_array(tangent)
         matrix = scene.stiffness + spread.T @ tangent @ spread
         bulk = abs(scene.stiffness) @ np.abs(q) + self.factor * np.abs(scene.load)
-        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + abs(spread).T @ (abs(tangent) @ np.abs(z)))
+        # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
+        contact = abs(spread).T @ abs(tangent).sum(axis=1) * np.abs(z).max(initial=0.0)
+        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + contact)
         self.seconds["tangent"] += perf_counter() - start
         return matrix, floor
 
@@ -170,7 +172,7 @@ class System:
         solve = _dense_step if isinstance(matrix, np.ndarray) else _sparse_step
         step, condition = solve(matrix, residual)
         self.seconds["solve"] += perf_counter() - start
-        if condition <= UNIT_ROUNDOFF or step is None or not np.isfinite(step).all():
+        if condition <= UNIT_ROUNDOFF * len(residual) or step is None or not np.isfinite(step).all():
             return None, condition
         return step, condition
 
@@ -216,6 +218,10 @@ def solve(
         raise MisuseError(name, f"{number}", "at least 1")
     system, record = System(scene, formulation, own_tangent=own_tangent), _Record()
     q = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
+    if q.shape != (scene.n_free,):
+        raise MisuseError("start", f"shape {q.shape}", f"shape ({scene.n_free},)")
+    if not np.isfinite(q).all():
+        raise MisuseError("start", "NaN or infinity", "finite numbers")
     end = End.CONVERGED
     for number in range(1, load_steps + 1):
         system.factor = number / load_steps
@@ -264,10 +270,9 @@ class _Record:
         self.factors.append(factor)
         self.residuals.append(float(np.abs(residual).max(initial=0.0)))
         self.floors.append(float(floor.max(initial=0.0)))
-        # an entry without any term has no roundoff, and nothing but zero will do
-        self.roundings.append(
-            float(np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor).max(initial=0.0))
-        )
+        with np.errstate(divide="ignore"):  # an entry without any term has no roundoff, and nothing but zero will do
+            roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
+        self.roundings.append(float(roundings.max(initial=0.0)))
         self.changes.append(changes)
         self.energies.append(np.nan)
         self.conditions.append(np.nan)
@@ -332,5 +337,6 @@ def _sparse_step(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, flo
         factors = splu(matrix.tocsc())
     except RuntimeError:  # scipy's word for an exactly singular matrix
         return None, 0.0
-    pivots = np.abs(factors.U.diagonal())
-    return factors.solve(right), float(pivots.min() / pivots.max())
+    inverse = LinearOperator(matrix.shape, factors.solve, lambda v: factors.solve(v, "T"), dtype=np.float64)
+    # one column: more would be random ones; pivots alone do not tell a singular matrix
+    return factors.solve(right), float(1 / (abs(matrix).sum(axis=0).max() * onenormest(inverse, t=1)))

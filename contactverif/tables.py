@@ -130,7 +130,7 @@ def summary(found: Run) -> Text:
 
 def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
     """What the report says of a case beside what comes out now."""
-    table = _table("")
+    table = plain_table("")
     for column in ("", "formulation", "verdict", "reason"):
         table.add_column(column)
     table.add_row("stored", stored.formulation, str(stored.verdict), stored.reason)
@@ -140,7 +140,7 @@ def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
 
 def formulations_table(formulations: Sequence[Subject | NotLoaded], *, every_trait: bool) -> Table:
     """The installed formulations: what each promises, or why it does not load."""
-    table = _table("formulations")
+    table = plain_table("formulations")
     table.add_column("name", no_wrap=True)
     table.add_column("promises")
     for item in formulations:
@@ -156,7 +156,7 @@ def formulations_table(formulations: Sequence[Subject | NotLoaded], *, every_tra
 
 def properties_table(properties: Sequence[Property | NotLoaded]) -> Table:
     """The installed properties: what each asks."""
-    table = _table("properties")
+    table = plain_table("properties")
     table.add_column("id", no_wrap=True)
     table.add_column("asks")
     for item in properties:
@@ -167,7 +167,7 @@ def properties_table(properties: Sequence[Property | NotLoaded]) -> Table:
     return table
 
 
-def _table(title: str) -> Table:
+def plain_table(title: str) -> Table:
     """A table without lines that a narrow terminal would break."""
     return Table(
         title=title or None, title_justify="left", title_style="bold", header_style="bold", box=box.SIMPLE_HEAD

@@ -63,14 +63,14 @@ ROOMS = {
     "properties": Room(
         (), ("contracts", "oracle", "scene", "newton", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
-    "reports": Room((), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib")),
+    "reports": Room((), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib", "meshio")),
     "run": Room(
         ("registry", "runner", "generate", "profile", "provenance"),
         ("contracts", "scene", "strategies", "run"),
         ("numpy", "hypothesis"),
     ),
     "front": Room(  # knows everything, but no formulation and no property by name; imported by nobody
-        ("cli", "pytest_plugin", "testing", "tables", "progress"),
+        ("cli", "pytest_plugin", "testing", "tables", "progress", "asked", "drawing", "gallery", "pictures"),
         (*INSIDE, "front"),
         ("numpy", "hypothesis", "typer", "rich", "pytest"),
     ),

@@ -24,18 +24,20 @@ from contactverif.subject import Subject
 
 SEED = 3
 PATCH, FORCE, MOMENT, TANGENT = "patch.flat.transmission", "balance.force", "balance.moment", "tangent.directional"
+PATCHES = frozenset({PATCH, "patch.flat.solve", "patch.variants"})
+INEXACT = frozenset({TANGENT, "newton.order", "newton.history"})
 
 # What each does not do; everything else it does.
 FAILS: Mapping[str, frozenset[str]] = {
-    "nts": frozenset({PATCH}),
-    "nts-ar": frozenset({PATCH}),
-    "nts-ar:area=reference": frozenset({PATCH}),
-    "vts-g": frozenset({PATCH}),
-    "vts-g:n=3": frozenset({PATCH}),
-    "vts-me": frozenset({PATCH}),
-    "vts-me:n=4": frozenset({PATCH}),
+    "nts": PATCHES,
+    "nts-ar": PATCHES,
+    "nts-ar:area=reference": PATCHES,
+    "vts-g": PATCHES,
+    "vts-g:n=3": PATCHES,
+    "vts-me": PATCHES,
+    "vts-me:n=4": PATCHES,
     "vts-ppt": frozenset({FORCE, MOMENT}),
-    "vts-ppt-basic": frozenset({FORCE, MOMENT, TANGENT}),
+    "vts-ppt-basic": frozenset({FORCE, MOMENT}) | INEXACT,
     "vts-ppt-balanced": frozenset(),
 }
 
@@ -240,7 +242,7 @@ def test_what_promises_nothing_is_never_accused() -> None:
         [claiming(contactverif_nts.vts_ppt_basic, witnesses={}, **nothing)], load_properties(), examples=30, seed=SEED
     )
     verdicts = {row.question.id: row.verdict for row in found.rows}
-    assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == {FORCE, MOMENT, TANGENT}
+    assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == {FORCE, MOMENT} | INEXACT
     assert found.passed
 
 

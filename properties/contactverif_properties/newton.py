@@ -98,7 +98,7 @@ def one_step(case: Case, subject: Subject) -> Measurement:
         details["spectral radius"] = spectral_radius(system, solution, pairing)
     if least == inf:
         return Measurement({}, {}, details=details, idle=True)
-    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details)
+    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details, idle=untouched(system, trace))
 
 
 def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
@@ -147,7 +147,8 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
         end. Undecided where the pairing changes to the last, which is normal on kinked surfaces and no verdict against
         anybody. Details: how it ended, iterations, iterates at which the pairing changed.
     """
-    trace = solve(scene_of(case), subject.on(case))
+    system = System(scene_of(case), subject.on(case))
+    trace = solve(system.scene, system.formulation)
     details = ended(trace)
     last = len(trace.residuals) - 1
     settled = int(np.flatnonzero(trace.changes > 0)[-1]) if (trace.changes > 0).any() else 0
@@ -162,7 +163,13 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
     allowed = ceil(log2(max(log(ends) / log(min(begins, NEAR)), 1.0))) + 3
     details["finite"] = float(trace.converged and last - begin <= 1)
     taken = float(last - begin) if trace.converged else inf
-    return Measurement({TAIL.name: taken}, {TAIL.name: float(allowed)}, details=details)
+    return Measurement({TAIL.name: taken}, {TAIL.name: float(allowed)}, details=details, idle=untouched(system, trace))
+
+
+def untouched(system: System, trace: Trace) -> bool:
+    """Whether the formulation gives no force at the last iterate, so that Newton solved the bodies alone."""
+    pairing = system.formulation.pair(system.scene.interface, trace.z)
+    return not system.formulation.residual(system.scene.interface, pairing, trace.z).any()
 
 
 def ended(trace: Trace) -> dict[str, float]:

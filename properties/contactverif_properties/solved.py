@@ -32,8 +32,8 @@ REASON = (
     "the matrix has the condition ε̂h/E, E of the softer body; r is the ratio of the shortest segment to the longest; "
     "a gap p/ε̂ is a difference of positions X"
 )
-PRESSURE_TOLERANCE = "1e-11 + 1e-13 ε̂h/E + 5e-15/r + 16 u X ε̂/(p r)"
-PRESSURE_REASON = f"{REASON}; on the shortest segment, the roundoff of the longest one's nodal force"
+PRESSURE_TOLERANCE = "1e-11 + 1e-13 ε̂h/E + 5e-15/r + 64 u X ε̂/(p r)"
+PRESSURE_REASON = f"{REASON}; a nodal force is in balance to 4 roundoffs, and an area has a quarter of a segment"
 GAP_TOLERANCE = f"({TOLERANCE}) (1 + ε̂ ΣH/M)"
 GAP_REASON = (
     f"{REASON}; where no spring sees a height, the bodies hold it, which give way by ΣH/M under a unit pressure"
@@ -111,7 +111,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
     tolerances = dict.fromkeys(values, of_mesh + of_gap)
     tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
     if "pressure" in values:
-        tolerances["pressure"] = of_mesh + of_gap / ratio
+        tolerances["pressure"] = of_mesh + 4 * of_gap / ratio
     return Measurement(values, tolerances, details=_ended(trace))
 
 

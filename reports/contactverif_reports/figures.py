@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from contactverif.arrays import FloatArray
 from contactverif.case import Case
 from contactverif.errors import MisuseError
+from contactverif_reports.files import checked_name, whole
 from contactverif_reports.geometry import Course, Gaps
 from contactverif_reports.lengths import short, unit_of
 from contactverif_reports.strokes import MASTER, SLAVE, draw_arrows, draw_surface
 
-_SUFFIXES = (".png", ".svg")
+SUFFIXES = (".png", ".svg")
 _SEEN_GAP = 0.05  # of the interface; a smaller largest gap is magnified to it
 _APART = 0.13  # of the interface; between surfaces that are drawn apart, to make room for arrows
 _BODY = 0.10  # width of the hatched part of a body, of the interface
@@ -35,9 +36,7 @@ def draw(
     exact: FloatArray | None,
 ) -> None:
     """See `contactverif_reports.draw.figure`."""
-    target = Path(path)
-    if target.suffix.lower() not in _SUFFIXES:
-        raise MisuseError("path", f"{os.fspath(path)!r}", f"a name that ends in {' or '.join(_SUFFIXES)}")
+    target = checked_name(path, SUFFIXES)
     course, gaps = Course.of(case), Gaps.of(case)
     interface = case.interface
     lengths = [surface.lengths(case.positions) for surface in (interface.slave, interface.master)]
@@ -65,7 +64,7 @@ def draw(
         loc="left",
         parse_math=False,
     )
-    _save(figure, target)
+    save(figure, target)
 
 
 def _shown(case: Case, gaps: Gaps, roundoff: float, apart: bool) -> tuple[FloatArray, str]:
@@ -76,14 +75,14 @@ def _shown(case: Case, gaps: Gaps, roundoff: float, apart: bool) -> tuple[FloatA
         moves = np.full(len(gaps.gap), _APART * size + max(0.0, -float(gaps.gap.min())))
         how = ", drawn apart"
     else:
-        factor = _magnification(gaps.gap, roundoff, size)
+        factor = magnification(gaps.gap, roundoff, size)
         moves = (factor - 1) * gaps.gap
         how = "" if factor == 1 else f", drawn {short(factor)} times larger"
     positions[: case.interface.n_slave_nodes] += moves[:, None] * gaps.normal
     return positions, how
 
 
-def _magnification(gap: FloatArray, roundoff: float, size: float) -> float:
+def magnification(gap: FloatArray, roundoff: float, size: float) -> float:
     """One significant digit, so that the largest gap is seen; 1 where it is seen already or is none."""
     largest = float(np.abs(gap).max())
     if largest <= roundoff * 1e-3 or largest >= _SEEN_GAP * size:
@@ -112,11 +111,17 @@ def _finish(axes: Axes, unit_name: str) -> None:
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
 
 
-def _save(figure: Figure, target: Path) -> None:
-    """The same bytes for the same picture: no date, no random ids."""
-    metadata = {"Date": None} if target.suffix.lower() == ".svg" else {"Software": None}
+def save(figure: Figure, target: Path) -> None:
+    """The same bytes for the same picture: no date, no random ids.
+
+    Raises
+    ------
+    MisuseError : if the file cannot be written.
+    """
+    suffix = target.suffix.lower()
+    metadata = {"Date": None} if suffix == ".svg" else {"Software": None}
     try:
-        with matplotlib.rc_context({"svg.hashsalt": "contactverif"}):
-            figure.savefig(target, dpi=150, metadata=metadata)
+        with matplotlib.rc_context({"svg.hashsalt": "contactverif"}), whole(target) as part:
+            figure.savefig(part, format=suffix[1:], dpi=150, metadata=metadata)
     except OSError as error:
         raise MisuseError("path", f"{target}: {error.strerror}", "a file that can be written") from error

@@ -24,11 +24,27 @@ OFF_THE_RECORD = frozenset({"created", "command", "platform"})  # root attribute
 PARTS = ("pair", "tangent", "contact_points")
 
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"
+FORCE, STRESS = "N", "N m-1"  # forces are per unit of thickness
 PARAMETER_UNITS: Mapping[str, str] = {
     "penetration": LENGTH,
     "along": LENGTH,
     "direction": RATIO,
     "cosine": RATIO,
+    "approach": LENGTH,
+    "pressure": STRESS,
+    "compliance": "m2 N-1",
+    "bodies_nodes": LENGTH,
+    "bodies_cells": RATIO,
+    "bodies_contact": RATIO,
+    "bodies_fixed": RATIO,
+    "bodies_imposed": LENGTH,
+    "bodies_load": FORCE,
+    "bodies_count": RATIO,
+    "bodies_is_slave": RATIO,
+    "bodies_young": STRESS,
+    "bodies_poisson": RATIO,
+    "bodies_axis": RATIO,
+    "bodies_start": LENGTH,
 }
 
 VERDICTS: Mapping[str, int] = {str(verdict).replace(" ", "_"): int(verdict) for verdict in Verdict}

@@ -88,7 +88,7 @@ def rows(out: str) -> dict[tuple[str, str], list[str]]:
 def nts_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of NTS failing the patch test."""
     path = tmp_path_factory.mktemp("reports") / "nts.nc"
-    arguments = ["verify", "nts", "-p", "patch.*", "--seed", "1", "--examples", "20", "--report", path]
+    arguments = ["verify", "nts", "-p", "patch.flat.transmission", "--seed", "1", "--examples", "20", "--report", path]
     subprocess.run(command(*arguments), env=environment(), capture_output=True, check=True)
     return path
 
@@ -393,7 +393,7 @@ def test_lists_fit_the_terminal_and_lose_nothing(ask: Ask, columns: int) -> None
 def test_a_line_to_be_copied_is_never_folded(ask: Ask, tmp_path: Path) -> None:
     folder = tmp_path / "a folder with a name that is far too long for a line of a narrow terminal, as names are"
     folder.mkdir()
-    options = ("-p", "patch.*", "--examples", "5", "--seed", "1", "--report", folder / "r.nc")
+    options = ("-p", "patch.flat.transmission", "--examples", "5", "--seed", "1", "--report", folder / "r.nc")
     answer = ask("verify", "nts", *options, columns=80)
     assert f"    contactverif replay '{folder / 'r.nc'}' --case {CASE}\n" in answer.out
 
@@ -471,7 +471,7 @@ def test_replay_clears_another_formulation(ask: Ask, nts_report: Path) -> None:
 
 def test_verify_draws_each_counterexample_into_a_folder(ask: Ask, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "pictures"
-    options = ("-p", "patch.*", "--examples", "5", "--seed", "1", "--pictures", folder)
+    options = ("-p", "patch.flat.transmission", "--examples", "5", "--seed", "1", "--pictures", folder)
     answer = ask("verify", "nts", "vts-ppt", *options)
     assert answer.status == 0
     assert [path.name for path in folder.iterdir()] == [f"{CASE}.png"]
@@ -565,7 +565,7 @@ def test_a_stopped_run_says_so(running: subprocess.Popen[str], tmp_path: Path, n
 # ---------------------------------------------------------------------------------------------------------------------
 # Help
 
-PAGES = [[], ["list"], ["verify"], ["replay"]]
+PAGES = [[], ["list"], ["verify"], ["replay"], ["draw"], ["scenes"]]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: " ".join(page) or "contactverif")
@@ -575,7 +575,7 @@ def test_help_teaches_and_fits_the_terminal(ask: Ask, page: list[str]) -> None:
     assert max(map(len, answer.out.splitlines())) <= 80
     assert "\b" not in answer.out
     assert f"Usage: contactverif {' '.join(page)}".rstrip() in answer.out
-    if page in (["verify"], ["replay"]):
+    if page in (["verify"], ["replay"], ["draw"]):
         example = f"contactverif {page[0]}"
         examples = answer.out.partition("Examples\n" if "Examples\n" in answer.out else "Examples ")[2]
         lines = [line for line in examples.splitlines() if example in line]
@@ -584,8 +584,8 @@ def test_help_teaches_and_fits_the_terminal(ask: Ask, page: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", [line.strip() for name in ("verify", "replay") for line in (getattr(cli, name).__doc__ or "").splitlines()
-             if line.strip().startswith("contactverif ")],
+    "line", [line.strip() for name in ("verify", "replay", "draw", "scenes")
+             for line in (getattr(cli, name).__doc__ or "").splitlines() if line.strip().startswith("contactverif ")],
 )  # fmt: skip
 def test_the_examples_of_the_help_parse(ask: Ask, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each gets as far as to a file or a formulation that is not there, or runs."""

@@ -13,6 +13,8 @@ from contactverif import Pairing
 
 PATCH, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT = "balance.force", "balance.moment"
+SOLVE, VARIANTS = "patch.flat.solve", "patch.variants"
+ORDER, HISTORY = "newton.order", "newton.history"
 TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
 BALANCED = "vts_ppt_balanced"
 
@@ -137,7 +139,46 @@ def _symmetrises(penalty: float) -> Any:
     return Wrapped(penalty, tangent=tangent)
 
 
+def _says_of_its_points(penalty: float, pressure: Any) -> Any:
+    """Right forces, and another pressure said of the contact points."""
+
+    def contact_points(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        points = answer(interface, pairing, z)
+        return replace(points, pressure=pressure(points))
+
+    return Wrapped(penalty, contact_points=contact_points)
+
+
+def _keeps_its_first_tangent(penalty: float) -> Any:
+    """Modified Newton by accident: on one mesh, the matrix of the first iterate serves for all."""
+    kept: dict[str, Any] = {}
+
+    def tangent(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        if kept.get("interface") is not interface:
+            kept.update(interface=interface, tangent=answer(interface, pairing, z))
+        return kept["tangent"]
+
+    return Wrapped(penalty, tangent=tangent)
+
+
 MUTANTS = (
+    # Wrong only in shallow contact, as high penalties make it; few states of an interface alone are like that.
+    line("spring softened in shallow contact", SOLVE, "box3",
+         "f_v = penalty * g * l_ab * (c_p - c_q) / 2",
+         "f_v = penalty * g * l_ab * (c_p - c_q) / 2 * (1.0 if -g.real > 1e-4 * l_12.real else 0.9)"),
+    line("shares of the slave nodes equal in shallow contact", SOLVE, "box3",
+         "_push(r, node_a, (1 - c) / 2 * f_v, normal)",
+         "c = c if -g.real > 1e-4 * l_12.real else 0.0; _push(r, node_a, (1 - c) / 2 * f_v, normal)"),
+    Mutant("pressure said to be one percent less", SOLVE,
+           lambda *, penalty: _says_of_its_points(penalty, lambda points: 0.99 * points.pressure)),
+    Mutant("pressure from the vertical gap", VARIANTS,
+           lambda *, penalty: _says_of_its_points(penalty, lambda points: points.pressure * abs(points.normal[:, 1]))),
+    Mutant("tangent kept from the first iterate", ORDER, lambda *, penalty: _keeps_its_first_tangent(penalty)),
+    line("stress part of the tangent missing in shallow contact", ORDER, "box3",
+         "f_v = penalty * g * l_ab * share", "f_v = penalty * g * l_ab * share * (-g > 1e-3 * l_12)"),
+    line("tangent of a softer spring in shallow contact", HISTORY, "box3",
+         "d_f = penalty * share * (l_ab * d_g + g * d_l)",
+         "d_f = (1.0 if -g > 1e-3 * l_12 else 0.5) * penalty * share * (l_ab * d_g + g * d_l)"),
     line("force on a slave node off by 1e-6", FORCE, "box3",
          "_push(r, node_a, (1 - c) / 2 * f_v, normal)", "_push(r, node_a, (1 - c) / 2 * f_v * (1 + 1e-6), normal)"),
     line("slave and master forces of the printed algorithm", FORCE, "box3",
