@@ -35,6 +35,8 @@ class Body:
     axis : (2,) unit vector of the body's first axis; the second is a quarter turn counter-clockwise from it.
     start : (2,) displacement, in the body's axes, of all that is free in the first guess of a solution.
     name : for messages and drawings.
+    contact_nodes : (n_contact,) the numbers of the nodes on the contact boundary, ascending.
+    frame : (2, 2) the rotation from the body's axes to the global ones: its columns are the axes.
 
     Raises
     ------
@@ -52,6 +54,8 @@ class Body:
     axis: FloatArray = field(default_factory=lambda: np.array([1.0, 0.0]))
     start: FloatArray = field(default_factory=lambda: np.zeros(2))
     name: str = "body"
+    contact_nodes: IntArray = field(init=False)
+    frame: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         self._settle("nodes", np.float64, (-1, 2))
@@ -72,6 +76,9 @@ class Body:
                 self._refuse(name, f"node number {outlier}", f"numbers from 0 to {n_nodes - 1}")
         if not len(self.contact):
             self._refuse("contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)")
+        frame = [[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]]
+        object.__setattr__(self, "frame", frozen(frame, np.float64))
+        object.__setattr__(self, "contact_nodes", frozen(np.unique(self.contact), np.int64))
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
         for name, low, high, needed in (
@@ -95,16 +102,6 @@ class Body:
     def rigid(self) -> bool:
         """Whether there is nothing to deform."""
         return len(self.cells) == 0
-
-    @property
-    def frame(self) -> FloatArray:
-        """The rotation (2, 2) from the body's axes to the global ones: its columns are the axes."""
-        return np.array([[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]])
-
-    @property
-    def contact_nodes(self) -> IntArray:
-        """The numbers of the nodes on the contact boundary, ascending."""
-        return np.unique(self.contact)
 
     @property
     def oedometer(self) -> float:

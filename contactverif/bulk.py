@@ -1,7 +1,7 @@
 """What an elastic body does under load: stiffness, condensation onto its contact boundary, and recovery of the inside.
 
-scikit-fem gives meshes, shape functions, mappings and quadrature; the form of linear elasticity is contracted here in
-one go over all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene.
+scikit-fem gives meshes, shape functions and quadrature; the form of linear elasticity is contracted here in one go over
+all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene.
 The stiffness knows nothing of any contact formulation: its nodal forces judge them all.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ import skfem
 from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
+from skfem.quadrature import get_quadrature
 
 from contactverif.arrays import FloatArray, IntArray
 from contactverif.body import Body
@@ -75,8 +76,11 @@ def elasticity(body: Body) -> FloatArray:
     return np.array([[lame + 2 * shear, lame, 0], [lame, lame + 2 * shear, 0], [0, 0, shear]])
 
 
-def stiffness(body: Body) -> tuple[sparse.csr_array, FloatArray]:
-    """K (2 n_nodes, 2 n_nodes) in the body's axes, and the gradients of shape functions at the Gauss points."""
+def stiffness(body: Body) -> tuple[Any, FloatArray]:
+    """K (2 n_nodes, 2 n_nodes) in the body's axes, and the gradients of shape functions at the Gauss points.
+
+    K is an array where that is small, else a sparse one.
+    """
     gradients, areas = _shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
     n_cells, n_points, n_corners, _ = gradients.shape
     unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # strains of unit displacements
@@ -87,19 +91,28 @@ def stiffness(body: Body) -> tuple[sparse.csr_array, FloatArray]:
     unknowns = (2 * body.cells[:, :, None] + np.arange(2)).reshape(n_cells, -1)
     rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
     size = 2 * len(body.nodes)
+    if size <= DENSE:
+        places = (rows * size + columns).ravel()
+        return np.bincount(places, weights=blocks.ravel(), minlength=size * size).reshape(size, size), gradients
     return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), gradients
 
 
 def _shapes(body: Body) -> tuple[FloatArray, FloatArray]:
     """Gradients of the shape functions in the body's axes, and weights × areas, at the Gauss points of each cell."""
-    points, cells = body.nodes @ body.frame, body.cells
-    triangles = cells.shape[1] == 3
-    kind, element = (skfem.MeshTri, skfem.ElementTriP1()) if triangles else (skfem.MeshQuad, skfem.ElementQuad1())
-    mesh = kind(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T), sort_t=False, validate=False)
-    basis = skfem.Basis(mesh, element, intorder=1 if triangles else 2)
-    # skfem's axes are (component, cell, point), one array for each shape function
-    gradients = np.stack([np.asarray(shape[0].grad) for shape in basis.basis])
-    return np.ascontiguousarray(gradients.transpose(2, 3, 0, 1)), np.asarray(basis.dx)
+    reference, weights = _reference(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
+    corners = (body.nodes @ body.frame)[body.cells]  # (n_cells, n_corners, 2)
+    jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
+    areas = np.linalg.det(jacobians) * weights
+    return np.matmul(reference, np.linalg.inv(jacobians)), areas
+
+
+@cache
+def _reference(corners: int) -> tuple[FloatArray, FloatArray]:
+    """Gradients of the shape functions on scikit-fem's reference cell at its Gauss points, and their weights."""
+    element, order = (skfem.ElementTriP1(), 1) if corners == 3 else (skfem.ElementQuad1(), 2)
+    points, weights = get_quadrature(element.refdom, order)
+    gradients = np.stack([element.lbasis(points, corner)[1] for corner in range(corners)])  # (n_corners, 2, n_points)
+    return np.ascontiguousarray(gradients.transpose(2, 0, 1)), weights
 
 
 def free_on_contact(body: Body) -> IntArray:
@@ -127,8 +140,6 @@ def condense(body: Body) -> Condensed:
         return Condensed(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
     matrix, gradients = stiffness(body)
     forces = body.load.reshape(-1) - matrix @ imposed
-    if matrix.shape[0] <= DENSE:
-        matrix = matrix.toarray()
     across = matrix[interior][:, unknowns]
     solved = _solved(body, matrix[interior][:, interior], np.column_stack([_dense(across), forces[interior]]))
     influence, own = -solved[:, :-1], solved[:, -1]

@@ -25,7 +25,7 @@ ITERATIONS = 40
 ROUNDINGS = 4.0  # of a residual: how many units of roundoff of its largest terms count as zero
 STALLED = 4  # iterations without a smaller residual
 NEARLY = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
-GONE = 1e8  # times the first residual: it will not come back
+GONE = 1e8  # times the first residual, or the size of the interface: it will not come back
 
 PARTS = ("pair", "residual", "tangent", "solve")  # of the time
 
@@ -233,7 +233,10 @@ def solve(
 
 def _load_step(system: System, record: _Record, q: FloatArray, iterations: int) -> tuple[End, FloatArray]:
     first, before = len(record.q), None
+    size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
+        if not np.abs(q).max(initial=0.0) <= GONE * size:  # no plugin is asked about such a state
+            return End.DIVERGED, q
         pairing = system.pair(q)
         residual = system.residual(q, pairing)
         matrix, floor = system.matrix(q, pairing)

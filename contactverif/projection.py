@@ -53,7 +53,7 @@ def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
 
 @compiled
 def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
-    """Boxes (n_boxes, 4: low x, low y, high x, high y) of a binary tree over the segments in chain order.
+    """Boxes (n_boxes, 4: low x, low y, high x, high y) of a binary tree over the segments in a padded chain order.
 
     Box 1 holds all, box i is halved into 2i and 2i+1; the lower half of the list are leaves of `_LEAF` segments.
     """
@@ -64,6 +64,8 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
     boxes[:, :2] = np.inf
     boxes[:, 2:] = -np.inf
     for place in range(len(order)):
+        if order[place] < 0:  # padding
+            continue
         box = boxes[n_leaves + place // _LEAF]
         for end in range(2):
             for axis in range(2):
@@ -131,6 +133,8 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
         start = (box - n_leaves) * _LEAF
         for place in range(start, min(start + _LEAF, len(order))):
             segment = order[place]
+            if segment < 0:  # padding
+                continue
             distance, past = distance_to_segment(p, node(x, segments[segment, 0]), node(x, segments[segment, 1]))
             nearer = distance < best_distance or (
                 distance == best_distance and (past < best_past or (past == best_past and segment < best))
@@ -142,7 +146,28 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
 
 def search_tree(surface: Surface, x: FloatArray) -> Tree:
     """What `nearest_segment` needs to search a surface at the positions x (n_nodes, 2): O(n)."""
-    return surface.chain_order, _box_tree(x, surface.segments, surface.chain_order)
+    order = _padded(surface)
+    return order, _box_tree(x, surface.segments, order)
+
+
+def _padded(surface: Surface) -> IntArray:
+    """The chain order with −1 between chains, so that each chain has a subtree of its own.
+
+    So a chain far away costs a search a look at its box: the subtree of the near one is what it would be alone.
+    """
+    order = surface.chain_order
+    begins = np.flatnonzero(surface.neighbours[order[:-1], 1] != order[1:]) + 1
+    if not len(begins):
+        return order
+    padded = np.full(0, -1, dtype=np.int64)
+    for chain in np.split(order, begins):
+        width = _LEAF
+        while width < len(chain):
+            width *= 2
+        start = -(-len(padded) // width) * width
+        padded = np.concatenate([padded, np.full(start + width - len(padded), -1)])
+        padded[start : start + len(chain)] = chain
+    return padded
 
 
 @compiled

@@ -64,6 +64,7 @@ class Measurement:
     undecided : empty, or why a failure would not be the formulation's fault (roundoff, a kink).
     broken : empty, or a breach that no number tells, in words.
     details : further numbers worth keeping, {name: number}.
+    series : numbers by iterate, {name: (n_iterates,)}; those that the property declares.
     idle : nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
     """
 
@@ -72,6 +73,7 @@ class Measurement:
     undecided: str = ""
     broken: str = ""
     details: Mapping[str, float] = field(default_factory=dict)
+    series: Mapping[str, FloatArray] = field(default_factory=dict)
     idle: bool = False
 
 
@@ -91,6 +93,7 @@ class Property:
     needs : parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
     promise : what the traits say: True passes, False does not (with a witness), None nothing.
     applicable : empty, or why the question makes no sense for these traits.
+    series : {name: unit} of the numbers by iterate that it keeps of each case.
     bodies : the cases are scenes, solved; else they are states of an interface alone.
     exact : where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for pictures.
     """
@@ -104,6 +107,7 @@ class Property:
     promise: Callable[[Traits], bool | None]
     needs: frozenset[str] = frozenset()
     applicable: Callable[[Traits], str] = lambda traits: ""
+    series: Mapping[str, str] = field(default_factory=dict)
     bodies: bool = False
     exact: Callable[[Case], FloatArray] | None = None
 

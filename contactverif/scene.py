@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import linalg, sparse
 
-from contactverif.arrays import FloatArray, IntArray
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.body import Body
 from contactverif.bulk import DENSE, KEPT, Condensed, condense, free_on_contact, loose_modes
 from contactverif.case import Case
@@ -142,10 +142,12 @@ class Scene:
                 values.append(body.frame[direction, components])
             first += len(body.contact_nodes)
         shape = (self.interface.n_unknowns, self.n_free)
-        matrix = sparse.csr_array(
-            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
-        )
-        return matrix.toarray() if self.n_free <= DENSE else matrix
+        places = np.concatenate(rows), np.concatenate(columns)
+        if self.n_free <= DENSE:
+            matrix = np.zeros(shape)
+            matrix[places] = np.concatenate(values)
+            return matrix
+        return sparse.csr_array((np.concatenate(values), places), shape=shape)
 
     @cached_property
     def moved(self) -> FloatArray:
@@ -215,8 +217,10 @@ def scene_of(case: Case) -> Scene:
     """
     if not has_bodies(case):
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")
-    packed = {name.removeprefix(_BODIES): values for name, values in case.parameters.items() if _BODIES in name}
-    facts = {name: values for name, values in case.parameters.items() if _BODIES not in name}
+    packed = {
+        name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
+    }
+    facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
     bodies, slave, master = _unpacked(packed)
     return Scene(bodies, slave, master, case.penalty, facts, case.name)
 
@@ -234,11 +238,11 @@ def _alone(condensed: Condensed, factor: float) -> FloatArray:
     """The unknowns of a body that touches nothing."""
     if not len(condensed.unknowns):
         return np.zeros(0)
-    try:
-        alone: FloatArray = linalg.solve(condensed.stiffness, factor * condensed.load, assume_a="pos")
-    except (linalg.LinAlgError, linalg.LinAlgWarning):
+    stiffnesses, modes = linalg.eigh(condensed.stiffness)
+    if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
         found = "not enough to hold a body that can touch nothing"
-        raise MisuseError(f"supports of {condensed.body.name}", found, "supports against every motion") from None
+        raise MisuseError(f"supports of {condensed.body.name}", found, "supports against every motion")
+    alone: FloatArray = modes @ (modes.T @ (factor * condensed.load) / stiffnesses)
     return alone
 
 

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from contactverif.formulation import Traits
+from contactverif.newton import End
 from contactverif.property import Measurement, Outcome, Property, Verdict, excess
 from contactverif.result import NotLoaded, Row, Run
 from contactverif.subject import OPTIONAL_PARTS, Subject
@@ -27,6 +28,7 @@ _STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", V
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _PIPE_WIDTH = 140  # columns where no terminal says how many there are
 _COLUMNS = ("property", "promise", "verdict", "judged", "worst", "tolerance")
+_FEW = 3  # quantities that are written with their formulas
 _NUMBERS = _COLUMNS[3:]  # at the right end of their columns
 
 
@@ -236,10 +238,27 @@ def _numbers(question: Property, outcome: Outcome) -> list[str]:
     if measured is None:
         return [outcome.reason]
     lines = [measured.broken] if measured.broken else []
-    for quantity in question.quantities:
-        if quantity.name not in measured.values:
-            continue
+    told = [quantity for quantity in question.quantities if quantity.name in measured.values]
+    apart = len(told) > _FEW  # then a formula that several share is written once, below
+    for quantity in told:
         value, tolerance = measured.values[quantity.name], measured.tolerances[quantity.name]
         mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
-        lines.append(f"{mark} {quantity.name} {value:.3g}, {quantity.sense} {tolerance:.3g} = {quantity.tolerance}")
+        formula = "" if apart else f" = {quantity.tolerance}"
+        lines.append(f"{mark} {quantity.name} {value:.3g}, {quantity.sense} {tolerance:.3g}{formula}")
+    if apart:
+        formulas: dict[str, list[str]] = {}
+        for quantity in told:
+            formulas.setdefault(quantity.tolerance, []).append(quantity.name)
+        most = max(formulas, key=lambda formula: len(formulas[formula]))
+        lines.append(f"tolerance: {most}")
+        lines += [f"of {', '.join(names)}: {formula}" for formula, names in formulas.items() if formula != most]
+    if measured.details:
+        lines.append("; ".join(_detail(name, value) for name, value in measured.details.items()))
     return lines
+
+
+def _detail(name: str, value: float) -> str:
+    """A further number; how Newton ended, in words."""
+    what, _, of = name.partition(", ")
+    words = End(int(value)).words if what == "end" and value in list(End) else f"{value:.3g}"
+    return f"{what} {words}{f' ({of})' if of else ''}"

@@ -113,6 +113,15 @@ def test_examples_in_python_run(
     assert 0 < float(printed.rpartition(":")[2]) <= 1
 
 
+def test_the_example_of_a_scene_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    title = "## Bodies: the patch test solved, Newton's order, pictures"
+    (example,) = blocks("python", section(title))
+    exec(compile(example, "README.md", "exec"), {})
+    words, rate = capsys.readouterr().out.split(" after ")
+    assert words == "converged"
+    assert 0.11 < float(rate.split()[-1]) < 0.14
+
+
 def test_what_it_points_to_is_there() -> None:
     told = [*re.findall(r"\]\(([^)#]+)\)", README), *re.findall(r"`((?:[\w.-]+/)+[\w-]+\.\w+)`", README)]
     missing = [path for path in told if not path.startswith((".venv", "http")) and not (ROOT / path).exists()]

@@ -11,7 +11,7 @@ from scipy import linalg
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Pairing
-from contactverif.newton import System, Trace, solve
+from contactverif.newton import NEARLY, End, System, Trace, solve
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import scene_of
 from contactverif.strategies import solid_cases
@@ -26,6 +26,7 @@ RISING = 0.02  # of the slope between neighbours: it has not settled yet
 LINEAR, QUADRATIC = 1.1, 1.9
 NEAR = 1e-4  # of the first residual: from there on the order shows
 WANDERS = 10  # iterations of one pairing in which Newton's method with an exact tangent ends, or never will
+SERIES = {"residual": "N", "energy norm": "N m", "changes of the pairing": "1", "reciprocal condition": "1"}
 
 ORDER = Quantity(
     "order of one step",
@@ -149,11 +150,13 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
     """
     system = System(scene_of(case), subject.on(case))
     trace = solve(system.scene, system.formulation)
-    details = ended(trace)
+    details, series = ended(trace), history(trace)
     last = len(trace.residuals) - 1
     settled = int(np.flatnonzero(trace.changes > 0)[-1]) if (trace.changes > 0).any() else 0
-    if not trace.converged and last - settled < WANDERS:
-        return Measurement({}, {}, details=details, undecided=f"the pairing does not settle: {trace.end.words}")
+    solved = trace.end in (End.CONVERGED, End.STAGNATED)  # the second is as near as roundoff lets it come
+    if not solved and last - settled < WANDERS:
+        why = f"the pairing does not settle: {trace.end.words}"
+        return Measurement({}, {}, details=details, series=series, undecided=why)
     near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
     near = near[near >= settled]
     begin = int(near[0]) if len(near) else settled
@@ -161,9 +164,17 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
         max(r / trace.residuals[0], np.finfo(float).tiny) for r in (trace.residuals[begin], trace.floors[-1])
     )
     allowed = ceil(log2(max(log(ends) / log(min(begins, NEAR)), 1.0))) + 3
-    details["finite"] = float(trace.converged and last - begin <= 1)
-    taken = float(last - begin) if trace.converged else inf
-    return Measurement({TAIL.name: taken}, {TAIL.name: float(allowed)}, details=details, idle=untouched(system, trace))
+    arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NEARLY))
+    taken = float(max(arrived[0] - begin, 0)) if solved else inf
+    details["finite"] = float(taken <= 1)
+    idle = untouched(system, trace)
+    return Measurement({TAIL.name: taken}, {TAIL.name: float(allowed)}, details=details, series=series, idle=idle)
+
+
+def history(trace: Trace) -> dict[str, FloatArray]:
+    """The whole trajectory, by iterate."""
+    columns = (trace.residuals, trace.energies, trace.changes.astype(np.float64), trace.conditions)
+    return dict(zip(SERIES, columns, strict=True))
 
 
 def untouched(system: System, trace: Trace) -> bool:
@@ -217,6 +228,7 @@ NEWTON_HISTORY = Property(
     quantities=(TAIL,),
     cases=solid_cases,
     measure=trajectory,
+    series=SERIES,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
     applicable=springs_only,

@@ -30,6 +30,7 @@ PARAMETER_UNITS: Mapping[str, str] = {
     "along": LENGTH,
     "direction": RATIO,
     "cosine": RATIO,
+    "variant": RATIO,
     "approach": LENGTH,
     "pressure": STRESS,
     "compliance": "m2 N-1",

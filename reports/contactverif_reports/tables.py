@@ -46,6 +46,7 @@ def property_group(question: Property, rows: Mapping[str, Row], formulations: Se
     measured = [_padded([outcome.measurement for outcome in row], longest, None) for row in outcomes]
     table |= quantity_values(question.quantities, measured, _EACH)
     table |= detail_values(measured, _EACH)
+    table |= _series(question, outcomes, longest)
     table |= _witnesses(question, witnesses)
     attributes = {
         "property_id": question.id,
@@ -115,6 +116,24 @@ def detail_values(measured: Any, dims: Sequence[str]) -> Table:
             fill=np.nan,
         ),
     }
+
+
+def _series(question: Property, outcomes: Sequence[Sequence[Outcome]], longest: int) -> Table:
+    """Numbers by iterate along `_EACH` + `iterate`, NaN behind the last; nothing where the property keeps none."""
+    kept = [outcome.measurement.series for outcome in _all(outcomes) if outcome.measurement is not None]
+    n_iterates = max((len(values) for series in kept for values in series.values()), default=0)
+    table: Table = {}
+    for name, unit in question.series.items() if n_iterates else ():
+        spread = np.full((len(outcomes), longest, n_iterates), np.nan)
+        for formulation, row in enumerate(outcomes):
+            for case, outcome in enumerate(row):
+                values = outcome.measurement.series.get(name, ()) if outcome.measurement is not None else ()
+                spread[formulation, case, : len(values)] = values
+        long_name, comment = f"{schema.text(name)} at each iterate", "NaN: no such iterate, or nothing to say there"
+        table[f"series_{schema.typeable(name)}"] = numbers(
+            [*_EACH, "iterate"], spread, long_name, unit, comment, fill=np.nan
+        )
+    return table
 
 
 def _descriptors(outcomes: Sequence[Sequence[Outcome]], longest: int) -> Table:
