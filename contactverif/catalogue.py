@@ -220,6 +220,8 @@ def _refused(option: str, value: Any) -> str:
         number = float(value)
     except OverflowError:  # a whole number that no float can hold
         number = inf
+    if option == "poisson":
+        return "" if -1 < number < 0.5 else "Poisson's ratio above −1 and below 0.5"
     if option in _ABOVE_ZERO:
         return "" if 0 < number < inf else "a number > 0"
     return "" if isfinite(number) else "a finite number"

@@ -11,13 +11,13 @@ from datetime import UTC, datetime
 from importlib import metadata
 from urllib.parse import unquote, urlparse
 
-PACKAGES = ("contactverif", "numpy", "scipy", "hypothesis", "numba", "xarray")
+PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 
 
 def provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
     """Versions, commit, machine, time and command, with what the run was asked for."""
     return {
-        **{f"{package}_version": _version(package) for package in PACKAGES},
+        **{f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES},
         "python_version": platform.python_version(),
         "commit": _commit(),
         "profile": profile,

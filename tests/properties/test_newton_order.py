@@ -1,0 +1,150 @@
+"""Newton's order: what the slope is taken from, and what a scene tells of a tangent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import inf, isnan
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactverif_nts
+from contactverif.arrays import FloatArray
+from contactverif.newton import End, System, solve
+from contactverif.property import Verdict
+from contactverif.registry import load_formulation
+from contactverif.runner import judge_case
+from contactverif.scene import scene_of
+from contactverif.strategies import named_scene
+from contactverif.subject import Subject
+from contactverif_properties.newton import (
+    DISTANCES,
+    NEWTON_HISTORY,
+    NEWTON_ORDER,
+    SERIES,
+    one_step,
+    order,
+    spectral_radius,
+    trajectory,
+)
+
+DISTANT = np.array(DISTANCES)
+
+
+@cache
+def the(name: str) -> Subject:
+    found = load_formulation(name)
+    assert isinstance(found, Subject), found
+    return found
+
+
+@pytest.mark.parametrize(
+    ("after", "slope", "rate"),
+    [
+        (DISTANT**2, 2.0, None),
+        (0.3 * DISTANT, 1.0, 0.3),
+        (DISTANT**1.5, 1.5, None),
+        (DISTANT**3 + 0.1 * DISTANT**2, 2.0, None),
+        (1e-3 * DISTANT + DISTANT**2, 1.0, None),  # linear only close by
+        (0 * DISTANT + 1e-20, inf, 0.0),
+    ],
+)
+def test_the_slope_of_a_known_law(after: FloatArray, slope: float, rate: float | None) -> None:
+    found, found_rate = order(DISTANT, after, 1e-14)
+    assert found == (slope if slope == inf else pytest.approx(slope, abs=0.1 if slope == 1.0 else 0.02))
+    if rate is not None:
+        assert found_rate == pytest.approx(rate)
+
+
+def test_a_slope_that_still_rises_decides_nothing() -> None:
+    after = np.abs(DISTANT**2 - 30 * DISTANT**3)  # two contributions of opposite sign
+    told = [order(DISTANT, after, floor)[0] for floor in (1e-5, 3e-6, 1e-6)]
+    assert all(isnan(slope) or slope >= 1.9 for slope in told), told
+
+
+def test_too_few_distances_decide_nothing() -> None:
+    assert isnan(order(DISTANT[:2], DISTANT[:2] ** 2, 0.0)[0])
+    assert isnan(order(DISTANT[:0], DISTANT[:0], 0.0)[0])
+    assert isnan(order(DISTANT, DISTANT**2, 0.5 * DISTANT[1] ** 2)[0])
+
+
+def test_noise_at_short_distances_is_not_taken_for_a_law() -> None:
+    noisy = np.maximum(DISTANT**2, 1e-8)
+    assert order(DISTANT, noisy, 3e-8)[0] == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("scene", "low", "high"), [("c:penalty=1e4,lowered=0", 0.12, 0.14), ("c:penalty=1e3,lowered=0", 0.025, 0.035)]
+)
+def test_the_rate_of_the_basic_version_is_the_spectral_radius(scene: str, low: float, high: float) -> None:
+    """Fig. 30: 0.12 to 0.14 at ε̂/E = 1, and 0.03 at 0.1."""
+    case = named_scene(scene)
+    trace = solve(scene_of(case), the("vts-ppt-basic").on(case))
+    system = System(scene_of(case), the("vts-ppt-basic").on(case))
+    radius = spectral_radius(system, trace.solution, system.pair(trace.solution))
+    assert low - 1e-3 < radius < high
+    tail = trace.residuals[4:-1]
+    assert tail[1:] / tail[:-1] == pytest.approx(radius, rel=0.1)
+
+
+def test_the_exact_tangent_leaves_no_radius() -> None:
+    case = named_scene("c-prime:penalty=1e4,sides=free,ratio=0.5,lowered=0")
+    trace = solve(scene_of(case), the("vts-ppt").on(case))
+    system = System(scene_of(case), the("vts-ppt").on(case))
+    assert trace.end is End.CONVERGED
+    assert spectral_radius(system, trace.solution, system.pair(trace.solution)) < 1e-7
+
+
+def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
+    case = named_scene("example-1bis")
+    exact, basic = (one_step(case, the(name)) for name in ("vts-ppt", "vts-ppt-basic"))
+    assert exact.values["order of one step"] >= 1.9
+    assert basic.values["order of one step"] == pytest.approx(1.0, abs=0.1)
+    # in the largest norm a rate may exceed the radius, which is that of many steps
+    assert 0.1 * basic.details["spectral radius"] < basic.details["rate"] < 10 * basic.details["spectral radius"]
+
+
+def test_a_solution_that_is_not_found_is_undecided() -> None:
+    case = named_scene("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
+    outcome = judge_case(NEWTON_ORDER, case, the("vts-me"))
+    assert outcome.verdict is Verdict.UNDECIDED
+    assert "2-cycle" in outcome.reason
+    assert judge_case(NEWTON_HISTORY, case, the("vts-me")).verdict is Verdict.UNDECIDED
+
+
+def test_the_whole_trajectory_is_kept() -> None:
+    case = named_scene("example-1bis:pressure=100,lowered=0")
+    found = trajectory(case, the("vts-ppt-basic"))
+    trace = solve(scene_of(case), the("vts-ppt-basic").on(case))
+    assert found.series.keys() == SERIES.keys()
+    assert np.array_equal(found.series["residual"], trace.residuals)
+    assert np.array_equal(found.series["energy norm"], trace.energies, equal_nan=True)
+    assert found.values["iterations at the end"] > found.tolerances["iterations at the end"]
+
+
+def test_a_piecewise_linear_problem_is_finite() -> None:
+    found = trajectory(named_scene("c-prime"), the("vts-ppt"))
+    assert found.details["finite"] == 1
+    assert found.values["iterations at the end"] <= 1
+
+
+def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
+    case = named_scene("example-1bis:pressure=300,penalty=1e4")
+
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_nts.vts_ppt(penalty=penalty)
+
+        class Unpaired:
+            traits = replace(the("vts-ppt").traits, batched=False, takes_complex=False)
+
+            def residual(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
+                return inner.residual(interface, inner.pair(interface, z), z)
+
+            def tangent(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
+                return inner.tangent(interface, inner.pair(interface, z), z)
+
+        return Unpaired()
+
+    assert judge_case(NEWTON_ORDER, case, Subject("unpaired", make)).verdict is Verdict.PASS

@@ -1,0 +1,163 @@
+"""The patch test solved: what is exact, what is measured, and that neither a lock nor a bad tangent misleads it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactverif_nts
+from contactverif.blocks import pressure_of, two_blocks
+from contactverif.case import Case
+from contactverif.newton import End, solve
+from contactverif.property import Property, Verdict, judge
+from contactverif.registry import load_formulation
+from contactverif.runner import judge_case, run
+from contactverif.scene import scene_of
+from contactverif.strategies import VARIANTS as NAMES_OF_VARIANTS
+from contactverif.strategies import named_scene, variant_cases
+from contactverif.subject import Subject
+from contactverif_properties.solved import FLAT_SOLVE, HIGH, SLOPE, VARIANTS, at_penalty, solved
+
+
+@cache
+def the(name: str) -> Subject:
+    found = load_formulation(name)
+    assert isinstance(found, Subject), found
+    return found
+
+
+def textbook() -> Case:
+    """The two blocks of which verification.md prints the pressure."""
+    scene = two_blocks(
+        [0, 1, 3, 4],
+        [0, 2, 6],
+        [0, 1.5, 2, 4],
+        [-4, -1, 0],
+        young=(1, 3),
+        poisson=(0.3, 0.2),
+        penalty=10,
+        approach=0.1,
+    )
+    return scene.case()
+
+
+def test_the_pressure_is_that_of_springs_in_series() -> None:
+    assert pressure_of(textbook(), 10.0) == pytest.approx(0.017369727047, abs=5e-13)
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced"])
+def test_the_recovered_stress_is_that_pressure(name: str) -> None:
+    case = textbook()
+    scene = scene_of(case)
+    stresses = scene.stresses(solve(scene, the(name).on(case)).solution)
+    for body in stresses:
+        assert np.abs(-body[..., 1] - 0.017369727047).max() <= 1e-12
+
+
+def test_nts_on_a1_passes_as_the_penalty_grows_because_it_locks() -> None:
+    found = solved(named_scene("a1"), the("nts"))
+    assert found.details[SLOPE] == pytest.approx(-1, abs=0.05)
+    assert judge(FLAT_SOLVE, found)[0] is Verdict.FAIL
+
+
+def test_nts_ar_on_c_fails_at_any_penalty() -> None:
+    found = solved(named_scene("c-prime"), the("nts-ar"))
+    assert found.details[SLOPE] > -0.5
+    assert found.values["stress, high penalty"] > 1e-2
+
+
+def test_a_tangent_that_does_not_lead_there_is_no_reason_to_accuse() -> None:
+    case, basic = textbook(), the("vts-ppt-basic")
+    for penalty in (case.penalty, HIGH * case.penalty):
+        assert solve(scene_of(case), basic.with_penalty(penalty)).end is not End.CONVERGED
+    outcome = judge_case(FLAT_SOLVE, case, basic)
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+class Turned:
+    """A formulation in which one verb is something else."""
+
+    def __init__(self, inner: Any, **verbs: Any) -> None:
+        self.inner = inner
+        self.__dict__ |= verbs
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+
+def test_who_is_out_of_balance_at_the_exact_solution_is_not_judged_there() -> None:
+    """VTS-ME with a tangent that leads nowhere: the exact solution is where it starts, and not where it is judged."""
+
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_nts.vts_me(penalty=penalty)
+        return Turned(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
+
+    lost = Subject("lost", make)
+    found = at_penalty(named_scene("c-prime"), lost, named_scene("c-prime").penalty)
+    assert found.details["end"] != End.CONVERGED
+    assert judge(VARIANTS, found)[0] is Verdict.FAIL
+    assert found.values["master forces"] > 1e6 * found.tolerances["master forces"]
+
+
+@pytest.mark.parametrize("scene", ["a2-graded", "b:degrees=45", "example-1bis", "c-prime:ratio=1e-3", "c:ratio=1e6"])
+def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_nts.vts_ppt(penalty=penalty)
+
+        def contact_points(*given: Any) -> Any:
+            points = inner.contact_points(*given)
+            return replace(points, pressure=points.pressure * (1 + 1e-3))
+
+        return Turned(inner, contact_points=contact_points)
+
+    found = solved(named_scene(scene), Subject("boaster", make))
+    wrong = {name for name, value in found.values.items() if value > found.tolerances[name]}
+    assert wrong == {"pressure", "pressure, high penalty"}
+
+
+def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
+    assert variant_cases(named_scene("c:sides=free")) is None
+    found = run([the("vts-ppt")], [FLAT_SOLVE], scene=named_scene("c:sides=free"))
+    assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
+
+
+def test_every_variant_is_drawn() -> None:
+    from contactverif.generate import draw_cases
+
+    strategy = variant_cases()
+    assert strategy is not None
+    drawn = draw_cases(strategy, seed="1", examples=60).cases
+    seen = {int(case.parameter("variant")) for case in drawn}
+    assert seen == set(range(len(NAMES_OF_VARIANTS)))
+    assert any(scene_of(case).bodies[1].rigid for case in drawn)
+
+
+@pytest.mark.parametrize("question", [FLAT_SOLVE, VARIANTS])
+def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
+    (row,) = run([the("vts-me")], [question], scene=named_scene("b")).rows
+    assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)
+    (row,) = run([the("vts-me")], [question], scene=named_scene("c")).rows
+    assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
+
+
+def test_a_scaled_scene_is_judged_the_same() -> None:
+    """Lengths × 2^40, stiffness × 2^-30: every number without dimension keeps its bits but for roundoff."""
+    values = []
+    for length, modulus in ((1.0, 1.0), (2.0**40, 2.0**-30)):
+        scene = two_blocks(
+            np.array([0, 1, 3, 4]) * length,
+            np.array([0, 2, 6]) * length,
+            np.array([0, 1.5, 2, 4]) * length,
+            np.array([-4, -1, 0]) * length,
+            young=(modulus, 3 * modulus),
+            poisson=(0.3, 0.2),
+            penalty=10 * modulus / length,
+            approach=0.1 * length,
+        )
+        found = at_penalty(scene.case(), the("nts-ar"), scene.penalty)
+        values.append([*found.values.values(), *found.tolerances.values()])
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
