@@ -76,7 +76,9 @@ def test_every_formulation_is_in_the_table() -> None:
     assert set(formulation_names()) <= set(FAILS)
 
 
-@pytest.mark.parametrize("property_id", property_ids())
+@pytest.mark.parametrize(
+    "property_id", [pytest.param(one, marks=pytest.mark.xdist_group(one)) for one in property_ids()]
+)
 @pytest.mark.parametrize("name", FAILS)
 def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> None:
     row = asked(name, property_id)
