@@ -158,11 +158,12 @@ class System:
             tangent = tangent.toarray() if sparse.issparse(tangent) else tangent
         else:
             tangent = sparse.csr_array(tangent)
-        matrix = scene.stiffness + spread.T @ tangent @ spread
+        contact = spread.T @ tangent @ spread
+        matrix = scene.stiffness + contact
         bulk = abs(scene.stiffness) @ np.abs(q) + self.factor * np.abs(scene.load)
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
-        contact = abs(spread).T @ abs(tangent).sum(axis=1) * np.abs(z).max(initial=0.0)
-        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + contact)
+        springs = np.asarray(abs(contact).sum(axis=1)).reshape(-1) * np.abs(z).max(initial=0.0)
+        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + springs)
         self.seconds["tangent"] += perf_counter() - start
         return matrix, floor
 

@@ -122,7 +122,7 @@ def _tilted(draw: DrawFn) -> Case:
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
     strain, motion, seed = draw(st.integers(5, 8).map(lambda e: 2.0**-e)), draw(motions(furthest=16)), draw(seeds())
     tilt, sevenths = draw(st.integers(1, 6)), draw(st.integers(1, 6))
-    stiff = draw(st.sampled_from([1.0, 10.0, 0.125, 64.0]))  # ε̂ h over the softer body's E
+    stiff = draw(st.sampled_from([1.0, 10.0, 0.125, 64.0]))
     x = _grid(slave)
     # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
     moved = x + sevenths / 7 + np.resize([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4
@@ -161,7 +161,7 @@ def _case(
         master_y - master_y[-1],
         young=young,
         poisson=poisson,
-        penalty=stiff * (min(young) if tilt else young[0]) / segment,
+        penalty=stiff * (young[0] if rigid_master else min(young)) / segment,
         pressure=pressure,
         approach=approach,
         tilt=tilt * (approach or 0.0),

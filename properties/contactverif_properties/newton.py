@@ -11,7 +11,7 @@ from scipy import linalg
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Pairing
-from contactverif.newton import NEARLY, End, System, Trace, solve
+from contactverif.newton import End, System, Trace, solve
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import scene_of
 from contactverif.strategies import solid_cases
@@ -23,8 +23,11 @@ DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # 3e-2 … 1e-5
 DIRECTIONS = 2
 AT_LEAST = 3  # distances that a slope is taken from, the nearest ones
 RISING = 0.02  # of the slope between neighbours: it has not settled yet
+EXACT = 1e-2  # of the shortest distance: with a floor no higher, an error below it is no linear convergence
 LINEAR, QUADRATIC = 1.1, 1.9
 NEAR = 1e-4  # of the first residual: from there on the order shows
+NOISE = 32.0  # roundoffs above convergence that count as converged where nothing lower is reached
+SHORT = 3  # iterations of a whole solution that nobody need explain
 WANDERS = 10  # iterations of one pairing in which Newton's method with an exact tangent ends, or never will
 SERIES = {"residual": "N", "energy norm": "N m", "changes of the pairing": "1", "reciprocal condition": "1"}
 
@@ -66,14 +69,33 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     solution = trace.solution
     pairing = system.pair(solution)
     matrix, _ = system.matrix(solution, pairing)
-    step, condition = system.step(matrix, np.zeros(scene.n_free))
-    if step is None:
-        return Measurement({}, {}, details=ended(trace), undecided="the matrix has no inverse at the solution")
-    z = scene.positions(solution)
+    _, condition = system.step(matrix, np.zeros(scene.n_free))
+    details = ended(trace)
+    if condition <= scene.n_free * UNIT_ROUNDOFF:
+        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+    least, details["rate"], details["steps"] = _steps(system, case, solution, pairing, condition)
+    if np.isnan(least):
+        return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
+    undecided = ""
+    if least < QUADRATIC:
+        details["spectral radius"] = spectral_radius(system, solution, pairing)
+        smooth, _, _ = _steps(replace(system, own_tangent=False), case, solution, pairing, condition)
+        if not smooth >= QUADRATIC:
+            undecided = "a kink: with the derivative by differences, Newton's order is no better"
+    idle = untouched(system, trace)
+    if least == inf:  # a linear problem
+        return Measurement({}, {}, details=details, idle=idle)
+    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details, undecided=undecided, idle=idle)
+
+
+def _steps(
+    system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float
+) -> tuple[float, float, float]:
+    """The lower order of the directions (NaN if none decides), the higher rate, and how many steps were looked at."""
+    scene, length = system.scene, case.shortest_segment
     floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution).max() + np.abs(scene.moved).max())
-    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(z).max()))
-    length = case.shortest_segment
-    slopes, rates, looked = [], [], 0
+    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution)).max()))
+    found, looked = [], 0
     for direction in _directions(case.seed, scene.n_free):
         before, after = [], []
         for distance in DISTANCES:
@@ -83,23 +105,11 @@ def one_step(case: Case, subject: Subject) -> Measurement:
             matrix, _ = system.matrix(u, pairing)
             step, _ = system.step(matrix, -system.residual(u, pairing))
             looked += 1
-            error = inf if step is None else float(np.abs(u + step - solution).max())
             before.append(distance * length)
-            after.append(error)
-        slope, rate = order(np.array(before), np.array(after), floor)
-        slopes.append(slope)
-        rates.append(rate)
-    details = {**ended(trace), "steps": float(looked)}
-    told = [slope for slope in slopes if not np.isnan(slope)]
-    if not told:
-        return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
-    least = min(told)
-    if least < QUADRATIC:
-        details["rate"] = max(rate for rate in rates if not np.isnan(rate))
-        details["spectral radius"] = spectral_radius(system, solution, pairing)
-    if least == inf:
-        return Measurement({}, {}, details=details, idle=True)
-    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details, idle=untouched(system, trace))
+            after.append(inf if step is None else float(np.abs(u + step - solution).max()))
+        found.append(order(np.array(before), np.array(after), floor))
+    told = [(slope, rate) for slope, rate in found if not np.isnan(slope)] or [(np.nan, np.nan)]
+    return min(slope for slope, _ in told), max(rate for _, rate in told), float(looked)
 
 
 def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
@@ -111,8 +121,8 @@ def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, f
     if not len(before):
         return np.nan, np.nan
     told = after > floor
-    if not told.any():
-        return inf, 0.0
+    if not told.any():  # exact, unless roundoff would hide as much as a linear rate
+        return (inf, 0.0) if floor <= EXACT * before.min() else (np.nan, np.nan)
     # once at the floor, always: what rises again at a shorter distance is noise
     last = int(np.argmin(told)) if not told.all() else len(told)
     before, after = before[:last][-AT_LEAST:], after[:last][-AT_LEAST:]
@@ -153,9 +163,15 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
     details, series = ended(trace), history(trace)
     last = len(trace.residuals) - 1
     settled = int(np.flatnonzero(trace.changes > 0)[-1]) if (trace.changes > 0).any() else 0
-    solved = trace.end in (End.CONVERGED, End.STAGNATED)  # the second is as near as roundoff lets it come
-    if not solved and last - settled < WANDERS:
+    solved = trace.converged or (trace.end is End.STAGNATED and trace.roundings.min() <= NOISE)
+    why = ""
+    if (solved and settled == last > SHORT) or (not solved and last - settled < WANDERS):
         why = f"the pairing does not settle: {trace.end.words}"
+    elif not solved and trace.changes.max() < 0:
+        why = f"there is no pairing that could tell whether a kink is in the way: {trace.end.words}"
+    elif not solved and trace.end is End.STAGNATED:
+        why = "the residual has a noise that roundoff does not explain"
+    if why:
         return Measurement({}, {}, details=details, series=series, undecided=why)
     near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
     near = near[near >= settled]
@@ -164,7 +180,7 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
         max(r / trace.residuals[0], np.finfo(float).tiny) for r in (trace.residuals[begin], trace.floors[-1])
     )
     allowed = ceil(log2(max(log(ends) / log(min(begins, NEAR)), 1.0))) + 3
-    arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NEARLY))
+    arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NOISE))
     taken = float(max(arrived[0] - begin, 0)) if solved else inf
     details["finite"] = float(taken <= 1)
     idle = untouched(system, trace)

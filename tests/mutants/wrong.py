@@ -161,7 +161,22 @@ def _keeps_its_first_tangent(penalty: float) -> Any:
     return Wrapped(penalty, tangent=tangent)
 
 
+def _pushes_what_a_roller_takes(penalty: float) -> Any:
+    """A couple of forces along the interface at the ends of the slave: right in sum, and in all that bodies see."""
+
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.array(answer(interface, pairing, z)).reshape(*z.shape[:-1], -1, 2)
+        first, last = interface.slave.segments[0, 0], interface.slave.segments[-1, 1]
+        along = (z.reshape(forces.shape)[..., last, :] - z.reshape(forces.shape)[..., first, :]) * penalty * 1e-3
+        forces[..., first, :] += along
+        forces[..., last, :] -= along
+        return forces.reshape(z.shape)
+
+    return Wrapped(penalty, residual=residual)
+
+
 MUTANTS = (
+    Mutant("forces that a roller takes", VARIANTS, lambda *, penalty: _pushes_what_a_roller_takes(penalty)),
     # Wrong only in shallow contact, as high penalties make it; few states of an interface alone are like that.
     line("spring softened in shallow contact", SOLVE, "box3",
          "f_v = penalty * g * l_ab * (c_p - c_q) / 2",
