@@ -25,16 +25,16 @@ from contactverif_properties.anywhere import springs_only
 
 HIGH = 1e3  # × the moderate penalty of a case
 ITERATIONS = 25  # a method that transmits a uniform pressure needs one; one that does not a few more, or none is enough
-SLOPE = "slope over penalties (−1 locks, 0 fails at any)"
+SLOPE = "slope over penalties (−1 if it locks)"
 NEAR = 2.0**-10  # × the penetration: less far from the exact solution, it is the same one
 
-TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u X ε̂/p"
+TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂ + M U/ℓ)/p"
 REASON = (
     "κ, the greater of ε̂h and the stiffer body's E over the softer one's, is the matrix's condition; r is the ratio of "
     "the shortest segment to the longest; a gap p/ε̂ is a difference of positions X, and a nodal force is in balance to "
-    "4 roundoffs of its 16 springs × X"
+    "4 roundoffs of its 16 springs × X; displacements U are rounded, and make stresses M U/ℓ on the shortest segment"
 )
-PRESSURE_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u X ε̂/(p r)"
+PRESSURE_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂/r + M U/ℓ)/p"
 PRESSURE_REASON = f"{REASON}; the shortest segment carries what the force of the longest one lacks"
 GAP_TOLERANCE = f"({TOLERANCE}) (1 + ε̂ ΣH/M)"
 GAP_REASON = (
@@ -197,6 +197,9 @@ def tolerance_parts(case: Case, scene: Scene, pressure: float) -> tuple[float, f
     lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
     h, ratio = float(interface.slave.lengths(interface.nodes).mean()), float(lengths.min() / lengths.max())
     of_mesh = 1e-11 + 1e-13 * max(case.penalty * h, *young) / min(young) + 5e-15 / ratio
+    modulus = max(body.oedometer for body in scene.bodies if not body.rigid)
+    displacement = float(np.abs(case.positions - interface.nodes).max())
+    of_mesh += 64 * UNIT_ROUNDOFF * modulus * displacement / float(lengths.min()) / pressure
     return of_mesh, 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure, ratio
 
 
