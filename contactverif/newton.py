@@ -22,7 +22,7 @@ from contactverif.scene import Scene
 from contactverif.subject import Guarded
 
 ITERATIONS = 40
-ROUNDINGS = 4.0  # of a residual: how many units of roundoff of its largest terms count as zero
+ROUNDINGS = 8.0  # of a residual: how many units of roundoff of its largest terms count as zero
 STALLED = 4  # iterations without a smaller residual
 NEARLY = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
 GONE = 1e8  # times the first residual, or the size of the interface: it will not come back
@@ -163,7 +163,9 @@ class System:
         bulk = abs(scene.stiffness) @ np.abs(q) + self.factor * np.abs(scene.load)
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
         springs = np.asarray(abs(contact).sum(axis=1)).reshape(-1) * np.abs(z).max(initial=0.0)
-        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + springs)
+        # and a force along an inclined normal is rounded in both of its components
+        forces = abs(spread).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
+        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + springs + forces)
         self.seconds["tangent"] += perf_counter() - start
         return matrix, floor
 

@@ -32,7 +32,7 @@ TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂ + M U/ℓ)/p"
 REASON = (
     "κ, the greater of ε̂h and the stiffer body's E over the softer one's, is the matrix's condition; r is the ratio of "
     "the shortest segment to the longest; a gap p/ε̂ is a difference of positions X, and a nodal force is in balance to "
-    "4 roundoffs of its 16 springs × X; displacements U are rounded, and make stresses M U/ℓ on the shortest segment"
+    "8 roundoffs of its 8 springs × X; displacements U are rounded, and make stresses M U/ℓ on the shortest segment"
 )
 PRESSURE_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂/r + M U/ℓ)/p"
 PRESSURE_REASON = f"{REASON}; the shortest segment carries what the force of the longest one lacks"

@@ -223,11 +223,11 @@ def test_stagnated_just_above_roundoff() -> None:
 
 
 def test_a_wrong_tangent_is_no_error() -> None:
-    """Where it says that nothing pushes though something does, there is no roundoff to compare with."""
+    """Where it says that nothing pushes though something does, what pushes is no roundoff."""
     scene = replace(catalogue.made("c"), bodies=tuple(replace(b, load=0 * b.load) for b in catalogue.made("c").bodies))
     trace = solve(scene, springs(scene, said=0.0, noise=1e-3), start=np.zeros(scene.n_free), iterations=5)
     documented(trace, scene)
-    assert trace.roundings[0] == np.inf
+    assert trace.roundings[0] > 1e12
     assert trace.end is not End.CONVERGED
 
 
