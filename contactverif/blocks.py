@@ -67,7 +67,6 @@ def two_blocks(
     slave_x, slave_y, master_x, master_y = (
         np.asarray(values, dtype=np.float64) for values in (slave_x, slave_y, master_x, master_y)
     )
-    place = {"axis": placing.axis, "shift": placing.shift, "scale": placing.scale}
     if lowered is None:
         lowered = approach if approach is not None else (pressure or 0.0) / penalty / placing.scale
     upper = block(
@@ -81,13 +80,16 @@ def two_blocks(
         tilt=tilt,
         lowered=lowered,
         free_sides=free_sides,
+        axis=placing.axis,
+        shift=placing.shift,
+        scale=placing.scale,
         name="slave",
-        **place,  # type: ignore[arg-type]
     )
     lower: Body
     if rigid_master:
         points = np.column_stack([master_x[::-1], np.full(len(master_x), master_y[-1])])
-        lower = rigid(placed_at(points, **place), axis=placing.axis, name="master")  # type: ignore[arg-type]
+        placed = placed_at(points, placing.axis, placing.shift, placing.scale)
+        lower = rigid(placed, axis=placing.axis, name="master")
     else:
         lower = block(
             master_x,
@@ -99,8 +101,10 @@ def two_blocks(
             approach=0.0,
             free_sides=free_sides,
             over=(float(slave_x[0]), float(slave_x[-1])),
+            axis=placing.axis,
+            shift=placing.shift,
+            scale=placing.scale,
             name="master",
-            **place,  # type: ignore[arg-type]
         )
     facts = {
         "along": np.concatenate([slave_x, master_x[::-1] if rigid_master else master_x]) * placing.scale,

@@ -26,6 +26,8 @@ from contactverif.errors import MisuseError
 KEPT = 512  # condensed bodies, so that penalties and formulations of one run share them
 DENSE = 600  # unknowns up to which a matrix without structure is as quick to factorise
 _LEFT = 2.0**-40  # of a diagonal entry after elimination: less than 1e2 u of a loose part, 1e6 u of a long thin bar
+_FREE = 1e-9  # of a rigid motion of the body's size: less resistance is none
+_PART = 1e-6  # of a loose motion: a smaller part of it is not worth a word
 _MODES = ("move along its first axis", "move along its second axis", "turn")
 
 
@@ -200,8 +202,9 @@ def loose_modes(body: Body) -> list[str]:
     resisted = np.concatenate([modes[body.fixed], *pressed])
     _, sizes, motions = np.linalg.svd(resisted, full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])
-    free = motions[sizes <= 1e-9 * max(sizes.max(), 1.0)]
-    return [words for words, column in zip(_MODES, free.T, strict=True) if len(free) and np.abs(column).max() > 1e-6]
+    # motions are numbers without dimension, of order 1: what resists by less than _FREE resists by roundoff
+    free = motions[sizes <= _FREE * max(sizes.max(), 1.0)]
+    return [words for words, part in zip(_MODES, free.T, strict=True) if len(free) and np.abs(part).max() > _PART]
 
 
 def body_from_mesh(

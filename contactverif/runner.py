@@ -194,7 +194,7 @@ def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
     witness = judge_case(question, witness_case, subject) if witness_case is not None else None
     row = replace(row, planned=planned, outcomes=tuple(outcomes), witness=witness, seconds=perf_counter() - start)
     verdict, reason = _overall(row)
-    if verdict is Verdict.NOT_JUDGED and plan.scene is not None and question.bodies and row.outcomes:
+    if verdict is Verdict.NOT_JUDGED and plan.scene is not None and question.bodies and row.outcomes and not row.judged:
         # there is one case, and nobody said that it can be decided
         verdict, reason = Verdict.UNDECIDED, row.outcomes[0].reason or reason
     row = replace(row, verdict=verdict, reason=reason)

@@ -7,6 +7,7 @@ Lengths are small integers, E and scales powers of two times small integers; all
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import accumulate, takewhile
 from math import ldexp
@@ -19,7 +20,7 @@ from contactverif.arrays import FloatArray
 from contactverif.blocks import Placing, two_blocks
 from contactverif.case import Case
 from contactverif.catalogue import MODERATE, scene_named
-from contactverif.scene import Scene, has_bodies
+from contactverif.scene import has_bodies
 from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
@@ -170,8 +171,9 @@ def _case(
         rigid_master=rigid_master,
         placing=place,
     )
-    facts = scene.facts if variant is None else {**scene.facts, "variant": np.array(float(variant))}
-    return Scene(scene.bodies, penalty=scene.penalty, facts=facts).case(seed=seed)
+    if variant is not None:
+        scene = replace(scene, facts={**scene.facts, "variant": np.array(float(variant))})
+    return scene.case(seed=seed)
 
 
 def _grid(segments: Sequence[float]) -> FloatArray:

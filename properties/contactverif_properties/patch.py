@@ -21,14 +21,19 @@ ERROR = roundoff.gap_quantity("error of a nodal force")
 TOTAL = roundoff.gap_quantity("error of the total force")
 
 
-def exact_forces(case: Case) -> FloatArray:
-    """The consistent forces (n_nodes, dim) by which the pressure ε̂ |g| pushes the nodes, exact to their last digit."""
+def consistent_forces(case: Case, pressure: float) -> FloatArray:
+    """The forces (n_nodes, 2) by which a uniform pressure pushes a flat interface, exact to the last digit."""
     weights = uniform_pressure_weights(case.interface, case.parameters["along"])
     along = case.parameters["direction"]
     normal = np.array([-along[1], along[0]])  # out of the master: to the left of the way the slave runs
     sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
-    forces: FloatArray = case.penalty * case.parameter("penetration") * (sides * weights)[:, None] * normal
+    forces: FloatArray = pressure * (sides * weights)[:, None] * normal
     return forces
+
+
+def exact_forces(case: Case) -> FloatArray:
+    """The consistent forces (n_nodes, 2) of the pressure ε̂ |g|."""
+    return consistent_forces(case, case.penalty * case.parameter("penetration"))
 
 
 def transmitted(case: Case, subject: Subject) -> Measurement:

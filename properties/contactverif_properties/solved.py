@@ -16,12 +16,12 @@ from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.blocks import exact_unknowns, pressure_of
 from contactverif.case import Case
 from contactverif.newton import NEARLY, Trace, solve
-from contactverif.oracle import uniform_pressure_weights
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import Scene, scene_of
 from contactverif.strategies import block_cases, variant_cases
 from contactverif.subject import Guarded, Subject
 from contactverif_properties.anywhere import springs_only
+from contactverif_properties.patch import consistent_forces
 
 HIGH = 1e3  # × the moderate penalty of a case
 ITERATIONS = 25  # a method that transmits a uniform pressure needs one; one that does not a few more, or none is enough
@@ -163,21 +163,11 @@ def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, 
         if scene.bodies[index].rigid:
             needed[first:last] = given[first:last]
         first = last
-    exact = exact_forces(case, pressure)
+    exact = consistent_forces(case, pressure)
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (needed, given)))
     errors /= pressure * case.slave_length
     n_slave = case.interface.n_slave_nodes
     return float(errors[:n_slave].max()), float(errors[n_slave:].max())
-
-
-def exact_forces(case: Case, pressure: float) -> FloatArray:
-    """The consistent forces (n_nodes, 2) by which the pressure pushes the nodes, exact to their last digit."""
-    weights = uniform_pressure_weights(case.interface, case.parameters["along"])
-    along = case.parameters["direction"]
-    normal = np.array([-along[1], along[0]])  # out of the master
-    sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
-    forces: FloatArray = pressure * (sides * weights)[:, None] * normal
-    return forces
 
 
 def gap_error(case: Case, penetration: float) -> float:
@@ -205,7 +195,7 @@ def tolerance_parts(case: Case, scene: Scene, pressure: float) -> tuple[float, f
 
 def exact_picture(case: Case) -> FloatArray:
     """For pictures: the exact forces (n_nodes, 2) at the penalty of the case."""
-    return exact_forces(case, pressure_of(case, case.penalty))
+    return consistent_forces(case, pressure_of(case, case.penalty))
 
 
 def _ended(trace: Trace) -> dict[str, float]:

@@ -12,10 +12,11 @@ import pytest
 
 import contactverif_nts
 from contactverif.arrays import FloatArray
+from contactverif.blocks import two_blocks
 from contactverif.newton import End, System, solve
 from contactverif.property import Verdict
 from contactverif.registry import load_formulation
-from contactverif.runner import judge_case
+from contactverif.runner import judge_case, run
 from contactverif.scene import scene_of
 from contactverif.strategies import named_scene
 from contactverif.subject import Subject
@@ -148,3 +149,26 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
         return Unpaired()
 
     assert judge_case(NEWTON_ORDER, case, Subject("unpaired", make)).verdict is Verdict.PASS
+
+
+def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_nts.vts_ppt(penalty=penalty)
+
+        class Nothing:
+            traits = inner.traits
+
+            def pair(self, interface: Any, z: FloatArray) -> Any:
+                return inner.pair(interface, z)
+
+            def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+                return 0 * z
+
+            def tangent(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
+                return np.zeros((z.size, z.size))
+
+        return Nothing()
+
+    scene = two_blocks([0, 1, 3], [0, 2], [-1, 1.2, 4], [-2, 0], penalty=10.0, approach=0.1).case()
+    (row,) = run([Subject("nothing", make)], [NEWTON_HISTORY], scene=scene).rows
+    assert (row.verdict, row.unexpected) == (Verdict.NOT_JUDGED, "not judged"), row.reason
