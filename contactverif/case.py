@@ -22,12 +22,14 @@ class Case:
     Attributes
     ----------
     interface : the two meshes in their reference configuration.
-    z : (n_unknowns,) current positions, a length each, flat: slave nodes first.
+    z : (n_unknowns,) current positions, a length each, flat: slave nodes first. Behind them the multipliers, if any.
     penalty : distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation is given
         ε̂ × the mean slave segment.
     parameters : what else the property that made the case needs to know, arrays of floats by name.
     seed : of anything random that the property does with the case (directions of a derivative).
     name : of a case that has one ("C", "C′"), else empty.
+    n_multipliers : how many of the entries of z are multipliers. A case that is drawn or stored has none; those of a
+        formulation are put behind its positions when it is asked.
     """
 
     interface: Interface
@@ -36,13 +38,14 @@ class Case:
     parameters: Mapping[str, FloatArray] = field(default_factory=dict)
     seed: int = 0
     name: str = ""
+    n_multipliers: int = 0
 
     def __post_init__(self) -> None:
         raw = np.asarray(self.z)
         if raw.dtype.kind not in "fiu":
             raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
         z = frozen(raw, np.float64)
-        if z.shape != (self.interface.n_unknowns,):
+        if z.shape != (self.interface.n_unknowns + self.n_multipliers,):
             raise MisuseError("z", f"shape {z.shape}", f"({self.interface.n_unknowns},): n_nodes × dim, flat")
         if not np.isfinite(z).all():
             raise MisuseError("z", "NaN or infinity", "finite positions")
@@ -61,12 +64,12 @@ class Case:
     @property
     def positions(self) -> FloatArray:
         """Current positions (n_nodes, dim)."""
-        return self.z.reshape(self.interface.nodes.shape)
+        return self.z[: self.interface.n_unknowns].reshape(self.interface.nodes.shape)
 
     @property
     def largest_coordinate(self) -> float:
         """X: the largest coordinate, of the state and the reference."""
-        return float(max(np.abs(self.z).max(), np.abs(self.interface.nodes).max()))
+        return float(max(np.abs(self.positions).max(), np.abs(self.interface.nodes).max()))
 
     @property
     def shortest_segment(self) -> float:

@@ -6,6 +6,11 @@ internal minus external force, so a slave node in contact is pushed along +norma
 An entry point of the group `contactverif.formulations` is a factory `make(*, penalty, **options) -> Formulation`; the
 harness chooses the penalty of each case. All but `residual` may be missing; what is missing is reported as
 "not provided" and nothing is promised for it. A `ResidualOnly` is the least a plugin is.
+
+Multipliers: a formulation that has some says how many in `n_multipliers(interface)`; they stand behind the positions in
+z, and their rows behind the forces in the residual: −area · g where active, area · λ where not. λ ≥ 0 is a pressure
+(trait `penalty` "distributed") or a nodal force ("nodal"). What the factory is given as penalty is then the scale c of
+the decision λ − c g ≥ 0 and must change no solution.
 """
 
 from __future__ import annotations
@@ -96,6 +101,7 @@ _WORDS: dict[str, tuple[object, ...]] = {
     "area": ("reference", "current", None),
     "penalty": ("nodal", "distributed", None),
     "enforcement": ("penalty", "multiplier", "barrier"),
+    "independent_multipliers": (True, False, None),
     "batched": (True, False),
     "takes_complex": (True, False),
 }
@@ -114,8 +120,10 @@ class Traits:
     continuity : how smooth the forces are while a node slides over master vertices, "C0" or "C1".
     area : the configuration in which areas of competence are measured; they add up to the slave's length, so that a
         uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
-    penalty : "nodal" (force per length) or "distributed" (force per length per length of penetration).
+    penalty : "nodal" (force per length) or "distributed" (force per length per length of penetration); of a multiplier,
+        whether it is a nodal force or a pressure.
     enforcement : how contact is enforced.
+    independent_multipliers : the constraints are independent on any mesh, so that the multipliers are unique.
     dimensions : numbers of coordinates that it can do.
     batched : `residual` takes a batch of states, z (..., n_unknowns).
     takes_complex : `residual` takes complex positions, so that a complex step works.
@@ -138,6 +146,7 @@ class Traits:
     area: Literal["reference", "current"] | None = None
     penalty: Literal["nodal", "distributed"] | None = None
     enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
+    independent_multipliers: bool | None = None
     dimensions: tuple[int, ...] = (2,)
     batched: bool = False
     takes_complex: bool = False
@@ -218,14 +227,15 @@ class ResidualOnly(Protocol):
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array, /) -> Array:
         """Nodal forces (..., n_unknowns), internal minus external, at the positions z (..., n_unknowns).
 
-        `pairing` is what `pair` returned, None where the plugin has no `pair`. The leading axes are a batch of
-        states, used only where `traits.batched`.
+        Behind them, where there are multipliers, the constraint rows; z and the answer are of one shape. `pairing` is
+        what `pair` returned, None where the plugin has no `pair`. The leading axes are a batch of states, used only
+        where `traits.batched`.
         """
         ...
 
 
 class Formulation(ResidualOnly, Protocol):
-    """The whole contract."""
+    """The whole contract of a penalty formulation; one with multipliers has `n_multipliers(interface) -> int` too."""
 
     @property
     def traits(self) -> Traits:

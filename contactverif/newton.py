@@ -1,6 +1,8 @@
 """Newton's method on the unknowns of a scene, with its whole trace. That it does not converge is data, not an error.
 
-No line search: what is traced is the method as a finite element code would run it with this formulation's tangent.
+No line search: what is traced is the method as a finite element code would run it with this formulation's tangent. With
+multipliers the unknowns u are those of the scene, q, and behind them the multipliers: a saddle point. Which constraints
+are active is decided anew at each iterate, by the pairing.
 """
 
 from __future__ import annotations
@@ -11,10 +13,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.linalg import lapack
-from scipy.sparse.linalg import LinearOperator, onenormest, splu
+from scipy import linalg, sparse
 
+from contactverif import linear
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, frozen
 from contactverif.errors import MisuseError
 from contactverif.formulation import Pairing
@@ -69,9 +70,10 @@ class Trace:
     ----------
     scene : what was solved.
     end : how it ended.
-    q : (n_iterates, n_free) unknowns.
+    u : (n_iterates, n_free + n_multipliers) unknowns: those of the scene, and multipliers behind them.
     factors : (n_iterates,) share of loads and imposed displacements, 1 at the last load step.
-    residuals : (n_iterates,) largest entry of S q − g + R, a force.
+    residuals : (n_iterates,) largest entry of S q − g + R, a force; where there are multipliers, of the constraint rows
+        too, each with the factor that makes it comparable (`linear.scales`).
     energies : (n_iterates,) |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
     floors : (n_iterates,) what roundoff alone makes of the residual, a force.
     roundings : (n_iterates,) largest entry of the residual over what roundoff makes of that entry; up to 1 is
@@ -79,12 +81,13 @@ class Trace:
     changes : (n_iterates,) entries of the pairing that differ from the iterate before; −1 where there is no pairing
         or none before.
     conditions : (n_iterates,) estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last.
+    deficiencies : (n_iterates,) how many multipliers were not unique in the step from there, 0 where none was taken.
     seconds : {"pair", "residual", "tangent", "solve"}: time spent in each.
     """
 
     scene: Scene
     end: End
-    q: FloatArray
+    u: FloatArray
     factors: FloatArray
     residuals: FloatArray
     energies: FloatArray
@@ -92,6 +95,7 @@ class Trace:
     roundings: FloatArray
     changes: IntArray
     conditions: FloatArray
+    deficiencies: IntArray
     seconds: dict[str, float]
 
     @property
@@ -105,88 +109,129 @@ class Trace:
         return int(np.isfinite(self.energies).sum())
 
     @property
+    def q(self) -> FloatArray:
+        """The unknowns of the scene (n_iterates, n_free)."""
+        return self.u[:, : self.scene.n_free]
+
+    @property
     def solution(self) -> FloatArray:
-        """The last iterate (n_free,)."""
+        """The unknowns of the scene at the last iterate (n_free,)."""
         last: FloatArray = self.q[-1]
         return last
 
     @property
+    def multipliers(self) -> FloatArray:
+        """At the last iterate (n_multipliers,)."""
+        last: FloatArray = self.u[-1, self.scene.n_free :]
+        return last
+
+    @property
+    def deficiency(self) -> int:
+        """How many multipliers were not unique, in any step."""
+        return int(self.deficiencies.max(initial=0))
+
+    @property
     def z(self) -> FloatArray:
-        """Positions (n_unknowns,) of the interface at the last iterate."""
-        return self.scene.positions(self.solution, float(self.factors[-1]))
+        """The state of the interface at the last iterate: positions (n_unknowns,), multipliers behind them."""
+        return np.concatenate([self.scene.positions(self.solution, float(self.factors[-1])), self.multipliers])
 
 
 @dataclass(slots=True)
 class System:
-    """The equations S q − g + R(z(q)) = 0 of a scene and a formulation, and what evaluating them costs."""
+    """The equations S q − g + R(z(u)) = 0 of a scene and a formulation, and what evaluating them costs."""
 
     scene: Scene
     formulation: Guarded
     factor: float = 1.0
     own_tangent: bool = True
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(PARTS, 0.0))
+    n_multipliers: int = field(init=False)
+    spread: Any = field(init=False)
+    stiffness: Any = field(init=False)
 
-    def pair(self, q: FloatArray) -> Pairing | None:
-        """Who touches whom at q."""
+    def __post_init__(self) -> None:
+        scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
+        self.n_multipliers, self.spread, self.stiffness = count, scene.spread, scene.stiffness
+        if count:
+            if isinstance(scene.spread, np.ndarray):
+                self.spread = linalg.block_diag(scene.spread, np.eye(count))
+                self.stiffness = linalg.block_diag(scene.stiffness, np.zeros((count, count)))
+            else:
+                unit, nothing = sparse.eye_array(count), sparse.csr_array((count, count))
+                self.spread = sparse.csr_array(sparse.block_diag([scene.spread, unit]))
+                self.stiffness = sparse.csr_array(sparse.block_diag([scene.stiffness, nothing]))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns u."""
+        return self.scene.n_free + self.n_multipliers
+
+    def state(self, u: FloatArray) -> FloatArray:
+        """What a formulation is asked about: positions, multipliers behind them."""
+        n_free = self.scene.n_free
+        return np.concatenate([self.scene.positions(u[:n_free], self.factor), u[n_free:]])
+
+    def pair(self, u: FloatArray) -> Pairing | None:
+        """Who touches whom at u."""
         start = perf_counter()
-        pairing = self.formulation.pair(self.scene.interface, self.scene.positions(q, self.factor))
+        pairing = self.formulation.pair(self.scene.interface, self.state(u))
         self.seconds["pair"] += perf_counter() - start
         return pairing
 
-    def residual(self, q: FloatArray, pairing: Pairing | None) -> FloatArray:
-        """(n_free,) forces that are not in balance."""
+    def residual(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+        """(n,) forces that are not in balance, and constraints that are not met."""
         start = perf_counter()
-        scene = self.scene
-        contact = self.formulation.residual(scene.interface, pairing, scene.positions(q, self.factor))
-        residual: FloatArray = scene.bulk_forces(q, self.factor) + scene.spread.T @ contact
+        n_free = self.scene.n_free
+        residual: FloatArray = self.spread.T @ self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
         self.seconds["residual"] += perf_counter() - start
         return residual
 
-    def matrix(self, q: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
-        """S + ∂R/∂q (n_free, n_free), and what the roundoff of positions and forces makes of the residual (n_free,).
+    def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
+        """Derivative (n, n) of the residual, and what the roundoff of positions and forces makes of the residual (n,).
 
         A formulation without a tangent is differentiated on the frozen pairing.
         """
         start = perf_counter()
-        scene, spread = self.scene, self.scene.spread
-        z = scene.positions(q, self.factor)
+        scene, n_free, z = self.scene, self.scene.n_free, self.state(u)
         if self.own_tangent and "tangent" in self.formulation.provides:
             tangent = self.formulation.tangent(scene.interface, pairing, z)
         else:
             tangent = self.differences(pairing, z)
-        if isinstance(spread, np.ndarray):
+        if isinstance(self.spread, np.ndarray):
             tangent = tangent.toarray() if sparse.issparse(tangent) else tangent
         else:
             tangent = sparse.csr_array(tangent)
-        contact = spread.T @ tangent @ spread
-        matrix = scene.stiffness + contact
-        bulk = abs(scene.stiffness) @ np.abs(q) + self.factor * np.abs(scene.load)
+        contact = self.spread.T @ tangent @ self.spread
+        matrix = self.stiffness + contact
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
-        springs = np.asarray(abs(contact).sum(axis=1)).reshape(-1) * np.abs(z).max(initial=0.0)
+        sizes = np.append(np.full(n_free, np.abs(z[: scene.interface.n_unknowns]).max()), np.abs(u[n_free:]))
         # and a force along an inclined normal is rounded in both of its components
-        forces = abs(spread).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
-        floor = ROUNDINGS * UNIT_ROUNDOFF * (bulk + springs + forces)
+        forces = abs(self.spread).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
+        terms = abs(contact) @ sizes + forces
+        terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + self.factor * np.abs(scene.load)
         self.seconds["tangent"] += perf_counter() - start
-        return matrix, floor
+        return matrix, ROUNDINGS * UNIT_ROUNDOFF * terms
 
-    def step(self, matrix: Any, residual: FloatArray) -> tuple[FloatArray | None, float]:
-        """The Newton step, None where the matrix has no inverse in floats, and an estimate of 1/cond."""
+    def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
+        """The solution of matrix · step = right; `floor` (n,) is what roundoff makes of the right-hand side."""
         start = perf_counter()
-        solve = _dense_step if isinstance(matrix, np.ndarray) else _sparse_step
-        step, condition = solve(matrix, residual)
+        step = linear.solved(matrix, right, self.scene.n_free, floor)
         self.seconds["solve"] += perf_counter() - start
-        if condition <= UNIT_ROUNDOFF * len(residual) or step is None or not np.isfinite(step).all():
-            return None, condition
-        return step, condition
+        return step
 
     def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
-        """Derivative (n_unknowns, n_unknowns) of the contact forces at the positions z, by central differences."""
-        shortest = min(side.lengths(z.reshape(-1, 2)).min() for side in self._sides())
-        h = shortest * (UNIT_ROUNDOFF * np.abs(z).max() / shortest) ** (1 / 3)
-        shifts = h * np.eye(z.size)
+        """Derivative (n_unknowns, n_unknowns) of the contact forces at the state z, by central differences."""
+        n_positions = self.scene.interface.n_unknowns
+        positions, multipliers = z[:n_positions], z[n_positions:]
+        shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
+        steps = np.full(z.size, shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3))
+        if len(multipliers):  # all is linear in them: a step as large as they are, or as the bodies are stiff
+            steps[n_positions:] = max(np.abs(multipliers).max(), abs(self.scene.stiffness).max(initial=1.0))
+        shifts = np.diag(steps)
         states = np.concatenate([z + shifts, z - shifts])
         forces = self.formulation.residual(self.scene.interface, pairing, states)
-        derivative: FloatArray = (forces[: z.size] - forces[z.size :]).T / (2 * h)
+        derivative: FloatArray = (forces[: z.size] - forces[z.size :]).T / (2 * steps)
         return derivative
 
     def _sides(self) -> tuple[Any, Any]:
@@ -207,7 +252,7 @@ def solve(
     Parameters
     ----------
     formulation : with its penalty, `subject.on(case)` or `subject.with_penalty(…)`.
-    start : (n_free,) first iterate; the scene's own by default.
+    start : (n_free,) first iterate, or (n_free + n_multipliers,); the scene's own by default, and no multipliers.
     load_steps : loads and imposed displacements grow in that many equal steps, each solved from the one before.
     iterations : linear systems solved at most, in each load step.
     own_tangent : the formulation's, if it has one; else its residual is differentiated on the frozen pairing.
@@ -220,41 +265,43 @@ def solve(
         name, number = ("load_steps", load_steps) if load_steps < 1 else ("iterations", iterations)
         raise MisuseError(name, f"{number}", "at least 1")
     system, record = System(scene, formulation, own_tangent=own_tangent), _Record()
-    q = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
-    if q.shape != (scene.n_free,):
-        raise MisuseError("start", f"shape {q.shape}", f"shape ({scene.n_free},)")
-    if not np.isfinite(q).all():
+    u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
+    if u.shape not in ((scene.n_free,), (system.size,)):
+        raise MisuseError("start", f"shape {u.shape}", f"shape ({system.size},)")
+    if not np.isfinite(u).all():
         raise MisuseError("start", "NaN or infinity", "finite numbers")
+    u = np.append(u, np.zeros(system.size - len(u)))
     end = End.CONVERGED
     for number in range(1, load_steps + 1):
         system.factor = number / load_steps
-        end, q = _load_step(system, record, q, iterations)
+        end, u = _load_step(system, record, u, iterations)
         if end is not End.CONVERGED:
             break
     return record.trace(scene, end, system.seconds)
 
 
-def _load_step(system: System, record: _Record, q: FloatArray, iterations: int) -> tuple[End, FloatArray]:
-    first, before = len(record.q), None
+def _load_step(system: System, record: _Record, u: FloatArray, iterations: int) -> tuple[End, FloatArray]:
+    first, before, n_free = len(record.u), None, system.scene.n_free
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
-        if not np.abs(q).max(initial=0.0) <= GONE * size:  # no plugin is asked about such a state
-            return End.DIVERGED, q
-        pairing = system.pair(q)
-        residual = system.residual(q, pairing)
-        matrix, floor = system.matrix(q, pairing)
-        record.add(q, system.factor, residual, floor, _changed(pairing, before))
-        end = _end(record, first)
+        if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= GONE * size):
+            return End.DIVERGED, u  # no plugin is asked about such a state
+        pairing = system.pair(u)
+        residual = system.residual(u, pairing)
+        matrix, floor = system.matrix(u, pairing)
+        comparable = linear.scales(matrix, n_free)[0] if system.n_multipliers else 1.0
+        record.add(u, system.factor, residual, floor, comparable, _changed(pairing, before))
+        end = _end(record, first, n_free)
         if end is not None:
-            return end, q
+            return end, u
         if iteration == iterations:
-            return End.EXHAUSTED, q
-        step, condition = system.step(matrix, -residual)
-        record.conditions[-1] = condition
-        if step is None:
-            return End.SINGULAR, q
-        record.energies[-1] = abs(float(step @ residual))
-        q, before = q + step, pairing
+            return End.EXHAUSTED, u
+        step = system.step(matrix, -residual, floor)
+        record.conditions[-1], record.deficiencies[-1] = step.condition, step.deficiency
+        if step.change is None:
+            return End.SINGULAR, u
+        record.energies[-1] = abs(float(step.change @ residual))
+        u, before = u + step.change, pairing
     raise AssertionError("the loop ends by itself")
 
 
@@ -262,7 +309,7 @@ def _load_step(system: System, record: _Record, q: FloatArray, iterations: int) 
 class _Record:
     """A trace in the making."""
 
-    q: list[FloatArray] = field(default_factory=list)
+    u: list[FloatArray] = field(default_factory=list)
     factors: list[float] = field(default_factory=list)
     residuals: list[float] = field(default_factory=list)
     energies: list[float] = field(default_factory=list)
@@ -270,24 +317,28 @@ class _Record:
     roundings: list[float] = field(default_factory=list)
     changes: list[int] = field(default_factory=list)
     conditions: list[float] = field(default_factory=list)
+    deficiencies: list[int] = field(default_factory=list)
 
-    def add(self, q: FloatArray, factor: float, residual: FloatArray, floor: FloatArray, changes: int) -> None:
-        self.q.append(q)
+    def add(
+        self, u: FloatArray, factor: float, residual: FloatArray, floor: FloatArray, comparable: Any, changes: int
+    ) -> None:
+        self.u.append(u)
         self.factors.append(factor)
-        self.residuals.append(float(np.abs(residual).max(initial=0.0)))
-        self.floors.append(float(floor.max(initial=0.0)))
+        self.residuals.append(float(np.abs(comparable * residual).max(initial=0.0)))
+        self.floors.append(float((comparable * floor).max(initial=0.0)))
         with np.errstate(divide="ignore"):  # an entry without any term has no roundoff, and nothing but zero will do
             roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
         self.roundings.append(float(roundings.max(initial=0.0)))
         self.changes.append(changes)
         self.energies.append(np.nan)
         self.conditions.append(np.nan)
+        self.deficiencies.append(0)
 
     def trace(self, scene: Scene, end: End, seconds: dict[str, float]) -> Trace:
         return Trace(
             scene=scene,
             end=end,
-            q=frozen(np.array(self.q), np.float64),
+            u=frozen(np.array(self.u), np.float64),
             factors=frozen(self.factors, np.float64),
             residuals=frozen(self.residuals, np.float64),
             energies=frozen(self.energies, np.float64),
@@ -295,13 +346,15 @@ class _Record:
             roundings=frozen(self.roundings, np.float64),
             changes=frozen(self.changes, np.int64),
             conditions=frozen(self.conditions, np.float64),
+            deficiencies=frozen(self.deficiencies, np.int64),
             seconds=seconds,
         )
 
 
-def _end(record: _Record, first: int) -> End | None:
+def _end(record: _Record, first: int, n_free: int) -> End | None:
     """What the iterates of a load step, which begin at `first`, say about its end; None to go on."""
-    residuals, roundings, q = record.residuals[first:], record.roundings[first:], record.q[first:]
+    residuals, roundings = record.residuals[first:], record.roundings[first:]
+    q = [u[:n_free] for u in record.u[first:]]
     if roundings[-1] <= 1:
         return End.CONVERGED
     if not np.isfinite(residuals[-1]) or residuals[-1] > GONE * max(residuals[0], record.floors[first]):
@@ -323,26 +376,3 @@ def _changed(pairing: Pairing | None, before: Pairing | None) -> int:
         int((values != before[name]).sum()) if name in before and before[name].shape == values.shape else values.size
         for name, values in pairing.items()
     )
-
-
-def _dense_step(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
-    if not len(right):
-        return right, 1.0
-    if not np.isfinite(matrix).all():
-        return None, 0.0
-    factors, pivots, info = lapack.dgetrf(matrix)
-    if info > 0:
-        return None, 0.0
-    condition, _ = lapack.dgecon(factors, np.abs(matrix).sum(axis=0).max())
-    step, _ = lapack.dgetrs(factors, pivots, right)
-    return step, float(condition)
-
-
-def _sparse_step(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
-    try:
-        factors = splu(matrix.tocsc())
-    except RuntimeError:  # scipy's word for an exactly singular matrix
-        return None, 0.0
-    inverse = LinearOperator(matrix.shape, factors.solve, lambda v: factors.solve(v, "T"), dtype=np.float64)
-    # one column: more would be random ones; pivots alone do not tell a singular matrix
-    return factors.solve(right), float(1 / (abs(matrix).sum(axis=0).max() * onenormest(inverse, t=1)))

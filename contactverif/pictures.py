@@ -61,7 +61,11 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
     q, factor = trace.q[shown], float(trace.factors[shown])
     at_gauss_points = scene.stresses(q, factor)
     z = scene.positions(q, factor)
-    forces, points, remark = _contact(scene, subject, formulation, z)
+    state = np.concatenate([z, trace.u[shown, scene.n_free :]])
+    forces, points, remark = _contact(scene, subject, formulation, state)
+    if trace.deficiency:
+        rank = f"{trace.deficiency} of {len(trace.multipliers)} multipliers are not unique"
+        remark = f"{remark}{'; ' if remark else ''}{rank}"
     if shown != len(trace.q) - 1:
         remark = f"drawn: iterate {shown}, the last that is not far away{'; ' if remark else ''}{remark}"
     return Solution(
@@ -100,7 +104,7 @@ def _contact(
     forces: FloatArray = np.full(interface.nodes.shape, np.nan)
     try:
         pairing = formulation.pair(interface, z)
-        forces = -formulation.residual(interface, pairing, z).reshape(-1, 2)
+        forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
         if "contact_points" not in formulation.provides or subject.traits.penalty == "nodal":
             return forces, None, ""
         found = formulation.contact_points(interface, pairing, z)

@@ -78,6 +78,16 @@ class Guarded:
         self._traits = traits
         self.provides = provides
 
+    def n_multipliers(self, interface: Interface) -> int:
+        """How many multipliers stand behind the positions in z; 0 where the plugin does not mention any."""
+        count = _asked("n_multipliers", getattr, self._plugin, "n_multipliers", None)
+        if count is None:
+            return 0
+        number = _asked("n_multipliers", count, interface)
+        if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < 0:
+            raise ContractError(f"n_multipliers: returned {number!r}; needed an integer ≥ 0")
+        return int(number)
+
     def pair(self, interface: Interface, z: FloatArray) -> Pairing | None:
         """The pairing at z (n_unknowns,), None where the plugin has none."""
         if "pair" not in self.provides:

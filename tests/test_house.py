@@ -56,7 +56,7 @@ ROOMS = {
     "mesh": Room(("mesh",), ("contracts",), ("numpy", "meshio")),
     "bulk": Room(("bulk",), ("contracts",), ("numpy", "scipy", "skfem"), QUIET),
     "scene": Room(("scene", "blocks", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET),
-    "newton": Room(("newton",), ("contracts", "scene"), ("numpy", "scipy"), QUIET),
+    "newton": Room(("newton", "linear"), ("contracts", "scene", "newton"), ("numpy", "scipy"), QUIET),
     "strategies": Room(("strategies",), ("contracts", "scene", "strategies", "oracle"), ("numpy", "hypothesis"), QUIET),
     "oracle": Room(("oracle",), ("contracts", "oracle"), ("numpy",), QUIET),
     "plugins": Room((), ("contracts", "compiled", "projection"), ("numpy", "scipy", "numba"), QUIET),

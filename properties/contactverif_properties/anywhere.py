@@ -1,14 +1,26 @@
-"""What several properties ask on: any state at all, one in three of them an exact tie; and of whom they ask it."""
+"""What several properties ask on: any state at all, one in three of them an exact tie; and of whom they ask it.
+
+A formulation with multipliers is asked about a state with some: random ones that press. As no body is there, the unit
+of pressure is free, and is chosen so that c = 1 and multipliers are as large as penetrations would be: forces,
+constraints and all parts of a tangent are then of one size and one unit.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from contactverif.arrays import FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Traits
 from contactverif.interface import Interface
 from contactverif.strategies import general_cases, tie_cases
+from contactverif.subject import Guarded, Subject
+
+PRESS = (0.125, 0.25)  # random multipliers lie between, × the shortest segment
 
 
 def any_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
@@ -18,8 +30,25 @@ def any_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     return st.one_of(general_cases(), general_cases(), tie_cases())
 
 
-def springs_only(traits: Traits) -> str:
-    """Empty for a penalty method. The states penetrate, where a barrier is not defined, and hold no multipliers."""
-    if traits.enforcement == "penalty":
+def no_barrier(traits: Traits) -> str:
+    """Empty but for a barrier: the states penetrate, where it is not defined."""
+    if traits.enforcement != "barrier":
         return ""
-    return f"the states are those of a penalty method, and the enforcement is by a {traits.enforcement}"
+    return "the states penetrate, where a barrier is not defined"
+
+
+def posed(case: Case, subject: Subject) -> tuple[Guarded, Case]:
+    """The formulation with the penalty of the case, and the case with multipliers if it has any."""
+    if subject.traits.enforcement != "multiplier":
+        return subject.on(case), case
+    low, high = (share * case.shortest_segment for share in PRESS)
+    formulation = subject.with_penalty(1.0)
+    random = np.random.default_rng([case.seed, 1])  # not the numbers that the property draws for itself
+    return formulation, with_multipliers(
+        replace(case, penalty=1.0), random.uniform(low, high, formulation.n_multipliers(case.interface))
+    )
+
+
+def with_multipliers(case: Case, multipliers: FloatArray) -> Case:
+    """The case with multipliers (n_multipliers,) behind its positions."""
+    return replace(case, z=np.concatenate([case.z, multipliers]), n_multipliers=len(multipliers))

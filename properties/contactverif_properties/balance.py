@@ -9,21 +9,23 @@ from contactverif.case import Case
 from contactverif.property import Measurement, Property
 from contactverif.subject import Subject
 from contactverif_properties import roundoff
-from contactverif_properties.anywhere import any_cases, springs_only
+from contactverif_properties.anywhere import any_cases, no_barrier, posed
 
 FORCE_DEFECT = roundoff.gap_quantity("force defect")
 MOMENT_DEFECT = roundoff.gap_quantity("moment defect")
 
 
-def _forces(case: Case, subject: Subject) -> FloatArray:
-    formulation = subject.on(case)
+def _forces(case: Case, subject: Subject) -> tuple[Case, FloatArray]:
+    """The case as it was asked, and the forces (n_nodes, 2)."""
+    formulation, case = posed(case, subject)
     pairing = formulation.pair(case.interface, case.z)
-    return formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
+    forces = formulation.residual(case.interface, pairing, case.z)
+    return case, forces[: case.interface.n_unknowns].reshape(-1, 2)
 
 
 def force_defect(case: Case, subject: Subject) -> Measurement:
     """|ΣR| over Σ|R| of the slave, dimensionless. VTS-PPT as printed: 1 − cos θ of the slave force under a tilt θ."""
-    forces = _forces(case, subject)
+    case, forces = _forces(case, subject)
     defect = roundoff.share(float(np.linalg.norm(forces.sum(axis=0))), roundoff.slave_forces(case, forces))
     tolerance = roundoff.of_gap(case, roundoff.mean_penetration(case, forces))
     return Measurement({FORCE_DEFECT.name: defect}, {FORCE_DEFECT.name: tolerance}, idle=not forces.any())
@@ -31,7 +33,7 @@ def force_defect(case: Case, subject: Subject) -> Measurement:
 
 def moment_defect(case: Case, subject: Subject) -> Measurement:
     """|Σ x×R| about the centroid of the nodes over D Σ|R| of the slave, dimensionless."""
-    forces = _forces(case, subject)
+    case, forces = _forces(case, subject)
     arms = case.positions - case.positions.mean(axis=0)
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
     defect = roundoff.share(moment, case.diameter * roundoff.slave_forces(case, forces))
@@ -47,7 +49,7 @@ FORCE = Property(
     cases=any_cases,
     measure=force_defect,
     promise=lambda traits: traits.conserves_force,
-    applicable=springs_only,
+    applicable=no_barrier,
 )
 MOMENT = Property(
     id="balance.moment",
@@ -57,5 +59,5 @@ MOMENT = Property(
     cases=any_cases,
     measure=moment_defect,
     promise=lambda traits: traits.conserves_moment,
-    applicable=springs_only,
+    applicable=no_barrier,
 )

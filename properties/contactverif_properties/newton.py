@@ -11,12 +11,13 @@ from scipy import linalg
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
 from contactverif.formulation import Pairing
+from contactverif.linear import scales
 from contactverif.newton import End, System, Trace, solve
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import scene_of
 from contactverif.strategies import solid_cases
 from contactverif.subject import Subject
-from contactverif_properties.anywhere import springs_only
+from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.kinks import dense, kink_within
 
 DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # 3e-2 … 1e-5, × the shortest segment
@@ -66,12 +67,12 @@ def one_step(case: Case, subject: Subject) -> Measurement:
         trace = solve(scene, system.formulation, own_tangent=False)
     if not trace.converged:
         return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.words}")
-    solution = trace.solution
+    solution = trace.u[-1]
     pairing = system.pair(solution)
     matrix, _ = system.matrix(solution, pairing)
-    _, condition = system.step(matrix, np.zeros(scene.n_free))
+    condition = system.step(matrix, np.zeros(system.size)).condition
     details = ended(trace)
-    if condition <= scene.n_free * UNIT_ROUNDOFF:
+    if condition <= system.size * UNIT_ROUNDOFF:
         return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
     least, details["rate"], details["steps"] = _steps(system, case, solution, pairing, condition)
     if np.isnan(least):
@@ -92,24 +93,29 @@ def _steps(
     system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float
 ) -> tuple[float, float, float]:
     """The lower order of the directions (NaN if none decides), the higher rate, and how many steps were looked at."""
-    scene, length = system.scene, case.shortest_segment
-    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution).max() + np.abs(scene.moved).max())
-    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution)).max()))
+    scene, length, units = system.scene, case.shortest_segment, _units(system, solution, pairing)
+    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution / units).max() + np.abs(scene.moved).max())
+    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max()))
     found, looked = [], 0
-    for direction in _directions(case.seed, scene.n_free):
+    for direction in _directions(case.seed, system.size):
         before, after = [], []
         for distance in DISTANCES:
-            u = solution + distance * length * direction
+            u = solution + distance * length * direction * units
             if not _same(system, case, pairing, u, distance * length):
                 continue
             matrix, _ = system.matrix(u, pairing)
-            step, _ = system.step(matrix, -system.residual(u, pairing))
+            step = system.step(matrix, -system.residual(u, pairing)).change
             looked += 1
             before.append(distance * length)
-            after.append(inf if step is None else float(np.abs(u + step - solution).max()))
+            after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
         found.append(order(np.array(before), np.array(after), floor))
     told = [(slope, rate) for slope, rate in found if not np.isnan(slope)] or [(np.nan, np.nan)]
     return min(slope for slope, _ in told), max(rate for _, rate in told), float(looked)
+
+
+def _units(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+    """(n,) what a unit of distance is: 1 of a position, of a multiplier what does as much to the forces."""
+    return scales(system.matrix(u, pairing)[0], system.scene.n_free)[1]
 
 
 def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
@@ -136,16 +142,14 @@ def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, f
     return float(slopes.mean() if slopes[-1] < QUADRATIC else slopes[-1]), float(after[-1] / before[-1])
 
 
-def spectral_radius(system: System, q: FloatArray, pairing: Pairing | None) -> float:
+def spectral_radius(system: System, u: FloatArray, pairing: Pairing | None) -> float:
     """Of I − K⁻¹ K_true, the rate of Newton's method with the matrix K; K_true by central differences of the residual.
 
     Source: Zavarise & De Lorenzis (2009), Fig. 30, where it is the rate of the basic version.
     """
-    scene = system.scene
-    matrix, _ = system.matrix(q, pairing)
-    contact = system.differences(pairing, scene.positions(q, system.factor))
-    exact = scene.stiffness + scene.spread.T @ contact @ scene.spread
-    return float(np.abs(linalg.eigvals(np.eye(len(q)) - linalg.solve(dense(matrix), dense(exact)))).max())
+    matrix, _ = system.matrix(u, pairing)
+    exact, _ = replace(system, own_tangent=False).matrix(u, pairing)
+    return float(np.abs(linalg.eigvals(np.eye(len(u)) - linalg.solve(dense(matrix), dense(exact)))).max())
 
 
 def trajectory(case: Case, subject: Subject) -> Measurement:
@@ -195,18 +199,22 @@ def history(trace: Trace) -> dict[str, FloatArray]:
 
 def untouched(system: System, trace: Trace) -> bool:
     """Whether the formulation gives no force at the last iterate, so that Newton solved the bodies alone."""
-    pairing = system.formulation.pair(system.scene.interface, trace.z)
-    return not system.formulation.residual(system.scene.interface, pairing, trace.z).any()
+    interface, z = system.scene.interface, trace.z
+    pairing = system.formulation.pair(interface, z)
+    return not system.formulation.residual(interface, pairing, z)[: interface.n_unknowns].any()
 
 
 def ended(trace: Trace) -> dict[str, float]:
     """How a solution ended, for the details of a measurement."""
-    return {
+    details = {
         "end": float(trace.end),
         "iterations": float(trace.n_iterations),
         "changes of pairing": float((trace.changes > 0).sum()),
         "last residual in roundoffs": float(trace.roundings[-1]),
     }
+    if len(trace.multipliers):
+        details["multipliers too many"] = float(trace.deficiency)
+    return details
 
 
 def _directions(seed: int, size: int) -> FloatArray:
@@ -219,10 +227,11 @@ def _same(system: System, case: Case, pairing: Pairing | None, u: FloatArray, re
     """Whether the state pairs as the solution does; where no pairing says so, whether differences see no kink there."""
     if pairing is not None:
         return system.pair(u) == pairing
-    z = system.scene.positions(u)
+    z = system.state(u)
     direction = np.random.default_rng(case.seed).uniform(-1, 1, z.size)
     direction /= np.abs(direction).max()
-    return not kink_within(replace(case, z=z), system.formulation, None, reach, direction)
+    here = replace(case, z=z, n_multipliers=system.n_multipliers)
+    return not kink_within(here, system.formulation, None, reach, direction)
 
 
 NEWTON_ORDER = Property(
@@ -234,7 +243,7 @@ NEWTON_ORDER = Property(
     measure=one_step,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=springs_only,
+    applicable=no_barrier,
     bodies=True,
 )
 NEWTON_HISTORY = Property(
@@ -247,6 +256,6 @@ NEWTON_HISTORY = Property(
     series=SERIES,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=springs_only,
+    applicable=no_barrier,
     bodies=True,
 )

@@ -9,7 +9,7 @@ from contactverif.interface import Interface
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.subject import Subject
 from contactverif_properties import roundoff
-from contactverif_properties.anywhere import any_cases, springs_only
+from contactverif_properties.anywhere import any_cases, no_barrier, posed
 
 BITWISE = "the same operations on the same numbers give the same bits"
 AGAIN = Quantity("entries that change when asked again", "1", "0", BITWISE)
@@ -21,19 +21,20 @@ BATCHED = Quantity(
 
 def pure(case: Case, subject: Subject) -> Measurement:
     """R(x1), R(x2), R(x1) gives the first again, also after a tangent and in a batch; inputs stay as they are."""
+    original = case
+    formulation, case = posed(original, subject)
     interface, z = case.interface, case.z
     random = np.random.default_rng(case.seed)
     elsewhere = z + random.uniform(-1, 1, z.size) * case.shortest_segment / 4
     before = _fingerprint(interface)
 
-    formulation = subject.on(case)
     pairing = formulation.pair(interface, z)
     first = formulation.residual(interface, pairing, z)
     pairing_elsewhere = formulation.pair(interface, elsewhere)
     second = formulation.residual(interface, pairing_elsewhere, elsewhere)
     pairing_again = formulation.pair(interface, z)
     again = formulation.residual(interface, pairing_again, z)
-    fresh = subject.on(case)  # it meets the states the other way round, tangents first
+    fresh, _ = posed(original, subject)  # it meets the states the other way round, tangents first
     pairing_first = fresh.pair(interface, elsewhere)
     if "tangent" in fresh.provides:
         fresh.tangent(interface, pairing_first, elsewhere)
@@ -64,7 +65,7 @@ def pure(case: Case, subject: Subject) -> Measurement:
             BATCHED.name: roundoff.of_gap(case, roundoff.mean_penetration(case, first)),
         },
         broken="; ".join(broken),
-        idle=not (first.any() or alone.any()),
+        idle=not (first[: interface.n_unknowns].any() or alone[: interface.n_unknowns].any()),
     )
 
 
@@ -80,5 +81,5 @@ PURITY = Property(
     cases=any_cases,
     measure=pure,
     promise=lambda traits: True,
-    applicable=springs_only,
+    applicable=no_barrier,
 )

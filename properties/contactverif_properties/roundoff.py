@@ -18,8 +18,8 @@ TURNED_REASON = "as for a gap; and rounding the ends of a segment turns it by uX
 
 
 def slave_forces(case: Case, forces: Array) -> float:
-    """Σ|R| over the slave nodes, from forces (n_unknowns,)."""
-    return float(np.abs(forces.reshape(-1, 2)[: case.interface.n_slave_nodes]).sum())
+    """Σ|R| over the slave nodes, from forces (n_unknowns,), whatever stands behind them."""
+    return float(np.abs(forces.reshape(-1)[: 2 * case.interface.n_slave_nodes]).sum())
 
 
 def mean_penetration(case: Case, forces: Array) -> float:

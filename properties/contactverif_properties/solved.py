@@ -20,7 +20,8 @@ from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import Scene, scene_of
 from contactverif.strategies import block_cases, variant_cases
 from contactverif.subject import Guarded, Subject
-from contactverif_properties.anywhere import springs_only
+from contactverif_properties.anywhere import no_barrier
+from contactverif_properties.multipliers import right_multipliers, uniformity_error
 from contactverif_properties.patch import consistent_forces
 
 HIGH = 1e3  # × the moderate penalty of a case
@@ -48,6 +49,7 @@ QUANTITIES = (
     Quantity("pressure", "1", PRESSURE_TOLERANCE, PRESSURE_REASON),
 )
 HIGH_QUANTITIES = tuple(replace(quantity, name=f"{quantity.name}, high penalty") for quantity in QUANTITIES)
+MULTIPLIERS = Quantity("multipliers", "1", PRESSURE_TOLERANCE, PRESSURE_REASON)
 
 
 def solved(case: Case, subject: Subject) -> Measurement:
@@ -57,8 +59,10 @@ def solved(case: Case, subject: Subject) -> Measurement:
     -------
     Measurement
         As `at_penalty`, for the penalty of the case and for one that is HIGH times larger. Details: how each solution
-        ended, and the slope of the stress error over the penalties.
+        ended, and the slope of the stress error over the penalties. Multipliers have no penalty and are asked once.
     """
+    if subject.traits.enforcement == "multiplier":
+        return solved_once(case, subject)
     moderate = at_penalty(case, subject, case.penalty)
     high = at_penalty(case, subject, HIGH * case.penalty)
     errors = moderate.values["stress"], high.values["stress"]
@@ -77,8 +81,42 @@ def solved(case: Case, subject: Subject) -> Measurement:
 
 
 def solved_once(case: Case, subject: Subject) -> Measurement:
-    """The same at the penalty of the case alone."""
-    return at_penalty(case, subject, case.penalty)
+    """The same at the penalty of the case alone, or by multipliers."""
+    return (by_multipliers if subject.traits.enforcement == "multiplier" else at_penalty)(case, subject, case.penalty)
+
+
+def by_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
+    """The scene solved as a saddle point against the exact solution without penetration, as numbers without dimension.
+
+    Returns
+    -------
+    Measurement
+        stress and forces as `at_penalty`; gap over p/ε̂, with the penalty that is not there as a measure. multipliers:
+        largest error of one over p, where they are pressures. Details: how it ended, and how many multipliers are not
+        unique, of which those that are nearest to uniform count.
+    """
+    scene, pressure = scene_of(case), pressure_of(case, np.inf)
+    formulation = subject.on(replace(case, penalty=penalty))
+    exact = exact_unknowns(scene, pressure, np.inf)
+    right = right_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
+    trace, u = solution(scene, formulation, np.append(exact, right), pressure / penalty)
+    q = u[: scene.n_free]
+    z = np.append(scene.positions(q), u[scene.n_free :])
+    here = replace(case, z=z, penalty=penalty, n_multipliers=len(right))
+    slave, master = force_errors(here, scene, formulation, q, pressure)
+    values = {
+        "stress": stress_error(scene, q, pressure),
+        "slave forces": slave,
+        "master forces": master,
+        "gap": gap_error(here, 0.0, pressure / penalty),
+    }
+    of_mesh, of_gap, ratio = tolerance_parts(here, scene, pressure)
+    tolerances = dict.fromkeys(values, of_mesh + of_gap)
+    tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
+    if subject.traits.penalty == "distributed":
+        values[MULTIPLIERS.name] = uniformity_error(here, formulation, pressure)
+        tolerances[MULTIPLIERS.name] = of_mesh + of_gap / ratio
+    return Measurement(values, tolerances, details=_ended(trace))
 
 
 def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
@@ -104,7 +142,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
         "stress": stress_error(scene, q, pressure),
         "slave forces": slave,
         "master forces": master,
-        "gap": gap_error(here, pressure / penalty),
+        "gap": gap_error(here, pressure / penalty, pressure / penalty),
     }
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, formulation.pair(case.interface, z), z)
@@ -123,7 +161,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
 
 
 def solution(scene: Scene, formulation: Guarded, exact: FloatArray, penetration: float) -> tuple[Trace, FloatArray]:
-    """Newton's trace from the first guess of the scene, and the unknowns (n_free,) of the solution that is judged.
+    """Newton's trace from the first guess of the scene, and the unknowns (n,) of the solution that is judged.
 
     The patch test asks about the residual alone, so Newton's method differentiates it, and the formulation's own
     tangent has no part in this. It asks whether the exact solution is one of the formulation's: where Newton ends
@@ -132,11 +170,11 @@ def solution(scene: Scene, formulation: Guarded, exact: FloatArray, penetration:
     afterwards.
     """
     trace = solve(scene, formulation, iterations=ITERATIONS, own_tangent=False)
-    if trace.converged and np.abs(trace.solution - exact).max(initial=0.0) <= NEAR * penetration:
-        return trace, trace.solution
+    if trace.converged and np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0) <= NEAR * penetration:
+        return trace, trace.u[-1]
     again = solve(scene, formulation, start=exact, iterations=ITERATIONS, own_tangent=False)
-    balanced = again.roundings[0] <= NEARLY or len(again.q) == 1
-    return trace, again.q[0] if balanced else again.q[1 + np.argmin(again.roundings[1:])]
+    balanced = again.roundings[0] <= NEARLY or len(again.u) == 1
+    return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
 
 
 def stress_error(scene: Scene, q: FloatArray, pressure: float) -> float:
@@ -156,7 +194,7 @@ def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, 
     """
     needed = scene.nodal_forces(q)
     pairing = formulation.pair(case.interface, case.z)
-    given = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
+    given = -formulation.residual(case.interface, pairing, case.z)[: case.interface.n_unknowns].reshape(-1, 2)
     first = 0
     for index in scene.reached:
         last = first + len(scene.bodies[index].contact_nodes)
@@ -170,14 +208,14 @@ def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, 
     return float(errors[:n_slave].max()), float(errors[n_slave:].max())
 
 
-def gap_error(case: Case, penetration: float) -> float:
-    """Largest departure of a node's height from a plane slave at `penetration` below a plane master, over it."""
+def gap_error(case: Case, penetration: float, size: float) -> float:
+    """Largest departure of a node's height from a plane slave at `penetration` below a plane master, over `size`."""
     along = case.parameters["direction"]
     heights = case.positions @ [-along[1], along[0]]
     n_slave = case.interface.n_slave_nodes
     level = heights[n_slave:].mean()
     errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
-    return float(errors.max() / penetration)
+    return float(errors.max() / size)
 
 
 def tolerance_parts(case: Case, scene: Scene, pressure: float) -> tuple[float, float, float]:
@@ -199,18 +237,21 @@ def exact_picture(case: Case) -> FloatArray:
 
 
 def _ended(trace: Trace) -> dict[str, float]:
-    return {"end": float(trace.end), "iterations": float(trace.n_iterations)}
+    details = {"end": float(trace.end), "iterations": float(trace.n_iterations)}
+    if len(trace.multipliers):
+        details["multipliers too many"] = float(trace.deficiency)
+    return details
 
 
 FLAT_SOLVE = Property(
     id="patch.flat.solve",
     family="patch",
     summary="two elastic blocks under a uniform pressure: exact stress, forces on both sides, gap, at two penalties",
-    quantities=(*QUANTITIES, *HIGH_QUANTITIES),
+    quantities=(*QUANTITIES, *HIGH_QUANTITIES, MULTIPLIERS),
     cases=block_cases,
     measure=solved,
     promise=lambda traits: traits.passes_flat_patch,
-    applicable=springs_only,
+    applicable=no_barrier,
     bodies=True,
     exact=exact_picture,
 )
@@ -218,11 +259,11 @@ VARIANTS = Property(
     id="patch.variants",
     family="patch",
     summary="the same on a rigid master, with unequal materials, inclined, slid along, and under a narrow punch",
-    quantities=QUANTITIES,
+    quantities=(*QUANTITIES, MULTIPLIERS),
     cases=variant_cases,
     measure=solved_once,
     promise=lambda traits: traits.passes_flat_patch,
-    applicable=springs_only,
+    applicable=no_barrier,
     bodies=True,
     exact=exact_picture,
 )

@@ -17,7 +17,7 @@ from contactverif.formulation import Pairing
 from contactverif.property import Measurement, Property, Quantity, Verdict, judge
 from contactverif.strategies import smooth_cases
 from contactverif.subject import Guarded, Subject
-from contactverif_properties.anywhere import springs_only
+from contactverif_properties.anywhere import no_barrier, posed
 from contactverif_properties.kinks import kink_within
 
 N_DIRECTIONS = 8
@@ -59,7 +59,8 @@ def directional(case: Case, subject: Subject) -> Measurement:
         such slope, as across a kink that no pairing freezes); the complex step where the plugin takes complex
         positions. Detail: the length that took the place of ℓ.
     """
-    formulation, shortest = subject.on(case), case.shortest_segment
+    formulation, case = posed(case, subject)
+    shortest = case.shortest_segment
     pairing = formulation.pair(case.interface, case.z)
     directions = random_directions(case)
     derivative = (formulation.tangent(case.interface, pairing, case.z) @ directions.T).T  # (n_directions, n_unknowns)
@@ -216,5 +217,5 @@ DIRECTIONAL = Property(
     measure=directional,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=springs_only,
+    applicable=no_barrier,
 )

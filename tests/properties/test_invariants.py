@@ -63,7 +63,8 @@ def test_the_other_kind_of_penalty_does_not(promised: Any, kept: Any) -> None:
 def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
     assert "not stated" in SCALING.applicable(Traits())
     assert SCALING.applicable(Traits(penalty="nodal")) == ""
-    assert "penalty method" in SCALING.applicable(Traits(penalty="nodal", enforcement="multiplier"))
+    assert SCALING.applicable(Traits(penalty="nodal", enforcement="multiplier")) == ""
+    assert "barrier" in SCALING.applicable(Traits(penalty="nodal", enforcement="barrier"))
     found = run([subject(Springs)], [SCALING], examples=3, seed=1)
     assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
     assert found.passed

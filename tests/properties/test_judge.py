@@ -78,14 +78,17 @@ def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
     assert judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Handmade)).verdict is Verdict.FAIL
 
 
-@pytest.mark.parametrize("enforcement", ["barrier", "multiplier"])
-def test_states_that_penetrate_are_for_penalty_methods(enforcement: Any) -> None:
-    """A barrier is not defined there, and would be accused of its NaN."""
+def test_states_that_penetrate_are_not_for_barriers() -> None:
+    """A barrier is not defined there, and would be accused of its NaN. Multipliers are asked everything."""
     for question in load_properties():
         assert isinstance(question, Property)
-        assert enforcement in question.applicable(
-            Traits(penalty="distributed", area="current", enforcement=enforcement)
-        )
+        said = {
+            enforcement: question.applicable(Traits(penalty="distributed", area="current", enforcement=enforcement))
+            for enforcement in ("penalty", "multiplier", "barrier")
+        }
+        assert "barrier" in said["barrier"]
+        assert not said["multiplier"]
+        assert bool(said["penalty"]) is (question.id == "multipliers.rank")
 
 
 class Pair(Handmade):
