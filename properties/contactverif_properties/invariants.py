@@ -45,7 +45,8 @@ def turned(case: Case, subject: Subject) -> Measurement:
     largest = max(case.largest_coordinate, there.largest_coordinate)
     tolerance = _turned_tolerance(case, forces, largest)
     errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
-    values = {TURNED_FORCES.name: roundoff.share(errors["forces"], roundoff.slave_forces(case, forces))}
+    size = roundoff.slave_forces(case, forces) + float(np.abs(forces[n:]).sum())
+    values = {TURNED_FORCES.name: roundoff.share(errors["forces"], size)}
     if "tangent" in formulation.provides:
         tangent = dense(formulation.tangent(interface, pairing, case.z))
         tangent_there = dense(formulation.tangent(interface, pairing_there, there.z))

@@ -10,7 +10,7 @@ from scipy import linalg
 
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.case import Case
-from contactverif.formulation import Pairing
+from contactverif.formulation import Pairing, Traits
 from contactverif.linear import scales
 from contactverif.newton import End, System, Trace, solve
 from contactverif.property import Measurement, Property, Quantity
@@ -234,6 +234,13 @@ def _same(system: System, case: Case, pairing: Pairing | None, u: FloatArray, re
     return not kink_within(here, system.formulation, None, reach, direction)
 
 
+def _solutions_are_unique(traits: Traits) -> str:
+    """Empty, or why there is nothing to converge to: constraints that depend on one another contradict when bent."""
+    if traits.independent_multipliers is False:
+        return "the multipliers are not independent, so there need be no solution, nor one alone"
+    return no_barrier(traits)
+
+
 NEWTON_ORDER = Property(
     id="newton.order",
     family="newton",
@@ -243,7 +250,7 @@ NEWTON_ORDER = Property(
     measure=one_step,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=no_barrier,
+    applicable=_solutions_are_unique,
     bodies=True,
 )
 NEWTON_HISTORY = Property(
@@ -256,6 +263,6 @@ NEWTON_HISTORY = Property(
     series=SERIES,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=no_barrier,
+    applicable=_solutions_are_unique,
     bodies=True,
 )

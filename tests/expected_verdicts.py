@@ -1,0 +1,82 @@
+"""What theory says of each formulation and each property, and the same as the table in `properties/README.md`.
+
+`python tests/expected_verdicts.py` writes the table anew; `test_verdicts.py` holds it against what is found, and
+against the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from contactverif.property import Verdict
+from contactverif.registry import property_ids
+
+README = Path(__file__).parents[1] / "properties" / "README.md"
+BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"
+
+FLAT = "patch.flat.transmission"
+RESULTANT, RANK, DEAD_ZONE = "patch.flat.resultant", "multipliers.rank", "patch.dead-zone"
+FORCE, MOMENT, TANGENT = "balance.force", "balance.moment", "tangent.directional"
+SOLVED = frozenset({"patch.flat.solve", "patch.variants"})
+PATCHES = frozenset({FLAT, DEAD_ZONE}) | SOLVED
+INEXACT = frozenset({TANGENT, "newton.order", "newton.history"})
+PRINTED = frozenset({FORCE, MOMENT, DEAD_ZONE})
+
+# What each does not do; everything else that it is asked it does.
+FAILS: Mapping[str, frozenset[str]] = {
+    "nts": PATCHES,
+    "nts-ar": PATCHES,
+    "nts-ar:area=reference": PATCHES,
+    "vts-g": PATCHES,
+    "vts-g:n=3": PATCHES,
+    "vts-me": PATCHES,
+    "vts-me:n=4": PATCHES,
+    "vts-ppt": PRINTED,
+    "vts-ppt-basic": PRINTED | INEXACT,
+    "vts-ppt-balanced": frozenset(),
+}
+
+# What makes no sense to ask: springs at nodes have no area, springs that act twice no total; springs no multipliers.
+WITHOUT_AREA = ("nts",)
+WITH_MULTIPLIERS: tuple[str, ...] = ()
+NOT_UNIQUE: tuple[str, ...] = ()  # multipliers: Newton has nothing to converge to
+
+MARKS = {Verdict.PASS: "✓", Verdict.FAIL: "✗", Verdict.NOT_APPLICABLE: "·"}
+
+
+def expected(name: str, property_id: str) -> Verdict:
+    """The verdict on a formulation."""
+    if property_id == RESULTANT and name in WITHOUT_AREA:
+        return Verdict.NOT_APPLICABLE
+    if property_id == RANK and name not in WITH_MULTIPLIERS:
+        return Verdict.NOT_APPLICABLE
+    if property_id.startswith("newton.") and name in NOT_UNIQUE:
+        return Verdict.NOT_APPLICABLE
+    return Verdict.FAIL if property_id in FAILS[name] else Verdict.PASS
+
+
+def matrix() -> str:
+    """The table in Markdown: a row for each formulation, a column for each property."""
+    ids = property_ids()
+    heads = [property_id.replace(".", ".<br>") for property_id in ids]
+    lines = [f"| | {' | '.join(heads)} |", f"|---|{':-:|' * len(ids)}"]
+    for name in FAILS:
+        marks = [MARKS[expected(name, property_id)] for property_id in ids]
+        lines.append(f"| `{name}` | {' | '.join(marks)} |")
+    return "\n".join(lines)
+
+
+def written() -> str:
+    """What stands in the file."""
+    return README.read_text().partition(BEGIN)[2].partition(END)[0].strip()
+
+
+def rewrite() -> None:
+    """Puts the table into the file."""
+    before, _, rest = README.read_text().partition(BEGIN)
+    README.write_text(f"{before}{BEGIN}\n{matrix()}\n{END}{rest.partition(END)[2]}")
+
+
+if __name__ == "__main__":
+    rewrite()
