@@ -144,6 +144,56 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
     return best
 
 
+@compiled
+def segments_in_strip(
+    a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, order: IntArray, boxes: FloatArray
+) -> list[int]:
+    """Segments that may meet the strip between the line through a along n_a and that through b along n_b.
+
+    The strip lies on the left of the first line and on the right of the second as one looks along the segment a b's
+    normals, and ends at a distance `reach` from that segment. All that meet it are found, and others whose leaf of the
+    tree does; a caller looks closer. O(log n) for each that is found.
+    """
+    found = [0 for _ in range(0)]
+    n_leaves = len(boxes) // 2
+    waiting = np.empty(64, dtype=np.int64)
+    waiting[0] = 1
+    n_waiting = 1
+    while n_waiting > 0:
+        n_waiting -= 1
+        box = waiting[n_waiting]
+        if not _box_in_strip(a, n_a, b, n_b, reach, boxes[box]):
+            continue
+        if box < n_leaves:
+            waiting[n_waiting], waiting[n_waiting + 1] = 2 * box + 1, 2 * box
+            n_waiting += 2
+            continue
+        start = (box - n_leaves) * _LEAF
+        for place in range(start, min(start + _LEAF, len(order))):
+            if order[place] >= 0:  # no padding
+                found.append(order[place])
+    return found
+
+
+@compiled
+def _box_in_strip(a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, box: FloatArray) -> bool:
+    """Whether a box may meet the strip; in doubt, by some roundings of the coordinates, it does."""
+    size = max(abs(a[0]), abs(a[1]), abs(b[0]), abs(b[1]), reach)
+    if not np.isinf(box[0]):  # the box of padding is empty
+        size = max(size, abs(box[0]), abs(box[1]), abs(box[2]), abs(box[3]))
+    doubt = 16 * UNIT_ROUNDOFF * size
+    for axis in range(2):
+        if box[axis] > max(a[axis], b[axis]) + reach + doubt or box[2 + axis] < min(a[axis], b[axis]) - reach - doubt:
+            return False
+    behind_a, before_b = True, True  # all corners
+    for corner in range(4):
+        p = (box[2 * (corner % 2)], box[1 + 2 * (corner // 2)])
+        d_a, d_b = minus(p, a), minus(p, b)
+        behind_a = behind_a and n_a[0] * d_a[1] - n_a[1] * d_a[0] < -doubt
+        before_b = before_b and n_b[0] * d_b[1] - n_b[1] * d_b[0] > doubt
+    return not (behind_a or before_b)
+
+
 def search_tree(surface: Surface, x: FloatArray) -> Tree:
     """What `nearest_segment` needs to search a surface at the positions x (n_nodes, 2): O(n)."""
     order = _padded(surface)

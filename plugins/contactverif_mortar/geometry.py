@@ -1,0 +1,200 @@
+"""One slave segment A B against one master segment 1 → 2: where they overlap, and a point of the overlap with its Δ.
+
+Each point of the slave, at c ∈ [−1, 1], looks along a direction ν(c), linear in c between those of the two ends, and
+sees the master where the line along it meets the segment:
+
+    x_s = (1−c)/2 x_A + (1+c)/2 x_B      n = ν/|ν| (out of the slave)      τ = n turned, along the slave
+    ξ = (x_s − x_1)·τ / (x_2 − x_1)·τ    x_m = (1−ξ) x_1 + ξ x_2           g = (x_m − x_s)·n, negative in penetration
+
+With the segment's own normal at both ends ν is constant. With averaged normals it is (n_A + n_B)/2 + c (n_B − n_A)/2,
+with n_A the unit vector along the sum of the normals of the two segments at A; a node e of the master is then seen from
+the c that solves the quadratic (x_e − x_s(c))·τ(c) |ν| = 0. In both cases x_m − x_s is along n, so that forces along n
+at x_s and x_m balance in sum and in moment, and those of a point need no other point's.
+
+A Δ is a row (n_local, 2): what a number gains for each displacement of A, B, 1, 2, and with averaged normals of the
+slave nodes before A and behind B. With ω the turn of the directions, Δτ = n ω, Δn = −τ ω.
+
+Source: Zavarise & Wriggers (1998), Puso & Laursen (2004), Popp, Gitterle, Gee & Wall (2010); the rows are derived here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.arrays import FloatArray, IntArray
+from contactverif.compiled import compiled
+from contactverif.projection import Vector, between, dot, frame, minus, node
+
+A, B, ONE, TWO, BEFORE, BEHIND = range(6)  # local nodes
+D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # the rows of a point
+
+
+@compiled
+def turned(n: Vector) -> Vector:
+    """τ of a normal n: the tangent that `frame` would have with it."""
+    return -n[1], n[0]
+
+
+@compiled
+def end_normals(x: FloatArray, slave: IntArray, segment: int, before: int, behind: int) -> tuple[Vector, Vector]:
+    """Directions in which the two ends of a slave segment look: averaged with those segments, or its own where −1."""
+    _, _, n = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
+    n_a, n_b = n, n
+    if before >= 0:
+        n_a = _averaged(x, slave, n, before)
+    if behind >= 0:
+        n_b = _averaged(x, slave, n, behind)
+    return n_a, n_b
+
+
+@compiled
+def _averaged(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
+    _, _, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
+    total = (n[0] + n_other[0], n[1] + n_other[1])
+    size = np.sqrt(dot(total, total))
+    return total[0] / size, total[1] / size
+
+
+@compiled
+def seen_from(x_e: Vector, x_a: Vector, x_b: Vector, n_a: Vector, n_b: Vector, straight: bool) -> float:
+    """The c from which the point x_e is seen; the root at which it passes from ahead to behind as c grows."""
+    half = ((x_b[0] - x_a[0]) / 2, (x_b[1] - x_a[1]) / 2)
+    arm = minus(x_e, between(x_a, x_b, 0.0))
+    tau_0 = turned(between(n_a, n_b, 0.0))
+    d, slope = dot(arm, tau_0), dot(half, tau_0)
+    if straight:
+        return d / slope
+    tau_1 = turned(((n_b[0] - n_a[0]) / 2, (n_b[1] - n_a[1]) / 2))
+    slope -= dot(arm, tau_1)
+    c: float = 2 * d / (slope + np.sqrt(slope * slope + 4 * dot(half, tau_1) * d))
+    return c
+
+
+@compiled
+def facing_point(
+    x_a: Vector, x_b: Vector, n_a: Vector, n_b: Vector, x_1: Vector, x_2: Vector, c: float
+) -> tuple[float, float, Vector]:
+    """ξ, gap and normal n (out of the slave) at c."""
+    x_s = between(x_a, x_b, c)
+    nu = between(n_a, n_b, c)
+    size = np.sqrt(dot(nu, nu))
+    n = (nu[0] / size, nu[1] / size)
+    tau = turned(n)
+    xi = dot(minus(x_s, x_1), tau) / dot(minus(x_2, x_1), tau)
+    x_m = between(x_1, x_2, 2 * xi - 1)
+    return xi, dot(minus(x_m, x_s), n), n
+
+
+@compiled
+def turn_of_ends(
+    x: FloatArray, slave: IntArray, segment: int, before: int, behind: int, d_omega_a: FloatArray, d_omega_b: FloatArray
+) -> None:
+    """The turns of n_A and n_B, as rows: ω = n·(Δx_B − Δx_A)/l of the segment alone.
+
+    Averaged with the normal n′ of a neighbour: τ_A·(t ω + t′ ω′)/|n + n′|.
+    """
+    length, t, n = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
+    for row in (d_omega_a, d_omega_b):
+        for i in range(2):
+            row[A, i] = -n[i] / length
+            row[B, i] = n[i] / length
+    if before >= 0:
+        _average_turn(d_omega_a, x, slave, before, t, n, BEFORE, A)
+    if behind >= 0:
+        _average_turn(d_omega_b, x, slave, behind, t, n, B, BEHIND)
+
+
+@compiled
+def _average_turn(
+    row: FloatArray, x: FloatArray, slave: IntArray, other: int, t: Vector, n: Vector, first: int, second: int
+) -> None:
+    length, t_other, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
+    total = (n[0] + n_other[0], n[1] + n_other[1])
+    squared = dot(total, total)
+    tau = turned(total)  # longer than one by |n + n′|, hence the square
+    row *= dot(tau, t) / squared
+    share = dot(tau, t_other) / squared / length
+    for i in range(2):
+        row[first, i] -= share * n_other[i]
+        row[second, i] += share * n_other[i]
+
+
+@compiled
+def cut_gains(
+    d_c: FloatArray,
+    c: float,
+    cutting: int,
+    x_e: Vector,
+    x_a: Vector,
+    x_b: Vector,
+    n_a: Vector,
+    n_b: Vector,
+    d_omega_a: FloatArray,
+    d_omega_b: FloatArray,
+) -> None:
+    """Δ of the c from which local node `cutting`, at x_e, is seen.
+
+    [τ·(x_B − x_A)/2 − h ω_c] Δc = τ·(Δx_e − (1−c)/2 Δx_A − (1+c)/2 Δx_B) + h ω, with h = (x_e − x_s)·n, ω the turn of n
+    at fixed c and ω_c its turn for each unit of c.
+    """
+    nu = between(n_a, n_b, c)
+    size = np.sqrt(dot(nu, nu))
+    n = (nu[0] / size, nu[1] / size)
+    tau = turned(n)
+    height = dot(minus(x_e, between(x_a, x_b, c)), n)
+    slope = dot(minus(x_b, x_a), tau) / 2 + height * dot(minus(n_b, n_a), tau) / 2 / size
+    part_a = height * (1 - c) / 2 * dot(tau, turned(n_a)) / size / slope
+    part_b = height * (1 + c) / 2 * dot(tau, turned(n_b)) / size / slope
+    for k in range(len(d_c)):
+        for i in range(2):
+            d_c[k, i] = part_a * d_omega_a[k, i] + part_b * d_omega_b[k, i]
+    for i in range(2):
+        d_c[cutting, i] += tau[i] / slope
+        d_c[A, i] -= (1 - c) / 2 * tau[i] / slope
+        d_c[B, i] -= (1 + c) / 2 * tau[i] / slope
+
+
+@compiled
+def point_gains(
+    gains: FloatArray,
+    c: float,
+    x_a: Vector,
+    x_b: Vector,
+    n_a: Vector,
+    n_b: Vector,
+    x_1: Vector,
+    x_2: Vector,
+    d_omega_a: FloatArray,
+    d_omega_b: FloatArray,
+) -> None:
+    """The rows of Δξ, Δg and ω at c into `gains` (5, n_local, 2), whose row of Δc is there.
+
+        (x_2 − x_1)·τ Δξ = τ·(Δx_s − (1−ξ)Δx_1 − ξΔx_2) − g ω
+        Δg = n·((1−ξ)Δx_1 + ξΔx_2 − Δx_s) + n·(x_2 − x_1) Δξ
+
+    with Δx_s at fixed c gaining (x_B − x_A)/2 Δc, and ω gaining ω_c Δc.
+    """
+    xi, gap, n = facing_point(x_a, x_b, n_a, n_b, x_1, x_2, c)
+    nu = between(n_a, n_b, c)
+    size = np.sqrt(dot(nu, nu))
+    tau = turned(n)
+    ab, along = minus(x_b, x_a), minus(x_2, x_1)
+    length, lean = dot(along, tau), dot(along, n)
+    part_a = (1 - c) / 2 * dot(tau, turned(n_a)) / size
+    part_b = (1 + c) / 2 * dot(tau, turned(n_b)) / size
+    bend = -dot(minus(n_b, n_a), tau) / 2 / size
+    along_tau, along_n = dot(ab, tau) / 2, dot(ab, n) / 2
+    shape = ((1 - c) / 2, (1 + c) / 2, -(1 - xi), -xi)
+    for k in range(gains.shape[1]):
+        for i in range(2):
+            d_c = gains[D_C, k, i]
+            omega = part_a * d_omega_a[k, i] + part_b * d_omega_b[k, i] + bend * d_c
+            d_xi = along_tau * d_c - gap * omega
+            d_gap = -along_n * d_c
+            if k < 4:
+                d_xi += shape[k] * tau[i]
+                d_gap -= shape[k] * n[i]
+            d_xi /= length
+            gains[OMEGA, k, i] = omega
+            gains[D_XI, k, i] = d_xi
+            gains[D_GAP, k, i] = d_gap + lean * d_xi

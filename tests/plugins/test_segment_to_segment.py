@@ -1,0 +1,250 @@
+"""Segment-to-segment and all that integrates over the same cells: exact forces and tangents, balance, the dead zone."""
+
+from __future__ import annotations
+
+import sys
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from bent import DEPTH, bent, flat, pushed
+
+import contactverif_mortar
+from contactverif import Interface, MisuseError, projection
+from contactverif.body import block
+from contactverif.compiled import uncompiled
+from contactverif.newton import solve
+from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.scene import Scene
+from contactverif.strategies import named_case
+from contactverif.subject import Subject
+from contactverif_mortar import cells, geometry, search, shapes, transmission
+
+PRESSURE_FROM_POSITIONS = [
+    ("sts", {}),
+    ("sts", {"area": "reference"}),
+    ("chen_hisada", {}),
+    ("mortar", {}),
+    ("mortar", {"area": "reference"}),
+    ("mortar_dual", {}),
+    ("mortar", {"normals": "averaged"}),
+    ("mortar_dual", {"normals": "averaged", "area": "reference"}),
+]
+MULTIPLIERS = [
+    ("mortar_lm", {}),
+    ("mortar_dual_lm", {}),
+    ("mortar_lm", {"normals": "averaged", "area": "reference"}),
+    ("mortar_dual_lm", {"normals": "averaged"}),
+]
+METHODS = [*PRESSURE_FROM_POSITIONS, *MULTIPLIERS]
+
+
+def ids(methods: list[tuple[str, dict[str, str]]]) -> list[str]:
+    return [f"{name}{options or ''}" for name, options in methods]
+
+
+def made(name: str, options: dict[str, str], penalty: float = 8.0) -> Any:
+    return getattr(contactverif_mortar, name)(penalty=penalty, **options)
+
+
+def pressed(formulation: Any, seed: int) -> tuple[Interface, Any]:
+    """Bent surfaces, and multipliers behind the positions where the formulation has any."""
+    interface, z = bent(seed)
+    if hasattr(formulation, "n_multipliers"):
+        multipliers = np.random.default_rng(seed).uniform(0, 3, formulation.n_multipliers(interface))
+        z = np.append(z, multipliers)
+    return interface, z
+
+
+@pytest.mark.parametrize(("name", "options"), PRESSURE_FROM_POSITIONS, ids=ids(PRESSURE_FROM_POSITIONS))
+@pytest.mark.parametrize("case", ["a1", "a2", "b", "c", "c-prime"])
+def test_a_uniform_pressure_is_transmitted_as_in_rationals(case: str, name: str, options: dict[str, str]) -> None:
+    flat_case = named_case(case)
+    interface, z = flat_case.interface, flat_case.z
+    forces = pushed(made(name, options, flat_case.penalty), interface, z)
+    exact = uniform_pressure_weights_exact(interface, flat_case.parameters["along"])
+    signs = np.where(np.arange(interface.n_nodes) < interface.n_slave_nodes, 1, -1)
+    assert forces[:, 1] * signs == pytest.approx([float(value) for value in exact], abs=64 * 2.0**-53)
+    if case != "c-prime":  # 3.2 is none of the binary numbers
+        found = [Fraction(value).limit_denominator(60) for value in (forces[:, 1] * signs).tolist()]
+        assert found == exact
+    assert not forces[:, 0].any()
+
+
+@pytest.mark.parametrize(("name", "options"), PRESSURE_FROM_POSITIONS, ids=ids(PRESSURE_FROM_POSITIONS))
+def test_so_it_is_on_random_meshes_and_with_many_segments_under_one(name: str, options: dict[str, str]) -> None:
+    random = np.random.default_rng(1)
+    meshes = [(random.integers(1, 9, n).tolist(), random.integers(1, 9, m).tolist()) for n in (1, 4) for m in (1, 5, 9)]
+    meshes += [([12.0], [0.125] * 96), ([0.125] * 96, [12.0]), ([5.0, 2.0**-18, 3.0], [2.0**-17, 20.0])]
+    for slave, master in meshes:
+        master = [*master, max(sum(slave) - sum(master), 1.0)]  # the slave overhangs nowhere
+        interface, z = flat(slave, master)
+        exact = uniform_pressure_weights_exact(interface, z[::2])
+        forces = pushed(made(name, options, 1 / DEPTH), interface, z)
+        assert np.abs(forces[:, 1]) == pytest.approx([float(value) for value in exact], abs=1e-13)
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_the_tangent_is_the_complex_step(name: str, options: dict[str, str]) -> None:
+    formulation, in_contact = made(name, options), 0
+    for seed in range(100):
+        interface, z = pressed(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        h = 2.0**-100
+        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
+        assert np.abs(moved.imag.T / h - tangent).max() <= 1e-13 * np.abs(tangent).max()
+        in_contact += bool(pairing["active"].any())
+    assert in_contact > 50
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_conserving_and_unsymmetric_as_declared(name: str, options: dict[str, str]) -> None:
+    formulation, unsymmetric = made(name, options), 0.0
+    for seed in range(50):
+        interface, z = pressed(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        if not pairing["active"].any():
+            continue
+        unsymmetric = max(unsymmetric, np.abs(tangent - tangent.T).max() / np.abs(tangent).max())
+        x, forces = z[: interface.n_unknowns].reshape(-1, 2), pushed(formulation, interface, z)
+        size = np.abs(forces).sum()
+        assert np.abs(forces.sum(axis=0)).max() <= 1e-14 * size
+        assert abs((x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()) <= 1e-13 * size
+    assert unsymmetric > 0.1
+    assert formulation.traits.symmetric is False
+    assert formulation.traits.conserves_force
+    assert formulation.traits.conserves_moment
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, str]) -> None:
+    formulation = made(name, options)
+    interface, z = pressed(formulation, 3)
+    pairing = formulation.pair(interface, z)
+    states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
+    batch = formulation.residual(interface, pairing, states)
+    assert batch.shape == states.shape
+    for i in range(3):
+        for j in range(2):
+            assert np.array_equal(batch[i, j], formulation.residual(interface, pairing, states[i, j]))
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_uncompiled_kernels_agree(name: str, options: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    formulation = made(name, options)
+    scenes = [pressed(formulation, seed) for seed in range(4)]
+
+    def answers() -> list[Any]:
+        found = []
+        for interface, z in scenes:
+            pairing = formulation.pair(interface, z)
+            found += [formulation.residual(interface, pairing, z), formulation.tangent(interface, pairing, z).toarray()]
+        return found
+
+    compiled = answers()
+    nodal = sys.modules["contactverif_mortar.chen_hisada"]  # in the package that name is the function
+    for module in (projection, cells, nodal, geometry, search, shapes, transmission):
+        for attribute, value in list(vars(module).items()):
+            if hasattr(value, "py_func"):
+                monkeypatch.setattr(module, attribute, uncompiled(value))
+    for one, other in zip(compiled, answers(), strict=True):
+        assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_no_contact_is_no_force_and_no_error(name: str, options: dict[str, str]) -> None:
+    formulation = made(name, options)
+    for lift in (0.01, 100.0):
+        interface, z = flat([2, 2], [3, 1])
+        x = interface.nodes.copy()
+        x[:3, 1] += lift
+        n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
+        z = np.append(x, np.zeros(n))
+        pairing = formulation.pair(interface, z)
+        assert not pairing["active"].any()
+        assert not formulation.residual(interface, pairing, z).any()
+        tangent = formulation.tangent(interface, pairing, z)
+        assert tangent.shape == (z.size, z.size)
+        assert np.linalg.matrix_rank(tangent.toarray()) == n
+        formulation.contact_points(interface, pairing, z)
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_surfaces_that_touch_exactly_are_in_contact(name: str, options: dict[str, str]) -> None:
+    formulation = made(name, options)
+    interface, _ = flat([2, 2], [3, 1])
+    n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
+    assert formulation.pair(interface, np.append(interface.nodes, np.zeros(n)))["active"].all()
+
+
+SLAVE, MASTER = [-6, -4.4, -2.1, -0.3, 1.9, 4, 6], [-3.3, -1.6, 0.4, 2.2, 3.3]
+
+
+@pytest.mark.parametrize("degrees", [0, 17])
+@pytest.mark.parametrize("name", ["sts", "mortar", "mortar_dual", "mortar_lm", "mortar_dual_lm"])
+def test_the_dead_zone_is_passed(name: str, degrees: int) -> None:
+    """A slave that overhangs the master inside its segments, p on all that overhangs: the stress is uniform."""
+    stress = dead_zone(getattr(contactverif_mortar, name), degrees)
+    assert stress <= (3e-14 if degrees == 0 else 3e-13)  # turned, Newton ends within some roundoffs of 1e4 × positions
+
+
+def test_nodal_gaps_fail_in_the_dead_zone() -> None:
+    assert dead_zone(contactverif_mortar.chen_hisada, 0) > 0.1
+
+
+def dead_zone(make: Any, degrees: float) -> float:
+    axis = [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
+    material: dict[str, Any] = {"young": 1e3, "poisson": 0.3, "axis": axis}
+    upper = block(SLAVE, np.linspace(0, 4, 4), contact="bottom", pressure=1.0, over=(-3.3, 3.3), **material)
+    lower = block(MASTER, np.linspace(-4, 0, 4), contact="top", approach=0.0, **material)
+    scene = Scene((upper, lower))
+    trace = solve(scene, Subject("", make).with_penalty(1e4))
+    assert trace.converged
+    exact = [-3 / 7, -1.0, 0.0]
+    return max(float(np.abs(stress - exact).max()) for stress in scene.stresses(trace.q[-1]))
+
+
+@pytest.mark.parametrize("name", ["sts", "mortar", "mortar_dual"])
+def test_a_half_covered_slave_pushes_with_what_is_covered(name: str) -> None:
+    interface, z = flat([1, 4, 3], [0.5, 2], shift=2.0)  # the master covers [2, 4.5] of [0, 8]
+    forces = pushed(made(name, {}, 1 / DEPTH), interface, z)
+    # ∫N over [2, 4.5] on the segment [1, 5], and on the master's own.
+    exact = [0, 2.5 * (5 - 3.25) / 4, 2.5 * (3.25 - 1) / 4, 0, -1, -1.25, -0.25]
+    assert forces[:, 1] == pytest.approx(exact, abs=1e-15)
+
+
+@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
+def test_contact_points_add_up_to_the_forces(name: str, options: dict[str, str]) -> None:
+    formulation = made(name, options)
+    for seed in range(20):
+        interface, z = pressed(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        points = formulation.contact_points(interface, pairing, z)
+        assert np.all(points.weight >= 0)
+        assert np.all(points.pressure[~points.active] == 0)
+        if "mortar" in name:
+            assert len(points.gap) == interface.n_slave_nodes
+            continue
+        pushes = (points.pressure * points.weight)[:, None] * points.normal
+        slave = pushed(formulation, interface, z)[: interface.n_slave_nodes].sum(axis=0)
+        assert pushes.sum(axis=0) == pytest.approx(slave, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("sts", {"penalty": 0.0}),
+        ("sts", {"penalty": 1.0, "area": "slave"}),
+        ("mortar", {"penalty": float("nan")}),
+        ("mortar_dual_lm", {"penalty": 1.0, "normals": 3}),
+        ("chen_hisada", {"penalty": 1.0, "tau": 1.0}),
+        ("chen_hisada", {"penalty": True}),
+    ],
+)
+def test_options_that_cannot_be_used_say_so(name: str, options: dict[str, Any]) -> None:
+    with pytest.raises(MisuseError) as caught:
+        getattr(contactverif_mortar, name)(**options)
+    assert caught.value.argument == list(options)[-1]
