@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import linalg
 
-from contactverif.arrays import FloatArray
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.blocks import exact_unknowns, pressure_of
 from contactverif.case import Case
 from contactverif.formulation import Traits
+from contactverif.linear import ROUNDING
 from contactverif.newton import System
 from contactverif.property import Measurement, Property, Quantity
-from contactverif.scene import scene_of
+from contactverif.scene import Scene, scene_of
 from contactverif.strategies import block_cases
 from contactverif.subject import Guarded, Subject
 from contactverif_properties.anywhere import with_multipliers
@@ -29,7 +31,8 @@ TOO_MANY = Quantity(
 def right_multipliers(case: Case, subject: Subject, formulation: Guarded, pressure: float) -> FloatArray:
     """Multipliers (n_multipliers,) that stand for a uniform pressure in the exact state of the case.
 
-    The pressure itself where it transmits the right forces; else those that come nearest to the right forces.
+    The pressure itself where it transmits the right forces; else those that come nearest to the right forces. 0 of one
+    that transmits nothing, as that of a node which faces nothing.
     """
     uniform = np.full(formulation.n_multipliers(case.interface), pressure)
     pressed = with_multipliers(case, uniform)
@@ -37,22 +40,32 @@ def right_multipliers(case: Case, subject: Subject, formulation: Guarded, pressu
     exact = consistent_forces(case, pressure).reshape(-1)
     nearest = np.linalg.lstsq(transfer, exact, rcond=None)[0].astype(np.float64)
     if subject.traits.penalty != "nodal":
+        uniform[~transfer.any(axis=0)] = 0.0
         errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]
         if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):
             return uniform
     return nearest
 
 
-def uniformity_error(case: Case, formulation: Guarded, pressure: float) -> float:
-    """Largest |λ − p| over p, of the multipliers of a solved case that are pressures; of any solution, if several are.
+def nearest_solution(case: Case, scene: Scene, formulation: Guarded, right: FloatArray) -> tuple[FloatArray, float]:
+    """Multipliers as good as those of a solved case, and of all such the nearest to the right ones.
 
-    What transmits no force, as multipliers do where they are not unique, is not counted.
+    What moves no body, as multipliers do where they are not unique, may be added; with a rigid master that is also what
+    shares the forces out among its nodes.
+
+    Returns
+    -------
+    (n_multipliers,), and the smallest singular value of what the bodies feel of them over the largest: forces that are
+    wrong by roundoff leave the multipliers uncertain by roundoff over that.
     """
+    found = case.z[case.interface.n_unknowns :]
     pairing = formulation.pair(case.interface, case.z)
-    transfer = force_columns(case, formulation, pairing)
-    excess = case.z[case.interface.n_unknowns :] - pressure
-    seen = np.linalg.lstsq(transfer, transfer @ excess, rcond=None)[0]
-    return float(np.abs(seen).max(initial=0.0)) / pressure
+    felt = scene.spread.T @ force_columns(case, formulation, pairing)
+    _, sizes, directions = linalg.svd(felt)
+    told = int((sizes > ROUNDING * max(felt.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
+    unfelt = directions[told:]
+    nearest: FloatArray = found + unfelt.T @ (unfelt @ (right - found))
+    return nearest, float(sizes[told - 1] / sizes[0]) if told else 1.0
 
 
 def rank(case: Case, subject: Subject) -> Measurement:
@@ -61,8 +74,7 @@ def rank(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The number of zero singular values of the saddle-point matrix whose vectors move no body. Detail: the number of
-        multipliers.
+        The number of zero singular values of the saddle-point matrix. Detail: the number of multipliers.
 
     Source: verification, "Lagrange multipliers" of the formulations; VTS-PPT has seven too many with eight slave
     segments on two master segments.
@@ -76,8 +88,6 @@ def rank(case: Case, subject: Subject) -> Measurement:
     matrix, floor = system.matrix(u, system.pair(u))
     step = system.step(matrix, np.zeros(system.size), floor)
     details = {"multipliers": float(system.n_multipliers)}
-    if step.change is None:
-        return Measurement({}, {}, details=details, undecided="the bodies are not held: the matrix has no inverse")
     return Measurement({TOO_MANY.name: float(step.deficiency)}, {TOO_MANY.name: 0.0}, details=details)
 
 

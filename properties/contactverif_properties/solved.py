@@ -12,16 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.blocks import exact_unknowns, pressure_of
+from contactverif.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.case import Case
+from contactverif.formulation import ContactPoints
 from contactverif.newton import NEARLY, Trace, solve
 from contactverif.property import Measurement, Property, Quantity
 from contactverif.scene import Scene, scene_of
 from contactverif.strategies import block_cases, variant_cases
 from contactverif.subject import Guarded, Subject
 from contactverif_properties.anywhere import no_barrier
-from contactverif_properties.multipliers import right_multipliers, uniformity_error
+from contactverif_properties.multipliers import nearest_solution, right_multipliers
 from contactverif_properties.patch import consistent_forces
 
 HIGH = 1e3  # × the moderate penalty of a case
@@ -49,7 +50,12 @@ QUANTITIES = (
     Quantity("pressure", "1", PRESSURE_TOLERANCE, PRESSURE_REASON),
 )
 HIGH_QUANTITIES = tuple(replace(quantity, name=f"{quantity.name}, high penalty") for quantity in QUANTITIES)
-MULTIPLIERS = Quantity("multipliers", "1", PRESSURE_TOLERANCE, PRESSURE_REASON)
+MULTIPLIERS = Quantity(
+    "multipliers",
+    "1",
+    f"({TOLERANCE})/s",
+    f"{REASON}; s is the smallest singular value of what the bodies feel of the multipliers over the largest",
+)
 
 
 def solved(case: Case, subject: Subject) -> Measurement:
@@ -92,31 +98,45 @@ def by_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
     -------
     Measurement
         stress and forces as `at_penalty`; gap over p/ε̂, with the penalty that is not there as a measure. multipliers:
-        largest error of one over p, where they are pressures. Details: how it ended, and how many multipliers are not
-        unique, of which those that are nearest to uniform count.
+        largest error of one over p, where they are pressures. Where they are not unique, those of the solutions count
+        that are nearest to the right ones. Where the exact solution is one of the formulation's, to roundoff, it counts
+        for one that Newton found less exactly. Details: how it ended, and how many were not unique.
     """
     scene, pressure = scene_of(case), pressure_of(case, np.inf)
     formulation = subject.on(replace(case, penalty=penalty))
     exact = exact_unknowns(scene, pressure, np.inf)
     right = right_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
-    trace, u = solution(scene, formulation, np.append(exact, right), pressure / penalty)
-    q = u[: scene.n_free]
-    z = np.append(scene.positions(q), u[scene.n_free :])
-    here = replace(case, z=z, penalty=penalty, n_multipliers=len(right))
-    slave, master = force_errors(here, scene, formulation, q, pressure)
-    values = {
-        "stress": stress_error(scene, q, pressure),
-        "slave forces": slave,
-        "master forces": master,
-        "gap": gap_error(here, 0.0, pressure / penalty),
-    }
-    of_mesh, of_gap, ratio = tolerance_parts(here, scene, pressure)
-    tolerances = dict.fromkeys(values, of_mesh + of_gap)
-    tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
-    if subject.traits.penalty == "distributed":
-        values[MULTIPLIERS.name] = uniformity_error(here, formulation, pressure)
-        tolerances[MULTIPLIERS.name] = of_mesh + of_gap / ratio
-    return Measurement(values, tolerances, details=_ended(trace))
+    exact_u = np.append(exact, right)
+
+    def errors(u: FloatArray) -> Measurement:
+        q = u[: scene.n_free]
+        here = replace(case, z=np.append(scene.positions(q), u[scene.n_free :]), n_multipliers=len(right))
+        multipliers, sharpness = nearest_solution(here, scene, formulation, right)
+        here = replace(here, z=np.append(scene.positions(q), multipliers))
+        slave, master = force_errors(here, scene, formulation, q, pressure)
+        values = {
+            "stress": stress_error(scene, q, pressure),
+            "slave forces": slave,
+            "master forces": master,
+            "gap": gap_error(here, 0.0, pressure / penalty),
+        }
+        of_mesh, of_gap, _ = tolerance_parts(here, scene, pressure)
+        tolerances = dict.fromkeys(values, of_mesh + of_gap)
+        tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
+        if subject.traits.penalty == "distributed":
+            carry = right != 0  # one that faces nothing has none
+            values[MULTIPLIERS.name] = float(np.abs(multipliers[carry] / pressure - 1).max(initial=0.0))
+            tolerances[MULTIPLIERS.name] = (of_mesh + of_gap) / sharpness
+        return Measurement(values, tolerances)
+
+    trace, u = solution(scene, formulation, exact_u, pressure / penalty)
+    found = errors(u)
+    if any(value > found.tolerances[name] for name, value in found.values.items()):
+        # a saddle point that is nearly singular spoils what Newton finds, and not that the exact solution is one
+        at_exact = solve(scene, formulation, start=exact_u, iterations=1, own_tangent=False)
+        if at_exact.roundings[0] <= NEARLY:
+            found = errors(exact_u)
+    return replace(found, details=_ended(trace))
 
 
 def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
@@ -129,7 +149,8 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
         what the bodies need to be in balance and of what the formulation gives, over p L. gap: largest error of a
         node's height over the other surface, or of what the formulation says of its contact points, over p/ε̂.
         pressure: largest error of what it says they carry, over p; missing where it says nothing, or is nodal and so
-        knows forces only. Points of no weight or without a master segment do not count.
+        knows forces only. Of idle points those of no weight, without a master segment or beside the master do
+        not count.
     """
     scene, pressure = scene_of(case), pressure_of(case, penalty)
     formulation = subject.on(replace(case, penalty=penalty))
@@ -146,7 +167,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
     }
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, formulation.pair(case.interface, z), z)
-        carry = (points.weight != 0) & (points.master_segment >= 0)
+        carry = (points.weight != 0) & (points.active | (points.master_segment >= 0) & ~beside(case, points))
         said = np.where(carry, points.gap, -pressure / penalty)  # NaN where meaningless
         values["gap"] = max(values["gap"], float(np.nanmax(np.abs(said * penalty / pressure + 1), initial=0.0)))
         if subject.traits.penalty != "nodal":
@@ -158,6 +179,21 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
     if "pressure" in values:
         tolerances["pressure"] = of_mesh + of_gap / ratio
     return Measurement(values, tolerances, details=_ended(trace))
+
+
+def beside(case: Case, points: ContactPoints) -> BoolArray:
+    """Which points (n_points,) of a slave that overhangs its master lie beside it, or as near its end as roundoff is.
+
+    A point that names no place on the slave does not.
+    """
+    if not overhangs(case):
+        return np.zeros(len(points.c), bool)
+    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    ends = slave[case.interface.slave.segments[points.slave_segment]]  # of segment −1 too, where nothing is asked
+    place = (1 - points.c) / 2 * ends[:, 0] + (1 + points.c) / 2 * ends[:, 1]
+    rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate
+    found: BoolArray = (place < master.min() + rounding) | (place > master.max() - rounding)
+    return found & (points.slave_segment >= 0)
 
 
 def solution(scene: Scene, formulation: Guarded, exact: FloatArray, penetration: float) -> tuple[Trace, FloatArray]:
@@ -209,10 +245,16 @@ def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, 
 
 
 def gap_error(case: Case, penetration: float, size: float) -> float:
-    """Largest departure of a node's height from a plane slave at `penetration` below a plane master, over `size`."""
+    """Largest departure of a node's height from a plane slave at `penetration` below a plane master, over `size`.
+
+    A slave node beside the master stands for the place that is opposite the master's end: what overhangs may bend.
+    """
     along = case.parameters["direction"]
     heights = case.positions @ [-along[1], along[0]]
     n_slave = case.interface.n_slave_nodes
+    slave, master = np.split(case.parameters["along"], [n_slave])
+    order = np.argsort(slave)
+    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
     level = heights[n_slave:].mean()
     errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
     return float(errors.max() / size)
