@@ -46,7 +46,7 @@ def verify(
         list[str] | None,
         typer.Argument(help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.", metavar="NAME"),
     ] = None,
-    all_: Annotated[bool, typer.Option("--all", help="Every installed formulation.")] = False,
+    all_: Annotated[bool, typer.Option("--all", help="Every installed formulation that wraps no other.")] = False,
     properties: Annotated[
         list[str] | None,
         typer.Option("--property", "-p", help="Only properties whose id matches; repeatable.", metavar="GLOB"),
@@ -142,6 +142,109 @@ def verify(
 
 
 @app.command()
+def compare(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Formulations; or two reports, OLD.nc NEW.nc.", metavar="NAME")
+    ] = None,
+    against: Annotated[str | None, typer.Option(help="The formulation to compare with.", metavar="NAME")] = None,
+    properties: Annotated[
+        list[str] | None,
+        typer.Option("--property", "-p", help="Only properties whose id matches; repeatable.", metavar="GLOB"),
+    ] = None,
+    examples: Annotated[int | None, typer.Option(help="Random cases a property.")] = None,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.")] = None,
+    profile: Annotated[str | None, typer.Option(help=f"{PROFILE_HELP} By default dev.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write all that was found to this netCDF file.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write one page with tables and pictures.", metavar="FILE")] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Draw the meshes on which they differ into this folder.", metavar="FOLDER")
+    ] = None,
+    mesh: Annotated[
+        Path | None, typer.Option(help="Ask on the interface of this mesh, with random states.", metavar="FILE")
+    ] = None,
+    slave: Annotated[str | None, typer.Option(help="Its slave, as of verify.", metavar="TAG")] = None,
+    master: Annotated[str | None, typer.Option(help="Its master.", metavar="TAG")] = None,
+    flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's surfaces.")] = False,
+    scene: Annotated[
+        str | None, typer.Option(help="Ask on this scene: c, c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")
+    ] = None,
+) -> None:
+    """Compare formulations with a reference, on the same cases; or an old report with a new one.
+
+    An argument that ends in .nc, or is a file, is a report.
+
+    \bExit status, of formulations
+      0  compared, and every candidate does what it promises
+      1  a candidate breaks a promise, cannot be judged or does not load,
+         as of verify; being worse than the reference is a result, no error,
+         and the reference itself is not on trial
+    \bExit status, of two reports
+      0  nothing got worse; being slower is not worse
+      1  something passed and does not any more, kept a promise and does not,
+         or its error grew by more than roundoff can explain
+    \bOf either
+      2  something was asked that cannot be
+
+    \bExamples
+      contactverif compare mine --against vts-ppt
+      contactverif compare mine nts-ar --against vts-ppt --seed 7 --html mine.html
+      contactverif compare old.nc new.nc
+    """
+    from contactverif.comparing import Asked, compare_formulations, compare_reports, reports_in
+
+    paths = reports_in(names or [])
+    asked = Asked(
+        against=against,
+        profile=profile,
+        examples=examples,
+        seed=seed,
+        interface=_interface(mesh, slave, master, flip),
+        scene=_scene(scene, mesh),
+        report=report,
+        pictures=pictures,
+    )
+    if paths:
+        raise typer.Exit(0 if compare_reports(paths, properties or [], html, asked) else 1)
+    raise typer.Exit(0 if compare_formulations(names or [], properties or [], html, asked) else 1)
+
+
+@app.command()
+def report(
+    path: Annotated[Path, typer.Argument(help="A report that verify --report wrote.", metavar="REPORT")],
+    html: Annotated[
+        Path | None, typer.Option(help="Write one page with tables, distributions and pictures.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Show a stored report: its table here, or all of it as a page.
+
+    The page needs nothing but itself, reads on a phone and prints. Nothing
+    is judged or solved again.
+
+    \bExit status
+      0  shown, whatever the report says
+      2  something was asked that cannot be
+
+    \bExamples
+      contactverif report vts-ppt.nc
+      contactverif report vts-ppt.nc --html vts-ppt.html
+    """
+    from contactverif.tables import StoredTable, show, stored_summary
+    from contactverif_reports.stored import read_report
+
+    if html is None:
+        stored = read_report(path)
+        show(StoredTable(stored))
+        show(stored_summary(stored))
+        return
+    from contactverif_reports.pages import check_page, write_page
+    from contactverif_reports.report_page import report_page
+
+    check_page(html)
+    write_page(html, report_page(read_report(path)))
+    typer.echo(f"page: {html}")
+
+
+@app.command()
 def replay(
     report: Annotated[Path, typer.Argument(help="A report that verify --report wrote.", metavar="REPORT")],
     case: Annotated[
@@ -233,6 +336,46 @@ def draw(
 
 
 @app.command()
+def paper(
+    out: Annotated[Path, typer.Option(help="Folder to write to, made if it is not there.", metavar="FOLDER")] = Path(
+        "paper"
+    ),
+) -> None:
+    """Compute the reference paper's tables and figures again, beside what it says.
+
+    Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416.
+    Writes paper.html, one page with all of it; paper.nc, the numbers; and
+    each figure as SVG.
+
+    \bExit status
+      0  written; whether it agrees is what the page says
+      2  something was asked that cannot be
+
+    \bExamples
+      contactverif paper
+      contactverif paper --out reports/paper
+    """
+    from contactverif.progress import Bar
+    from contactverif.studies.paper import compute, steps
+    from contactverif_reports.paper_page import check_folder, summary, write
+
+    folder = out.absolute()
+    check_folder(folder)
+    done, planned = 0, steps()
+    with Bar() as bar:
+
+        def told(what: str) -> None:
+            nonlocal done
+            bar.at(what, done, max(planned, done))
+            done += 1
+
+        found = compute(told)
+        written = write(found, folder, told)
+    typer.echo(summary(found))
+    typer.echo(f"{len(written)} files in {out}, to begin with: {out / written[-1].name}")
+
+
+@app.command()
 def scenes() -> None:
     """List the scenes that have a name, with drawings, and their options.
 
@@ -248,12 +391,12 @@ def scenes() -> None:
 
 
 def _chosen(names: list[str], every: bool) -> list[str]:
-    from contactverif.registry import formulation_names
+    from contactverif.registry import formulation_names, standalone_names
 
     if every and names:
         raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")
     if every:
-        return list(formulation_names())
+        return list(standalone_names())
     if not names:
         raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
     return names

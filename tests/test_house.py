@@ -55,7 +55,7 @@ ROOMS = {
     "projection": Room(("projection",), ("contracts", "compiled"), ("numpy", "numba"), QUIET),
     "mesh": Room(("mesh",), ("contracts",), ("numpy", "meshio")),
     "bulk": Room(("bulk",), ("contracts",), ("numpy", "scipy", "skfem"), QUIET),
-    "scene": Room(("scene", "blocks", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET),
+    "scene": Room(("scene", "blocks", "disk", "hertz", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET),
     "newton": Room(("newton", "linear"), ("contracts", "scene", "newton"), ("numpy", "scipy"), QUIET),
     "strategies": Room(("strategies",), ("contracts", "scene", "strategies", "oracle"), ("numpy", "hypothesis"), QUIET),
     "oracle": Room(("oracle",), ("contracts", "oracle"), ("numpy",), QUIET),
@@ -63,15 +63,21 @@ ROOMS = {
     "properties": Room(
         (), ("contracts", "oracle", "scene", "newton", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
-    "reports": Room((), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib", "meshio")),
+    "reports": Room(
+        (), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib", "meshio", "jinja2", "markupsafe")
+    ),
     "run": Room(
         ("registry", "runner", "generate", "profile", "provenance"),
         ("contracts", "scene", "strategies", "run"),
         ("numpy", "hypothesis"),
     ),
+    "studies": Room(("studies", "pictures"), (*INSIDE, "studies"), ("numpy", "scipy", "hypothesis")),
     "front": Room(  # knows everything, but no formulation and no property by name; imported by nobody
-        ("cli", "pytest_plugin", "testing", "tables", "progress", "asked", "drawing", "gallery", "pictures"),
-        (*INSIDE, "front"),
+        (
+            *("cli", "pytest_plugin", "testing", "tables", "progress", "asked", "drawing", "gallery"),
+            *("comparing", "side_by_side"),
+        ),
+        (*INSIDE, "studies", "front"),
         ("numpy", "hypothesis", "typer", "rich", "pytest"),
     ),
 }

@@ -37,6 +37,11 @@ def draw(
 ) -> None:
     """See `contactverif_reports.draw.figure`."""
     target = checked_name(path, SUFFIXES)
+    save(drawn(case, title=title, forces=forces, exact=exact), target)
+
+
+def drawn(case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5) -> Figure:
+    """The figure that `contactverif_reports.draw.figure` writes, for a page; `width` in inches."""
     course, gaps = Course.of(case), Gaps.of(case)
     interface = case.interface
     lengths = [surface.lengths(case.positions) for surface in (interface.slave, interface.master)]
@@ -47,7 +52,7 @@ def draw(
     size = float(np.ptp(shown, axis=0).max())
 
     wide, high = np.ptp(shown, axis=0) + 2 * (_BODY + _ARROW * with_forces) * size
-    figure = Figure(figsize=(7.5, float(np.clip(6.5 * high / wide, 1.6, 7.5)) + 1.4), layout="constrained")
+    figure = Figure(figsize=(width, float(np.clip((width - 1) * high / wide, 1.6, width)) + 1.4), layout="constrained")
     axes = figure.add_subplot()
     axes.set_aspect("equal", adjustable="datalim")
     side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0  # towards the other body: there the labels are clear
@@ -64,7 +69,7 @@ def draw(
         loc="left",
         parse_math=False,
     )
-    save(figure, target)
+    return figure
 
 
 def _shown(case: Case, gaps: Gaps, roundoff: float, apart: bool) -> tuple[FloatArray, str]:

@@ -59,30 +59,23 @@ def read_case(path: str | os.PathLike[str], case_id: str) -> StoredCase:
     ------
     MisuseError : as `case_ids`, and if there is no such id.
     """
-    from contactverif_reports.counterexamples import ORIGIN
-
     with opened(path) as report:
         groups = _group(report, schema.COUNTEREXAMPLES, path).groups
         if case_id not in groups:
             raise MisuseError("--case", repr(case_id), _ids_that_are(case_id, list(groups)))
-        group = groups[case_id]
-        variables = _group(group, schema.CASE, path).variables
-        try:
-            arrays = {variable.getncattr(ORIGIN): variable[...] for variable in variables.values()}
-            case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
-            values, tolerances = _measured(group)
-            return StoredCase(
-                case,
-                str(group.formulation),
-                str(group.property_id),
-                Verdict(int(group["verdict"][...])),
-                "" if group.reason == schema.NONE else str(group.reason),
-                values,
-                tolerances,
-            )
-        except (AttributeError, LookupError) as error:
-            found = f"{os.fspath(path)}, where {error} is missing"
-            raise MisuseError(_ARGUMENT, found, "an undamaged report") from error
+        return _stored(groups[case_id], path)
+
+
+def read_cases(path: str | os.PathLike[str]) -> dict[str, StoredCase]:
+    """{id: counterexample} of all of them, in the order of the run.
+
+    Raises
+    ------
+    MisuseError : as `case_ids`.
+    """
+    with opened(path) as report:
+        groups = _group(report, schema.COUNTEREXAMPLES, path).groups
+        return {case_id: _stored(group, path) for case_id, group in groups.items()}
 
 
 def same_data(path_a: str | os.PathLike[str], path_b: str | os.PathLike[str]) -> list[str]:
@@ -126,6 +119,28 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
             raise MisuseError(_ARGUMENT, f"{found} of schema {report.schema}", f"schema {schema.SCHEMA}")
         report.set_auto_maskandscale(False)
         yield report
+
+
+def _stored(group: Any, path: str | os.PathLike[str]) -> StoredCase:
+    from contactverif_reports.counterexamples import ORIGIN
+
+    variables = _group(group, schema.CASE, path).variables
+    try:
+        arrays = {variable.getncattr(ORIGIN): variable[...] for variable in variables.values()}
+        case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
+        values, tolerances = _measured(group)
+        return StoredCase(
+            case,
+            str(group.formulation),
+            str(group.property_id),
+            Verdict(int(group["verdict"][...])),
+            "" if group.reason == schema.NONE else str(group.reason),
+            values,
+            tolerances,
+        )
+    except (AttributeError, LookupError) as error:
+        found = f"{os.fspath(path)}, where {error} is missing"
+        raise MisuseError(_ARGUMENT, found, "an undamaged report") from error
 
 
 def _group(parent: Any, name: str, path: str | os.PathLike[str]) -> Any:

@@ -19,7 +19,7 @@ from contactverif_reports.figures import SUFFIXES, save
 from contactverif_reports.files import checked_name
 from contactverif_reports.lengths import short
 from contactverif_reports.scene_curves import draw_history, draw_pressures, pen
-from contactverif_reports.scene_meshes import colour_scale, draw_bodies, magnifications
+from contactverif_reports.scene_meshes import close_up, colour_scale, draw_bodies, draw_meshes, magnifications
 from contactverif_reports.solved import Solution, Solved
 
 _WIDTH = 10.0  # inches
@@ -53,11 +53,19 @@ def draw_solved(solved: Solved, path: str | os.PathLike[str], *, title: str = ""
         save(_figure(solved, title), target)
 
 
+def solved_figure(solved: Solved) -> Figure:
+    """The figure that `draw_solved` writes, without a title, for a page."""
+    with matplotlib.rc_context(_SMALL):
+        return _figure(solved, "")
+
+
 def _figure(solved: Solved, title: str) -> Figure:
-    solutions = solved.solutions
-    across = min(len(solutions), _ACROSS)
-    rows = -(-len(solutions) // across)
+    box = close_up(solved)
+    panels = len(solved.solutions) + (box is not None)
+    across = min(panels, _ACROSS)
+    rows = -(-panels // across)
     wide, high = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
+    wide, high = (wide, high) if box is None else (1.0, 1.0)
     panel = float(np.clip((_WIDTH - 2.2) / across * high / wide, 1.6, 4.2))
     heights = rows * (panel + 0.5) + 0.6, 4.8
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(h_pad=0.07))
@@ -71,12 +79,19 @@ def _figure(solved: Solved, title: str) -> Figure:
 
 def _draw_meshes(figure: SubFigure, solved: Solved, rows: int, across: int) -> None:
     scale, large = colour_scale(solved), magnifications(solved)
-    panels = figure.subplots(rows, across, squeeze=False, sharex=True, sharey=True)
-    for axes, solution in zip(panels.ravel(), solved.solutions, strict=False):
+    box = close_up(solved)
+    panels = figure.subplots(rows, across, squeeze=False, sharex=box is None, sharey=box is None)
+    if box is not None:
+        whole = panels.ravel()[0]
+        draw_meshes(whole, solved, box)
+        whole.set_title("all of the meshes;\nframed, what is beside")
+        _bare(whole, alone=True)
+    from_near = panels.ravel()[int(box is not None) :]
+    for axes, solution in zip(from_near, solved.solutions, strict=False):
         draw_bodies(axes, solved, solution, large[solution.formulation], scale)
         axes.set_title(f"{solution.formulation}\n{large[solution.formulation].words}", parse_math=False)
-        _bare(axes)
-    for axes in panels.ravel()[len(solved.solutions) :]:
+        _bare(axes, alone=box is not None)
+    for axes in from_near[len(solved.solutions) :]:
         axes.set_axis_off()
     bar = figure.colorbar(scale, ax=panels, shrink=0.85, aspect=18, pad=0.01)
     bar.set_label("pressure across the\ninterface, −σₙ (force / length)")
@@ -121,8 +136,9 @@ def _facts(solved: Solved) -> str:
     return "\n".join(textwrap.wrap(words, 110, max_lines=2, placeholder=" …"))
 
 
-def _bare(axes: Axes) -> None:
+def _bare(axes: Axes, *, alone: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_xlabel("x (length)")
     axes.set_ylabel("y (length)")
-    axes.label_outer()
+    if not alone:  # else its scale is its own
+        axes.label_outer()

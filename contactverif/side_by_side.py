@@ -1,0 +1,286 @@
+"""How a comparison reads in a terminal: verdicts, errors, Newton iterations and cost side by side, then the meshes."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from math import inf, isfinite, isnan
+from textwrap import shorten
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from contactverif.property import Outcome, Verdict
+from contactverif.studies.compare import Study
+from contactverif.tables import plain_table
+from contactverif_reports.cells import Cell
+from contactverif_reports.comparison import PARTS, Comparison, Differing
+from contactverif_reports.draw import as_text
+from contactverif_reports.read import StoredCase
+from contactverif_reports.regression import Change, Changes
+
+DIFFERS = "≠"
+REASON = 100  # characters of a reason
+DRAWN = 3  # meshes in a terminal; more would bury the tables
+_STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
+
+
+class SideBySide:
+    """All tables of a study, one below the other; each needs 80 columns for a reference and two candidates."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        found = self._study.comparison
+        about = found.provenance
+        yield Text(
+            f"{', '.join(found.formulations[1:]) or 'nothing'} against {found.reference}: "
+            f"profile {about.get('profile')}, {about.get('examples')} examples a property, seed {about.get('seed')}"
+        )
+        yield Text("")
+        yield verdicts_table(found)
+        yield errors_table(found)
+        if found.iterations:
+            yield iterations_table(found)
+        yield cost_table(self._study)
+        for name, reason in found.not_loaded.items():
+            yield Text(f"{name}: not loaded: {reason}", style="red")
+
+
+def verdicts_table(found: Comparison) -> Table:
+    """A line a property, a column a formulation; what differs from the reference is marked."""
+    table = _table(f"verdicts ({DIFFERS}: not that of {found.reference})")
+    table.add_column("property", no_wrap=True)
+    for name in found.formulations:
+        table.add_column(name, overflow="fold")
+    for property_id in found.properties:
+        reference = found.cells.get((found.reference, property_id))
+        cells = [found.cells.get((name, property_id)) for name in found.formulations]
+        table.add_row(property_id, *(_verdict(cell, reference) for cell in cells))
+    return table
+
+
+def _verdict(cell: Cell | None, reference: Cell | None) -> Text:
+    if cell is None:
+        return Text("  –", style="dim")
+    mark = DIFFERS if reference is not None and cell.verdict is not reference.verdict else " "
+    said = f"{mark} {cell.verdict}{f' ({cell.unexpected.upper()})' if cell.unexpected else ''}"
+    return Text(said, style=_STYLES.get(cell.verdict, "dim"))
+
+
+def errors_table(found: Comparison) -> Table:
+    """For each property how far each formulation went towards its tolerance, and beside the reference case by case."""
+    table = _table(f"error over tolerance, above 1 fails; ratio and numbers of cases beside {found.reference}")
+    table.add_column("", no_wrap=True)
+    for column in ("median", "worst", "ratio", "better", "equal", "worse"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("worst number", no_wrap=True, overflow="ellipsis")
+    for property_id in found.properties:
+        cells = [found.cells[name, property_id] for name in found.formulations if (name, property_id) in found.cells]
+        if all(isnan(cell.worst) for cell in cells):
+            continue
+        table.add_row(Text(property_id, style="bold"))
+        for cell in cells:
+            if isnan(cell.worst):
+                continue
+            paired = found.paired.get((cell.formulation, property_id))
+            beside = [""] * 4
+            if paired is not None:
+                beside = [number(paired.ratio), *map(str, (paired.better, paired.equal, paired.worse))]
+            worst = f"{number(cell.worst_value)} {cell.worst_quantity}" if cell.worst_quantity else ""
+            table.add_row(f"  {cell.formulation}", number(cell.median), number(cell.worst), *beside, worst)
+    return table
+
+
+def iterations_table(found: Comparison) -> Table:
+    """For each property that solves: how many iterations, and beside the reference where both converged."""
+    table = _table(f"Newton iterations where it converged; numbers of cases beside {found.reference}")
+    table.add_column("", no_wrap=True)
+    for column in ("converged", "median", "most", "fewer", "same", "more", "order"):
+        table.add_column(column, justify="right", no_wrap=True)
+    before = None
+    for line in found.iterations:
+        if line.title != before:
+            table.add_row(Text(line.title, style="bold"))
+        before = line.title
+        beside: Sequence[str] = ("", "", "")
+        if line.formulation != found.reference:
+            beside = [str(count) for count in (line.fewer, line.same, line.more)]
+        table.add_row(
+            f"  {line.formulation}",
+            f"{line.converged}/{line.solved}",
+            number(line.median),
+            number(line.most),
+            *beside,
+            "" if isnan(line.order) else number(line.order),
+        )
+    return table
+
+
+def cost_table(study: Study) -> Table:
+    """Time of an evaluation on shared states, in turns."""
+    table = _table(f"time of one evaluation, µs, in turns on the same state; ratio to {_of(study)}")
+    table.add_column("", no_wrap=True)
+    for column in (*PARTS, "all", "a segment", "ratio"):
+        table.add_column(column, justify="right", no_wrap=True)
+    reference = {cost.n_segments: cost.total for cost in study.costs if cost.formulation == _of(study)}
+    before = 0
+    for cost in study.costs:
+        if cost.n_segments != before:
+            table.add_row(Text(f"{cost.n_segments} slave segments", style="bold"))
+        before = cost.n_segments
+        if cost.failed:
+            table.add_row(f"  {cost.formulation}", *["–"] * (len(PARTS) + 2), "–")
+            continue
+        total = cost.total
+        table.add_row(
+            f"  {cost.formulation}",
+            *(_micro(cost.seconds[part]) for part in PARTS),
+            _micro(total),
+            f"{1e6 * total / cost.n_segments:.2f}",
+            f"{total / reference[cost.n_segments]:.2f}",
+        )
+    return table
+
+
+def mesh(one: Differing, reference: str) -> Text:
+    """The case on which a candidate and the reference differ most: who does what, and a drawing."""
+    lines = [
+        f"{one.question.id}, case {one.number}",
+        f"    {one.formulation}: {said(one.outcome, one.margin)}",
+        f"    {reference}: {said(one.reference_outcome, one.reference_margin)}",
+        *(f"    {line}" for line in as_text(one.case).splitlines()),
+    ]
+    return Text("\n".join(["", *lines]))
+
+
+def stored_mesh(id_: str, stored: StoredCase, report: str) -> Text:
+    """A counterexample of a report: the smallest case on which what got worse fails, and the line that replays it."""
+    lines = [
+        f"{stored.formulation}, {stored.property_id}: {stored.verdict}",
+        *(f"    {line}" for line in as_text(stored.case).splitlines()),
+        f"    contactverif replay {shlex.quote(report)} --case {shlex.quote(id_)}",
+    ]
+    return Text("\n".join(["", *lines]))
+
+
+def said(outcome: Outcome, margin: float) -> str:
+    """A verdict, and how far from its tolerance the case was, or why it is no pass."""
+    if not isfinite(margin):
+        return f"{outcome.verdict}, {shorten(outcome.reason, REASON, placeholder=' …')}"
+    return f"{outcome.verdict}, {number(margin)} {'of' if margin <= 1 else 'times'} its tolerance"
+
+
+class ChangesTable:
+    """An old report and a new one: a line for each row that both have, then what only one of them asked."""
+
+    def __init__(self, changes: Changes) -> None:
+        self._changes = changes
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        found = self._changes
+        for name, report in (("old", found.old), ("new", found.new)):
+            about = report.provenance
+            yield Text(
+                f"{name}: {report.path}, {about.get('examples')} examples a property, seed {about.get('seed')}, "
+                f"commit {about.get('commit', 'unknown')[:12]}, {about.get('created', 'no date')}"
+            )
+        others = sum(change.paired is None for change in found.changes)
+        if others:
+            rows = "all rows" if others == len(found.changes) else f"{others} rows (marked *)"
+            yield Text(f"{rows} asked other cases: their errors are compared as distributions, not case by case")
+        yield Text("")
+        table = plain_table("error over tolerance, old → new; time of a case, new/old, which decides nothing")
+        table.add_column("", no_wrap=True)
+        for column in ("verdict", "median", "worst"):
+            table.add_column(column, no_wrap=True)
+        for column in ("better", "equal", "worse", "time"):
+            table.add_column(column, justify="right", no_wrap=True)
+        before = None
+        for change in found.changes:
+            if change.new.formulation != before:
+                table.add_row(Text(change.new.formulation, style="bold"))
+            before = change.new.formulation
+            table.add_row(*_change(change))
+        yield table
+        if found.iterations:
+            yield moved_iterations(found)
+        for what, names in (("only in the old", found.gone), ("only in the new", found.added)):
+            if names:
+                yield Text(f"{what}: {'; '.join(names)}")
+
+
+def moved_iterations(found: Changes) -> Table:
+    """Newton iterations where they are not what they were."""
+    table = plain_table("Newton iterations that changed, old → new, where it converged")
+    table.add_column("", no_wrap=True)
+    for column in ("converged", "median", "most"):
+        table.add_column(column, no_wrap=True)
+    for column in ("fewer", "same", "more"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for old, new in found.iterations:
+        table.add_row(
+            f"{new.formulation}, {new.title}",
+            _moved(f"{old.converged}/{old.solved}", f"{new.converged}/{new.solved}"),
+            _moved(number(old.median), number(new.median)),
+            _moved(number(old.most), number(new.most)),
+            *map(str, (new.fewer, new.same, new.more)),
+        )
+    return table
+
+
+def _change(change: Change) -> list[str | Text]:
+    old, new, paired = change.old, change.new, change.paired
+    style = "red" if change.regressions else "green" if change.better else ""
+    counted = paired is not None and paired.n
+    counts = [str(count) for count in (paired.better, paired.equal, paired.worse)] if paired and counted else [""] * 3
+    time = f"{change.slower:.2f}" if isfinite(change.slower) else "–"
+    return [
+        f"  {new.property_id}{'' if paired else ' *'}",
+        Text(_moved(str(old.verdict), str(new.verdict)), style=style),
+        _moved(number(old.median), number(new.median)),
+        _moved(number(old.worst), number(new.worst)),
+        *counts,
+        time,
+    ]
+
+
+def _moved(old: str, new: str) -> str:
+    return old if old == new else f"{old} → {new}"
+
+
+def outcome_of(changes: Changes) -> Text:
+    """What got worse, a line each; one line if nothing did."""
+    if not changes.regressions:
+        return Text("nothing got worse", style="green")
+    n = len(changes.regressions)
+    lines = [f"{n} regression{'s' * (n > 1)}", *(f"  {words}" for words in changes.regressions)]
+    return Text("\n".join(lines), style="red")
+
+
+def conclusion(found: Comparison) -> Text:
+    """One line: whether the candidates keep their promises."""
+    wrong = [f"{cell.formulation} {cell.property_id} ({cell.unexpected})" for cell in found.unexpected]
+    wrong += [f"{name} (not loaded)" for name in found.not_loaded]
+    if found.kept:
+        return Text(f"every promise of {', '.join(found.formulations[1:])} kept", style="green")
+    return Text(f"{len(wrong)} unexpected: {'; '.join(wrong)}" if wrong else "nothing was asked", style="red")
+
+
+def number(value: float) -> str:
+    """Two digits; ∞ for a failure without a number, – where there is none."""
+    return "–" if isnan(value) else "∞" if value == inf else f"{value:.2g}"
+
+
+def _of(study: Study) -> str:
+    return study.comparison.reference
+
+
+def _micro(seconds: float) -> str:
+    return "–" if isnan(seconds) else f"{1e6 * seconds:.1f}"
+
+
+def _table(title: str) -> Table:
+    return plain_table(title)

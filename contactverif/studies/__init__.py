@@ -1,0 +1,1 @@
+"""Long jobs made of the parts: comparisons, the reference paper."""
