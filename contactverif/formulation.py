@@ -93,6 +93,7 @@ class Pairing(Mapping[str, NDArray[Any]]):
 
 _WORDS: dict[str, tuple[object, ...]] = {
     "passes_flat_patch": (True, False, None),
+    "covers_overhang": (True, False, None),
     "tangent": ("exact", "approximate", None),
     "symmetric": (True, False, None),
     "conserves_force": (True, False, None),
@@ -114,6 +115,7 @@ class Traits:
     Attributes
     ----------
     passes_flat_patch : transmits a uniform pressure exactly across any flat interface that it covers.
+    covers_overhang : does so too where the slave overhangs the master inside a slave segment.
     tangent : "exact" is the derivative of the residual on a frozen pairing; "approximate" is not.
     symmetric : the tangent is symmetric.
     conserves_force, conserves_moment : slave and master forces balance at any tilt and curvature.
@@ -138,6 +140,7 @@ class Traits:
     """
 
     passes_flat_patch: bool | None = None
+    covers_overhang: bool | None = None
     tangent: Literal["exact", "approximate"] | None = None
     symmetric: bool | None = None
     conserves_force: bool | None = None

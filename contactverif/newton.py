@@ -205,7 +205,8 @@ class System:
         contact = self.spread.T @ tangent @ self.spread
         matrix = self.stiffness + contact
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
-        sizes = np.append(np.full(n_free, np.abs(z[: scene.interface.n_unknowns]).max()), np.abs(u[n_free:]))
+        sizes = np.full(self.size, np.abs(z[: scene.interface.n_unknowns]).max())
+        sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # also of one that is let go
         # and a force along an inclined normal is rounded in both of its components
         forces = abs(self.spread).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
         terms = abs(contact) @ sizes + forces

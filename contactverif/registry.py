@@ -11,6 +11,7 @@ import difflib
 import inspect
 import typing
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -29,9 +30,22 @@ _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _RESERVED = ("penalty", "inner")  # given by the harness, never as options
 
 
+@dataclass(frozen=True, slots=True)
+class Wrapper:
+    """What is a formulation only around another one, `name/NAME`; `summary` is the first line that its factory says."""
+
+    name: str
+    summary: str
+
+
 def formulation_names() -> tuple[str, ...]:
-    """The names of the installed formulations, sorted; nothing is loaded."""
+    """The names of the installed formulations and wrappers, sorted; nothing is loaded."""
     return tuple(_installed(FORMULATIONS))
+
+
+def standalone_names() -> tuple[str, ...]:
+    """The names without those of wrappers, sorted; all are loaded, since their factories tell which is which."""
+    return tuple(name for name in formulation_names() if _wrapper(name) is None)
 
 
 def property_ids() -> tuple[str, ...]:
@@ -65,7 +79,7 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
         return NotLoaded(name, str(error))
 
 
-def load_formulations() -> tuple[Subject | NotLoaded, ...]:
+def load_formulations() -> tuple[Subject | Wrapper | NotLoaded, ...]:
     """All installed formulations with their own choice of options, for a list; one that needs more is not loaded."""
     return tuple(_by_its_name(name) for name in formulation_names())
 
@@ -119,11 +133,26 @@ def _property(name: str) -> Property | NotLoaded:
     return NotLoaded(name, f"the entry point gives {what}; needed a contactverif.property.Property with the id {name}")
 
 
-def _by_its_name(name: str) -> Subject | NotLoaded:
+def _by_its_name(name: str) -> Subject | Wrapper | NotLoaded:
+    wrapper = _wrapper(name)
+    if wrapper is not None:
+        return wrapper
     try:
         return load_formulation(name)
-    except MisuseError as error:  # a wrapper without an inner formulation, an option without a default
+    except MisuseError as error:  # an option without a default
         return NotLoaded(name, str(error))
+
+
+def _wrapper(name: str) -> Wrapper | None:
+    """None where the name is that of a formulation, or of what does not load."""
+    make = _loaded(name, _installed(FORMULATIONS)[name])
+    if not callable(make) or not _wraps(_parameters(make)):
+        return None
+    return Wrapper(name, (inspect.getdoc(make) or "").partition("\n")[0].rstrip("."))
+
+
+def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
+    return "inner" in parameters
 
 
 def _factory(text: str) -> Callable[..., Any] | NotLoaded:
@@ -140,7 +169,7 @@ def _factory(text: str) -> Callable[..., Any] | NotLoaded:
         return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
     parameters = _parameters(make)
     _check_options(text, make, parameters, options)
-    wraps = "inner" in parameters
+    wraps = _wraps(parameters)
     if wraps and not slash:
         raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
     if slash and not wraps:

@@ -6,9 +6,10 @@ import os
 import shlex
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -18,11 +19,16 @@ from rich.text import Text
 from contactverif.formulation import Traits
 from contactverif.newton import End
 from contactverif.property import Measurement, Outcome, Property, Verdict, excess
+from contactverif.registry import Wrapper
 from contactverif.result import NotLoaded, Row, Run
 from contactverif.subject import OPTIONAL_PARTS, Subject
 from contactverif_reports.draw import as_text
 from contactverif_reports.read import StoredCase
 from contactverif_reports.schema import case_id
+
+if TYPE_CHECKING:  # slow to import
+    from contactverif_reports.cells import Cell
+    from contactverif_reports.stored import StoredReport, StoredRow
 
 _STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
 _PROMISES = {True: "passes", False: "fails", None: "–"}
@@ -46,6 +52,17 @@ def show_as_it_is(text: Text) -> None:
 
 
 @dataclass(frozen=True, slots=True)
+class _Line:
+    """One formulation, one property, in words; `quantity` names the worst number where there are several."""
+
+    formulation: str
+    verdict: Verdict
+    cells: tuple[str, ...]
+    quantity: str
+    remark: str
+
+
+@dataclass(frozen=True, slots=True)
 class RunTable:
     """A line for each formulation and property: what was promised, what it does, how close to the tolerance.
 
@@ -56,37 +73,65 @@ class RunTable:
     found: Run
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        yield Text(_asked(self.found))
-        lines = [(row, *_worst(row)) for row in self.found.rows]
-        cells = [_cells(row, value, tolerance) for row, value, tolerance, _ in lines]
-        widths = [max(map(len, column)) for column in zip(_COLUMNS, *cells, strict=True)]
-        if lines:
-            yield Text("")
-            yield Text("  " + _aligned(_COLUMNS, widths), style="bold")
-        at_verdict = 2 + widths[0] + 2 + widths[1] + 2
-        previous = None
-        for (row, _, _, quantity), its_cells in zip(lines, cells, strict=True):
-            if row.formulation != previous:
-                yield Text(row.formulation, style="bold")
-            previous = row.formulation
-            line, remark = "  " + _aligned(its_cells, widths), _remark(row)
-            said = [text for text in (remark, quantity) if text]
-            behind = next(
-                (text for text in ("; ".join(said), remark) if len(line) + 2 + len(text) <= options.max_width), ""
-            )
-            text = Text(f"{line}  {behind}".rstrip(), no_wrap=True, overflow="ignore")
-            text.stylize(_STYLES.get(row.verdict, "dim"), at_verdict, at_verdict + len(its_cells[2]))
-            yield text
-            if remark and not behind:
-                yield _folded(remark, options.max_width)
-        for item in self.found.not_loaded:
-            yield Text(item.formulation, style="bold")
-            yield _folded(f"{Verdict.NOT_LOADED}: {item.reason}", options.max_width, style="red")
+        not_loaded = {item.formulation: item.reason for item in self.found.not_loaded}
+        yield from _verdicts(self.found.provenance, map(_line, self.found.rows), not_loaded, options.max_width)
 
 
-def _cells(row: Row, value: str, tolerance: str) -> tuple[str, ...]:
+@dataclass(frozen=True, slots=True)
+class StoredTable:
+    """The same of a stored report."""
+
+    found: StoredReport
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        lines = map(_stored_line, self.found.rows.values())
+        yield from _verdicts(self.found.provenance, lines, self.found.not_loaded, options.max_width)
+
+
+def _verdicts(
+    provenance: Mapping[str, str], found: Iterable[_Line], not_loaded: Mapping[str, str], max_width: int
+) -> Iterator[Text]:
+    yield Text(_asked(provenance))
+    lines = list(found)
+    widths = [max(map(len, column)) for column in zip(_COLUMNS, *(line.cells for line in lines), strict=True)]
+    if lines:
+        yield Text("")
+        yield Text("  " + _aligned(_COLUMNS, widths), style="bold")
+    at_verdict = 2 + widths[0] + 2 + widths[1] + 2
+    previous = None
+    for one in lines:
+        if one.formulation != previous:
+            yield Text(one.formulation, style="bold")
+        previous = one.formulation
+        line = "  " + _aligned(one.cells, widths)
+        said = [text for text in (one.remark, one.quantity) if text]
+        behind = next((text for text in ("; ".join(said), one.remark) if len(line) + 2 + len(text) <= max_width), "")
+        text = Text(f"{line}  {behind}".rstrip(), no_wrap=True, overflow="ignore")
+        text.stylize(_STYLES.get(one.verdict, "dim"), at_verdict, at_verdict + len(one.cells[2]))
+        yield text
+        if one.remark and not behind:
+            yield _folded(one.remark, max_width)
+    for name, reason in not_loaded.items():
+        yield Text(name, style="bold")
+        yield _folded(f"{Verdict.NOT_LOADED}: {reason}", max_width, style="red")
+
+
+def _line(row: Row) -> _Line:
+    value, tolerance, quantity = _worst(row)
     judged = f"{row.judged}/{row.planned}" if row.planned else "–"
-    return row.question.id, _PROMISES[row.promise], str(row.verdict), judged, value, tolerance
+    cells = row.question.id, _PROMISES[row.promise], str(row.verdict), judged, value, tolerance
+    undecided = sum(outcome.verdict is Verdict.UNDECIDED for outcome in row.outcomes)
+    return _Line(row.formulation, row.verdict, cells, quantity, _remark(row, row.known, undecided))
+
+
+def _stored_line(row: StoredRow) -> _Line:
+    cell, worst = row.cell, row.furthest
+    value = f"{worst.value:.2g}" if worst else ""
+    tolerance = f"{worst.sign} {worst.tolerance:.2g}" if worst else ""
+    judged = f"{cell.judged}/{cell.planned}" if cell.planned else "–"
+    cells = cell.property_id, _PROMISES[cell.promise], str(cell.verdict), judged, value, tolerance
+    quantity = worst.quantity.name if worst and row.n_quantities > 1 else ""
+    return _Line(cell.formulation, cell.verdict, cells, quantity, _remark(cell, row.known, row.undecided))
 
 
 def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
@@ -125,7 +170,19 @@ def summary(found: Run) -> Text:
     """One line: how it came out, and why if not well."""
     wrong = [f"{row.formulation} {row.question.id} ({row.unexpected})" for row in found.rows if row.unexpected]
     wrong += [f"{item.formulation} (not loaded)" for item in found.not_loaded]
-    if found.passed:
+    return _summed_up(found.passed, wrong)
+
+
+def stored_summary(found: StoredReport) -> Text:
+    """The same of a stored report."""
+    cells = [row.cell for row in found.unexpected]
+    wrong = [f"{cell.formulation} {cell.property_id} ({cell.unexpected})" for cell in cells]
+    wrong += [f"{name} (not loaded)" for name in found.not_loaded]
+    return _summed_up(found.passed, wrong)
+
+
+def _summed_up(passed: bool, wrong: Sequence[str]) -> Text:
+    if passed:
         return Text("every promise kept, every property judged", style="green")
     return Text(f"{len(wrong)} unexpected: {'; '.join(wrong)}" if wrong else "nothing was asked", style="red")
 
@@ -140,14 +197,18 @@ def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
     return table
 
 
-def formulations_table(formulations: Sequence[Subject | NotLoaded], *, every_trait: bool) -> Table:
-    """The installed formulations: what each promises, or why it does not load."""
+def formulations_table(formulations: Sequence[Subject | Wrapper | NotLoaded], *, every_trait: bool) -> Table:
+    """The installed formulations: what each promises, or why it does not load; how a wrapper is used."""
     table = plain_table("formulations")
     table.add_column("name", no_wrap=True)
     table.add_column("promises")
     for item in formulations:
         if isinstance(item, NotLoaded):
             table.add_row(item.formulation, Text(f"not loaded: {item.reason}", style="red"))
+            continue
+        if isinstance(item, Wrapper):
+            about = f": {item.summary}" if item.summary else ""
+            table.add_row(item.name, f"wraps another, {item.name}/NAME{about}")
             continue
         said = _promises(item.traits, every_trait) or ["nothing"]
         missing = ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides)
@@ -176,8 +237,7 @@ def plain_table(title: str) -> Table:
     )
 
 
-def _asked(found: Run) -> str:
-    about = found.provenance
+def _asked(about: Mapping[str, str]) -> str:
     return f"profile {about.get('profile')}, {about.get('examples')} examples a property, seed {about.get('seed')}"
 
 
@@ -190,6 +250,7 @@ def _promises(traits: Traits, every_trait: bool) -> list[str]:
     if not every_trait:
         return said
     for name, positive, negative in (
+        ("covers_overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
         ("conserves_force", "conserves force", "does not conserve force"),
         ("conserves_moment", "conserves moment", "does not conserve moment"),
         ("symmetric", "symmetric", "unsymmetric"),
@@ -221,11 +282,10 @@ def _worst(row: Row) -> tuple[str, str, str]:
     return worst[1:] if worst else ("", "", "")
 
 
-def _remark(row: Row) -> str:
-    undecided = sum(outcome.verdict is Verdict.UNDECIDED for outcome in row.outcomes)
+def _remark(row: Row | Cell, known: str, undecided: int) -> str:
     parts = [
         row.unexpected.upper() if row.unexpected else "",
-        f"known: {row.known}" if row.known else "",
+        f"known: {known}" if known else "",
         row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
         f"{undecided} undecided" if undecided else "",
     ]

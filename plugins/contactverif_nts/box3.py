@@ -8,6 +8,10 @@ One segment: Eq. 6. Otherwise segment j with nodes f, m and projected length L_j
 Printed: R_V by Eq. 6's slave rows with F_V = ε̂ g l_AB (c_P − c_Q)/2, and −ε̂ g W n on the master nodes. Balanced:
 −F_V (W/S) n with S = ΣW, so that action equals reaction.
 
+With multipliers −λ stands for ε̂ g on both sides, and each virtual slave node has a row: −F_V/(ε̂ g) × g where it is
+active, λ × its share of the slave segment's reference length where it is not. Arrays of multipliers without columns
+mean a penalty.
+
 The tangent follows Appendix A. A Δ is a row: what a number gains for each displacement of each of the `CORE` nodes that
 all numbers of a virtual slave node hang on (A, B, 1, 2, and where its area is cut the segment of the frame and the
 cutting nodes), and behind them of f and m.
@@ -22,6 +26,7 @@ import numpy as np
 from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.compiled import compiled
 from contactverif.projection import Vector, between, dot, frame, minus, node
+from contactverif_nts.eq6 import push
 from contactverif_nts.walk import NOT_CUT
 
 PRINTED, BALANCED = 0, 1  # how the master side gets its share
@@ -29,6 +34,7 @@ PRINTED, BALANCED = 0, 1  # how the master side gets its share
 A, B, ONE, TWO, FRAME_1, FRAME_2, CUT_P, CUT_Q, F, M = range(10)  # local nodes
 CORE = 8
 N_LOCAL = 10
+NO_MULTIPLIER = -1
 
 
 @compiled
@@ -58,6 +64,7 @@ def area_of_competence(
 @compiled
 def residual(
     x: Array,
+    multipliers: Array,
     reference: FloatArray,
     slave: IntArray,
     master: IntArray,
@@ -75,15 +82,19 @@ def residual(
     transmission: int,
     current_area: bool,
     penalty: float,
-) -> Array:
-    """Nodal forces (n_states, n_nodes, 2) at the positions x (n_states, n_nodes, 2)."""
-    forces = np.zeros_like(x)
+) -> tuple[Array, Array]:
+    """Nodal forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers), at x and multipliers alike."""
+    forces, rows = np.zeros_like(x), np.zeros_like(multipliers)
+    held = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
         now, r = x[state], forces[state]
         for point in range(len(active)):
-            if not active[point]:
-                continue
             node_a, node_b = slave[point // n, 0], slave[point // n, 1]
+            if not active[point]:
+                if held:
+                    l_0, _, _ = frame(node(reference, node_a), node(reference, node_b))
+                    rows[state, point] = multipliers[state, point] * l_0 / n
+                continue
             node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
             x_a, x_b, x1 = node(now, node_a), node(now, node_b), node(now, node_1)
             c_p, c_q = area_of_competence(now, slave, master, point, n, cutting[point], cut_p[point], cut_q[point])
@@ -92,23 +103,24 @@ def residual(
             l_12, t, normal = frame(x1, node(now, node_2))
             g = dot(minus(x_v, x1), normal)
 
-            if current_area:
-                l_ab, _, _ = frame(x_a, x_b)
-                f_v = penalty * g * l_ab * (c_p - c_q) / 2
-            else:
-                l_reference, _, _ = frame(node(reference, node_a), node(reference, node_b))
-                f_v = penalty * g * l_reference * (c_p - c_q) / 2
-            _push(r, node_a, (1 - c) / 2 * f_v, normal)
-            _push(r, node_b, (1 + c) / 2 * f_v, normal)
+            pressure = -multipliers[state, point] if held else penalty * g  # its negative
+            l_ab, _, _ = frame(x_a, x_b)
+            if not current_area:
+                l_0, _, _ = frame(node(reference, node_a), node(reference, node_b))
+                l_ab = 0 * l_ab + l_0
+            f_v = pressure * l_ab * (c_p - c_q) / 2
+            if held:
+                rows[state, point] = -g * l_ab * (c_p - c_q) / 2
+            push(r, node_a, (1 - c) / 2 * f_v, normal)
+            push(r, node_b, (1 + c) / 2 * f_v, normal)
 
             if first[point] == last[point]:
                 xi = dot(minus(x_v, x1), t) / l_12
-                _push(r, node_1, -(1 - xi) * f_v, normal)
-                _push(r, node_2, -xi * f_v, normal)
+                push(r, node_1, -(1 - xi) * f_v, normal)
+                push(r, node_2, -xi * f_v, normal)
                 continue
 
             x_p, x_q = between(x_a, x_b, c_p), between(x_a, x_b, c_q)
-            pressure = penalty * g
             if transmission == BALANCED:
                 pressure = f_v / dot(minus(x_q, x_p), t)  # S = ΣW telescopes to s(Q) − s(P)
             j = first[point]
@@ -127,17 +139,18 @@ def residual(
                         b = 0 * length + clip_q[point]
                 w_m = length * (b * b - a * a) / 2
                 w_f = length * ((b - a) - (b * b - a * a) / 2)
-                _push(r, f, -pressure * w_f, normal)
-                _push(r, m, -pressure * w_m, normal)
+                push(r, f, -pressure * w_f, normal)
+                push(r, m, -pressure * w_m, normal)
                 if j == last[point]:
                     break
                 j = neighbours[j, 1]
-    return forces
+    return forces, rows
 
 
 @compiled
 def tangent(
     x: FloatArray,
+    multipliers: FloatArray,
     reference: FloatArray,
     slave: IntArray,
     master: IntArray,
@@ -156,15 +169,21 @@ def tangent(
     current_area: bool,
     penalty: float,
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rows, columns and values of the tangent at x (n_nodes, 2); entries of one place add up."""
-    n_entries = _count_entries(neighbours, first, last, cutting, active)
+    """Rows, columns and values of the tangent at x (n_nodes, 2), multipliers (n,); entries of one place add up."""
+    held = len(multipliers) > 0
+    n_entries = _count_entries(neighbours, first, last, cutting, active, held)
     rows = np.empty(n_entries, dtype=np.int64)
     columns = np.empty(n_entries, dtype=np.int64)
     values = np.empty(n_entries)
     place = 0
     nodes = np.empty(N_LOCAL, dtype=np.int64)
     for point in range(len(active)):
+        own = x.size + point if held else NO_MULTIPLIER  # row and column of its multiplier
         if not active[point]:
+            if held:
+                l_0, _, _ = frame(node(reference, slave[point // n, 0]), node(reference, slave[point // n, 1]))
+                rows[place], columns[place], values[place] = own, own, l_0 / n
+                place += 1
             continue
         n_core = 4 if cutting[point] == NOT_CUT else CORE
         nodes[A], nodes[B] = slave[point // n, 0], slave[point // n, 1]
@@ -206,31 +225,39 @@ def tangent(
                 d_l[A, i], d_l[B, i] = -t_ab[i], t_ab[i]
         else:
             l_ab, _, _ = frame(node(reference, nodes[A]), node(reference, nodes[B]))
-        f_v = penalty * g * l_ab * share
-        d_f = penalty * share * (l_ab * d_g + g * d_l) + penalty * g * l_ab * (d_cp - d_cq) / 2
+        stiffness, e, d_e, area = penalty, g, d_g, l_ab * share  # the pressure is −stiffness × e
+        if held:
+            stiffness, e, d_e = 1.0, -multipliers[point], np.zeros((CORE, 2))
+            d_row = -(share * (l_ab * d_g + g * d_l) + g * l_ab * (d_cp - d_cq) / 2)
+            for column in range(n_core):
+                for i in range(2):
+                    rows[place], columns[place], values[place] = own, 2 * nodes[column] + i, d_row[column, i]
+                    place += 1
+        f_v = stiffness * e * l_ab * share
+        d_f = stiffness * share * (l_ab * d_e + e * d_l) + stiffness * e * l_ab * (d_cp - d_cq) / 2
 
         place = _fill(rows, columns, values, place, nodes, n_core, A, (1 - c) / 2 * f_v,
-                      (1 - c) / 2 * d_f - f_v / 2 * d_c, d_omega, t, normal)  # fmt: skip
+                      (1 - c) / 2 * d_f - f_v / 2 * d_c, d_omega, t, normal, own, (1 - c) / 2 * area)  # fmt: skip
         place = _fill(rows, columns, values, place, nodes, n_core, B, (1 + c) / 2 * f_v,
-                      (1 + c) / 2 * d_f + f_v / 2 * d_c, d_omega, t, normal)  # fmt: skip
+                      (1 + c) / 2 * d_f + f_v / 2 * d_c, d_omega, t, normal, own, (1 + c) / 2 * area)  # fmt: skip
 
         if first[point] == last[point]:
             place = _fill(rows, columns, values, place, nodes, n_core, ONE, -(1 - xi) * f_v,
-                          -(1 - xi) * d_f + f_v * d_xi, d_omega, t, normal)  # fmt: skip
+                          -(1 - xi) * d_f + f_v * d_xi, d_omega, t, normal, own, -(1 - xi) * area)  # fmt: skip
             place = _fill(rows, columns, values, place, nodes, n_core, TWO, -xi * f_v,
-                          -xi * d_f - f_v * d_xi, d_omega, t, normal)  # fmt: skip
+                          -xi * d_f - f_v * d_xi, d_omega, t, normal, own, -xi * area)  # fmt: skip
             continue
 
-        pressure = penalty * g
+        pressure, carried = stiffness * e, 1.0  # on the master, and how much of the point's own
         d_pressure = np.zeros((N_LOCAL, 2))
-        d_pressure[:CORE] = penalty * d_g
+        d_pressure[:CORE] = stiffness * d_e
         if transmission == BALANCED:
             s = dot(minus(x_q, x_p), t)  # S = ΣW; ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω
             d_s = dot(minus(x_q, x_p), normal) * d_omega + dot(ab, t) / 2 * (d_cq - d_cp)
             for i in range(2):
                 d_s[A, i] += share * t[i]
                 d_s[B, i] -= share * t[i]
-            pressure = f_v / s
+            pressure, carried = f_v / s, area / s
             d_pressure[:CORE] = d_f / s - f_v * d_s / (s * s)
 
         j = first[point]
@@ -262,9 +289,9 @@ def tangent(
             d_wm = length * (b * d_b - a * d_a) + (b * b - a * a) / 2 * d_length
             d_wf = length * (d_b - d_a - (b * d_b - a * d_a)) + ((b - a) - (b * b - a * a) / 2) * d_length
             place = _fill(rows, columns, values, place, nodes, n_core, F, -pressure * w_f,
-                          -(w_f * d_pressure + pressure * d_wf), d_omega, t, normal)  # fmt: skip
+                          -(w_f * d_pressure + pressure * d_wf), d_omega, t, normal, own, -carried * w_f)  # fmt: skip
             place = _fill(rows, columns, values, place, nodes, n_core, M, -pressure * w_m,
-                          -(w_m * d_pressure + pressure * d_wm), d_omega, t, normal)  # fmt: skip
+                          -(w_m * d_pressure + pressure * d_wm), d_omega, t, normal, own, -carried * w_m)  # fmt: skip
             if j == last[point]:
                 break
             j = neighbours[j, 1]
@@ -325,8 +352,10 @@ def _fill(
     d_omega: FloatArray,
     t: Vector,
     normal: Vector,
+    own: int,
+    area: float,
 ) -> int:
-    """Enters Δ(force n) = n Δforce + force Δn, with Δn = −t ω, as the two rows of local node `at`."""
+    """Enters Δ(force n) = n Δforce + force Δn, Δn = −t ω, as two rows of local node `at`; of a multiplier −area n."""
     for i in range(2):
         for column in range(len(d_force)):
             if n_core <= column < CORE:
@@ -339,30 +368,31 @@ def _fill(
                 columns[place] = 2 * nodes[column] + j
                 values[place] = value
                 place += 1
+        if own != NO_MULTIPLIER:
+            rows[place], columns[place], values[place] = 2 * nodes[at] + i, own, -area * normal[i]
+            place += 1
     return place
 
 
 @compiled
-def _count_entries(neighbours: IntArray, first: IntArray, last: IntArray, cutting: IntArray, active: BoolArray) -> int:
-    n_entries = 0
+def _count_entries(
+    neighbours: IntArray, first: IntArray, last: IntArray, cutting: IntArray, active: BoolArray, held: bool
+) -> int:
+    n_entries, more = 0, 2 if held else 0  # a node's entries in the column of a multiplier
     for point in range(len(active)):
         if not active[point]:
+            n_entries += more // 2
             continue
         n_core = 4 if cutting[point] == NOT_CUT else CORE
+        n_entries += more * n_core
         if first[point] == last[point]:
-            n_entries += 4 * 4 * n_core
+            n_entries += 4 * (4 * n_core + more)
             continue
-        n_entries += 2 * 4 * n_core
+        n_entries += 2 * (4 * n_core + more)
         j = first[point]
         while True:
-            n_entries += 2 * 4 * (n_core + 2)
+            n_entries += 2 * (4 * (n_core + 2) + more)
             if j == last[point]:
                 break
             j = neighbours[j, 1]
     return n_entries
-
-
-@compiled
-def _push(forces: Array, number: int, size: float, direction: Vector) -> None:
-    forces[number, 0] += size * direction[0]
-    forces[number, 1] += size * direction[1]

@@ -6,6 +6,10 @@
 Compiled, float64 and complex128. Area: that of the slave segment that carries the point, times a weight, plus the same
 for the other slave segment at a slave node (NTS-AR); or 1 (NTS).
 
+With multipliers λ, one for each point: F = −λ × area, and a row for each point, −area × g where it is active, area × λ
+where it is not. That area is measured in the reference configuration, so that the row never vanishes. Arrays of
+multipliers without columns mean a penalty.
+
 Source: Zavarise & De Lorenzis (2009), Eq. 6, A1–A12.
 """
 
@@ -15,7 +19,7 @@ import numpy as np
 
 from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.compiled import compiled
-from contactverif.projection import between, dot, foot_on_surface, frame, minus, nearest_segment, node
+from contactverif.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
 
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # where the area of a point comes from
 
@@ -35,8 +39,10 @@ def pair(
     slot: IntArray,
     c: FloatArray,
     free_end: float,
+    multipliers: FloatArray,
+    penalty: float,
 ) -> tuple[IntArray, BoolArray]:
-    """For each point the nearest master segment, and whether it is active: g ≤ 0 and the foot on the surface."""
+    """For each point the nearest master segment, and whether it is active: pressed, and the foot on the surface."""
     partner = np.empty(len(segment), dtype=np.int64)
     active = np.empty(len(segment), dtype=np.bool_)
     for point in range(len(segment)):
@@ -47,13 +53,22 @@ def pair(
         free = master_neighbours[m]
         on_surface = foot_on_surface(x_v, x1, x2, free[0] < 0, free[1] < 0, free_end)
         partner[point] = m
-        active[point] = dot(minus(x_v, x1), n) <= 0 and on_surface
+        active[point] = pressed(dot(minus(x_v, x1), n), multipliers, point, penalty) and on_surface
     return partner, active
+
+
+@compiled
+def pressed(g: float, multipliers: FloatArray, point: int, penalty: float) -> bool:
+    """Whether a point is in contact by its gap: g ≤ 0, and with multipliers λ − c g ≥ 0, with the penalty for c."""
+    if len(multipliers) == 0:
+        return g <= 0
+    return bool(multipliers[point] - penalty * g >= 0)
 
 
 @compiled
 def residual(
     x: Array,
+    multipliers: Array,
     reference: FloatArray,
     slave: IntArray,
     master: IntArray,
@@ -66,13 +81,18 @@ def residual(
     weight: FloatArray,
     area_from: int,
     penalty: float,
-) -> Array:
-    """Nodal forces (n_states, n_nodes, 2) at the positions x (n_states, n_nodes, 2)."""
-    forces = np.zeros_like(x)
+) -> tuple[Array, Array]:
+    """Nodal forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers), at x and multipliers alike."""
+    forces, rows = np.zeros_like(x), np.zeros_like(multipliers)
+    held = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
         x_now, r = x[state], forces[state]
         for point in range(len(segment)):
+            w = weight[slot[point]]
             if not active[point]:
+                if held:
+                    area_0 = 1.0 if area_from == NODAL else w * _length(reference, slave, segment[point], other[point])
+                    rows[state, point] = multipliers[state, point] * area_0
                 continue
             a, b = slave[segment[point], 0], slave[segment[point], 1]
             node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
@@ -84,23 +104,27 @@ def residual(
             g = dot(minus(x_v, x1), n)
             xi = dot(minus(x_v, x1), t) / l_12
 
-            if area_from == NODAL:
-                f = penalty * g
-            elif area_from == CURRENT:
-                f = penalty * g * (weight[slot[point]] * _length(x_now, slave, segment[point], other[point]))
-            else:
-                f = penalty * g * (weight[slot[point]] * _length(reference, slave, segment[point], other[point]))
+            area = 1 + 0 * g  # of the type of x
+            if area_from == CURRENT:
+                area = w * _length(x_now, slave, segment[point], other[point])
+            elif area_from == REFERENCE:
+                area = area * (w * _length(reference, slave, segment[point], other[point]))
+            f = penalty * g * area
+            if held:
+                f = -multipliers[state, point] * area
+                rows[state, point] = -area * g
 
-            _push(r, a, (1 - c_v) / 2 * f, n)
-            _push(r, b, (1 + c_v) / 2 * f, n)
-            _push(r, node_1, -(1 - xi) * f, n)
-            _push(r, node_2, -xi * f, n)
-    return forces
+            push(r, a, (1 - c_v) / 2 * f, n)
+            push(r, b, (1 + c_v) / 2 * f, n)
+            push(r, node_1, -(1 - xi) * f, n)
+            push(r, node_2, -xi * f, n)
+    return forces, rows
 
 
 @compiled
 def tangent(
     x: FloatArray,
+    multipliers: FloatArray,
     reference: FloatArray,
     slave: IntArray,
     master: IntArray,
@@ -114,15 +138,27 @@ def tangent(
     area_from: int,
     penalty: float,
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rows, columns and values of the tangent at x (n_nodes, 2); entries of one place add up."""
-    n_entries = ENTRIES * np.sum(active)
+    """Rows, columns and values of the tangent at x (n_nodes, 2), multipliers (n,); entries of one place add up."""
+    held = len(multipliers) > 0
+    n_active = np.sum(active)
+    n_entries = ENTRIES * n_active
+    if held:
+        n_entries += (4 + N_LOCAL) * 2 * n_active + len(active) - n_active
     rows = np.empty(n_entries, dtype=np.int64)
     columns = np.empty(n_entries, dtype=np.int64)
     values = np.empty(n_entries)
     place = 0
     nodes = np.empty(N_LOCAL, dtype=np.int64)
     for point in range(len(segment)):
+        own = x.size + point  # row and column of its multiplier
+        w = weight[slot[point]]
         if not active[point]:
+            if held:
+                rows[place], columns[place] = own, own
+                values[place] = 1.0
+                if area_from != NODAL:
+                    values[place] = w * _length(reference, slave, segment[point], other[point])
+                place += 1
             continue
         a, b = slave[segment[point], 0], slave[segment[point], 1]
         node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
@@ -148,17 +184,29 @@ def tangent(
 
         area = 1.0
         if area_from == CURRENT:
-            w = weight[slot[point]]
             area = w * _length(x, slave, segment[point], other[point])
             _stretch(d_area, 0, x, a, b, w)  # Δl_AB = t_AB·(Δx_B − Δx_A)
             if other[point] >= 0:
                 nodes[4], nodes[5] = slave[other[point], 0], slave[other[point], 1]
                 _stretch(d_area, 4, x, nodes[4], nodes[5], w)
         elif area_from == REFERENCE:
-            area = weight[slot[point]] * _length(reference, slave, segment[point], other[point])
+            area = w * _length(reference, slave, segment[point], other[point])
 
         f = penalty * g * area
         d_f = penalty * (area * d_g + g * d_area)
+        if held:
+            f = -multipliers[point] * area
+            d_f = -multipliers[point] * d_area
+            for column in range(N_LOCAL):
+                for i in range(2):
+                    rows[place], columns[place] = own, 2 * nodes[column] + i
+                    values[place] = -(area * d_g[column, i] + g * d_area[column, i])
+                    place += 1
+            for k in range(4):
+                for i in range(2):
+                    rows[place], columns[place] = 2 * nodes[k] + i, own
+                    values[place] = -area * shape[k] * n[i]
+                    place += 1
         for k in range(4):
             for i in range(2):
                 for column in range(N_LOCAL):
@@ -195,6 +243,7 @@ def _stretch(row: FloatArray, first: int, x: FloatArray, a: int, b: int, weight:
 
 
 @compiled
-def _push(forces: Array, number: int, size: float, direction: tuple[float, float]) -> None:
+def push(forces: Array, number: int, size: float, direction: Vector) -> None:
+    """Adds a force along a direction to that of a node."""
     forces[number, 0] += size * direction[0]
     forces[number, 1] += size * direction[1]

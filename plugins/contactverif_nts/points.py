@@ -23,6 +23,7 @@ from contactverif.interface import Interface
 from contactverif.projection import search_tree
 from contactverif_nts import eq6
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen
+from contactverif_nts.state import joined, one_parted, parted
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
 
@@ -34,6 +35,7 @@ class PointContact:
     Attributes
     ----------
     c, weight : (n_slots,) places on a slave segment in [−1, 1], and their shares of its length.
+    penalty : stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
     at_nodes : the points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
     area_from : eq6.NODAL, CURRENT or REFERENCE.
     free_end : τ, how far past a free end of the master a foot still counts, in lengths of the segment.
@@ -47,9 +49,13 @@ class PointContact:
     area_from: int
     free_end: float
 
+    def n_multipliers(self, interface: Interface, /) -> int:
+        """One for each point, in their order; none where a penalty holds them."""
+        return len(self._points(interface)[0]) if self.traits.enforcement == "multiplier" else 0
+
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """The nearest master segment of each point, and whether it is in contact."""
-        x = np.array(z).reshape(-1, 2)
+        x, multipliers = one_parted(interface, z)
         segment, other, slot = self._points(interface)
         partner, active = eq6.pair(
             x,
@@ -61,22 +67,23 @@ class PointContact:
             slot,
             self.c,
             self.free_end,
+            multipliers,
+            self.penalty,
         )
         return Pairing({"segment": segment, "other": other, "slot": slot, "master": partner, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Forces (..., n_unknowns), Eq. 6 summed over the points."""
-        states = np.array(z).reshape(-1, interface.n_nodes, 2)
-        return eq6.residual(states, *self._arguments(interface, pairing)).reshape(z.shape)
+        """Forces (..., n_unknowns), Eq. 6 summed over the points; behind them the constraints of multipliers."""
+        return joined(*eq6.residual(*parted(interface, z), *self._arguments(interface, pairing)), z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """The exact derivative of the residual, sparse."""
-        rows, columns, values = eq6.tangent(np.array(z).reshape(-1, 2), *self._arguments(interface, pairing))
+        rows, columns, values = eq6.tangent(*one_parted(interface, z), *self._arguments(interface, pairing))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Each point, with its gap and pressure; areas of competence end at the middle of a segment or share it out."""
-        x = z.reshape(-1, 2)
+        x, multipliers = one_parted(interface, z)
         ends = x[interface.slave.segments[pairing["segment"]]]  # (n_points, 2, dim)
         c = self.c[pairing["slot"]]
         position = (1 - c[:, None]) / 2 * ends[:, 0] + (1 + c[:, None]) / 2 * ends[:, 1]
@@ -90,6 +97,7 @@ class PointContact:
         weight = self.weight[pairing["slot"]] * (lengths[pairing["segment"]] + lengths[pairing["other"]])
         if self.area_from == eq6.NODAL:
             weight = np.ones_like(gap)
+        pressure = multipliers if len(multipliers) else -self.penalty * gap
         nowhere = np.full_like(gap, np.nan)  # no decision hangs on where an area of competence ends
         return ContactPoints(
             slave_segment=pairing["segment"],
@@ -99,7 +107,7 @@ class PointContact:
             position=position,
             normal=normal,
             gap=gap,
-            pressure=np.where(pairing["active"], -self.penalty * gap, 0.0),
+            pressure=np.where(pairing["active"], pressure, 0.0),
             weight=weight,
             active=pairing["active"],
             area_from=nowhere,
@@ -198,6 +206,7 @@ def _traits(passes: bool, witness: str, penalty: str, area_from: int | None, sym
     areas = {eq6.CURRENT: "current", eq6.REFERENCE: "reference", None: None}
     return Traits(
         passes_flat_patch=passes,
+        covers_overhang=False,
         tangent="exact",
         symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
         conserves_force=True,
@@ -206,7 +215,7 @@ def _traits(passes: bool, witness: str, penalty: str, area_from: int | None, sym
         penalty=penalty,  # type: ignore[arg-type]
         batched=True,
         takes_complex=True,
-        witnesses={"patch": witness},
+        witnesses={"patch": witness, "patch.dead-zone": "dead-zone"},
         source=_PAPER,
     )
 

@@ -25,12 +25,14 @@ from contactverif.projection import search_tree
 from contactverif_nts import box3, walk
 from contactverif_nts.eq6 import CURRENT
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen
+from contactverif_nts.state import joined, one_parted, parted
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
 _FREE_ENDS = {"truncate": walk.TRUNCATE, "extend": walk.EXTEND, "cover": walk.COVER}
 _NAMES = ("master", "first", "last", "frame", "cut_p", "cut_q", "clip_p", "clip_q", "active")
 _PRINTED = Traits(
     passes_flat_patch=True,
+    covers_overhang=False,
     tangent="exact",
     symmetric=False,
     conserves_force=False,
@@ -39,7 +41,7 @@ _PRINTED = Traits(
     penalty="distributed",
     batched=True,
     takes_complex=True,
-    witnesses={"balance.force": "tilted", "balance.moment": "tilted"},
+    witnesses={"balance.force": "tilted", "balance.moment": "tilted", "patch.dead-zone": "dead-zone"},
     source=_PAPER,
 )
 
@@ -50,6 +52,7 @@ class PatchTestPassing:
 
     Attributes
     ----------
+    penalty : stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
     transmission : box3.PRINTED or box3.BALANCED.
     consistent : the tangent is exact; else that of VTS-ME.
     current_area : areas of competence are measured in the current configuration, else in the reference.
@@ -66,9 +69,13 @@ class PatchTestPassing:
     free_end: int
     tau: float
 
+    def n_multipliers(self, interface: Interface, /) -> int:
+        """One for each virtual slave node, in the order of the segments; none where a penalty holds them."""
+        return self.n * len(interface.slave) if self.traits.enforcement == "multiplier" else 0
+
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """What the area of competence of each virtual slave node covers, and whether it is in contact."""
-        x = np.array(z).reshape(-1, 2)
+        x, multipliers = one_parted(interface, z)
         master = interface.master
         found = walk.pair(
             x,
@@ -79,24 +86,25 @@ class PatchTestPassing:
             self.n,
             self.free_end,
             self.tau,
+            multipliers,
+            self.penalty,
         )
         return Pairing(dict(zip(_NAMES, found, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Forces (..., n_unknowns), Box 3."""
-        states = np.array(z).reshape(-1, interface.n_nodes, 2)
-        return box3.residual(states, *self._arguments(interface, pairing)).reshape(z.shape)
+        """Forces (..., n_unknowns), Box 3; behind them the constraints of multipliers."""
+        return joined(*box3.residual(*parted(interface, z), *self._arguments(interface, pairing)), z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """Derivative of the residual, Appendix A; that of one segment only where not consistent."""
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
-        rows, columns, values = box3.tangent(np.array(z).reshape(-1, 2), *self._arguments(interface, pairing))
+        rows, columns, values = box3.tangent(*one_parted(interface, z), *self._arguments(interface, pairing))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Each virtual slave node, with its gap and pressure and the ends Q, P of its area of competence."""
-        x = z.reshape(-1, 2)
+        x, multipliers = one_parted(interface, z)
         slave, master = interface.slave.segments, interface.master.segments
         ends = np.array(
             [
@@ -113,6 +121,7 @@ class PatchTestPassing:
         t = (x2 - x1) / length[:, None]
         normal = np.column_stack([t[:, 1], -t[:, 0]])
         gap = ((position - x1) * normal).sum(axis=1)
+        pressure = multipliers if len(multipliers) else -self.penalty * gap
         lengths = interface.slave.lengths(x if self.current_area else interface.nodes)
         return ContactPoints(
             slave_segment=segment,
@@ -122,7 +131,7 @@ class PatchTestPassing:
             position=position,
             normal=normal,
             gap=gap,
-            pressure=np.where(pairing["active"], -self.penalty * gap, 0.0),
+            pressure=np.where(pairing["active"], pressure, 0.0),
             weight=lengths[segment] * (ends[:, 0] - ends[:, 1]) / 2,
             active=pairing["active"],
             area_from=ends[:, 1],
@@ -154,7 +163,7 @@ def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: floa
     tau : how far past a free end of the master a foot still counts, in lengths of its segment.
     """
     return PatchTestPassing(
-        traits=_PRINTED,
+        traits=replace(_PRINTED, covers_overhang=free_end == "cover"),
         penalty=check_penalty(penalty),
         n=check_count(n),
         transmission=box3.PRINTED,
@@ -171,11 +180,9 @@ def vts_ppt_basic(*, penalty: float, n: int = 2, free_end: str = "truncate", tau
     Parameters are those of `vts_ppt`.
     """
     witnesses = {**_PRINTED.witnesses, "tangent.directional": "offset-c", "newton": "example-1bis"}
-    return replace(
-        vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau),
-        consistent=False,
-        traits=replace(_PRINTED, tangent="approximate", witnesses=witnesses),
-    )
+    consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau)
+    traits = replace(consistent.traits, tangent="approximate", witnesses=witnesses)
+    return replace(consistent, consistent=False, traits=traits)
 
 
 def vts_ppt_balanced(
@@ -192,6 +199,7 @@ def vts_ppt_balanced(
     covers = free_end == "cover" or None  # else an overhang breaks the balance, and nothing is promised of it
     traits = replace(
         _PRINTED,
+        covers_overhang=covers,
         conserves_force=covers,
         conserves_moment=covers,
         area="current" if current else "reference",

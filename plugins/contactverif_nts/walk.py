@@ -14,6 +14,7 @@ import numpy as np
 from contactverif.arrays import BoolArray, FloatArray, IntArray
 from contactverif.compiled import compiled
 from contactverif.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
+from contactverif_nts.eq6 import pressed
 
 TRUNCATE, EXTEND, COVER = 0, 1, 2  # what becomes of an area of competence that overhangs a free end
 NOT_CUT = -1
@@ -30,6 +31,8 @@ def pair(
     n: int,
     free_end: int,
     tau: float,
+    multipliers: FloatArray,
+    penalty: float,
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, BoolArray]:
     """For each virtual slave node (n on each slave segment) what its area of competence covers.
 
@@ -80,7 +83,7 @@ def pair(
         if dot(minus(x_p, x1), t) >= dot(minus(x_q, x1), t):
             continue
         on_surface = foot_on_surface(x_v, x1, x2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[point] = dot(minus(x_v, x1), n_m) <= 0 and on_surface
+        active[point] = pressed(dot(minus(x_v, x1), n_m), multipliers, point, penalty) and on_surface
         start, stop = _walk(x, x_p, x_q, m, t, master, neighbours)
         first[point], last[point] = start, stop
         if free_end == TRUNCATE and start != stop:

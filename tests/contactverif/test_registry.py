@@ -51,6 +51,10 @@ def needing(*, penalty: float, order: int) -> Plugin:
 
 
 def twice(*, penalty: float, inner: Any, mode: str = "average") -> Plugin:
+    """Two of it.
+
+    And more about them.
+    """
     return Plugin(inner=inner(penalty=penalty), mode=mode)
 
 
@@ -234,7 +238,13 @@ def test_all_are_loaded_for_a_list() -> None:
     names = [item.formulation if isinstance(item, NotLoaded) else item.name for item in found]
     assert names == sorted(FORMULATIONS)
     rows = {item.formulation for item in found if isinstance(item, NotLoaded)}
-    assert rows == {"raising", "empty", "number", "twice", "needing"}
+    assert rows == {"raising", "empty", "number", "needing"}
+    assert [item for item in found if isinstance(item, registry.Wrapper)] == [registry.Wrapper("twice", "Two of it")]
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_wrapper_does_not_stand_alone() -> None:
+    assert set(registry.standalone_names()) == set(FORMULATIONS) - {"twice"}
 
 
 @pytest.mark.parametrize(

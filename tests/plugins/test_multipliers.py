@@ -1,0 +1,306 @@
+"""Lagrange multipliers: the saddle point's exact tangent, the forces of the paper's tables, and what they solve."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from test_forces import GAP, TABLE, exactly, flat
+from test_tangents import scene
+
+import contactverif_nts
+from contactverif import Interface, MisuseError, projection
+from contactverif.blocks import two_blocks
+from contactverif.catalogue import made
+from contactverif.compiled import uncompiled
+from contactverif.newton import Trace, solve
+from contactverif.scene import Scene
+from contactverif.subject import Subject
+from contactverif_nts import box3, eq6, walk
+
+METHODS = [
+    ("nts_lm", {}),
+    ("vts_me_lm", {}),
+    ("vts_me_lm", {"n": 1}),
+    ("vts_me_lm", {"n": 3, "area": "reference"}),
+    ("vts_ppt_lm", {}),
+    ("vts_ppt_lm", {"n": 1}),
+    ("vts_ppt_lm", {"n": 3, "free_end": "extend"}),
+    ("vts_ppt_lm", {"free_end": "cover"}),
+    ("vts_ppt_lm", {"transmission": "balanced"}),
+    ("vts_ppt_lm", {"transmission": "balanced", "n": 1, "free_end": "cover"}),
+]
+IDS = [f"{name}{options or ''}" for name, options in METHODS]
+OF_ALL = pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
+SPRINGS = {"nts_lm": "nts", "vts_me_lm": "vts_me", "vts_ppt_lm": "vts_ppt"}
+C = 8.0  # scale of the decision λ − c g ≥ 0
+
+
+def made_of(name: str, **options: Any) -> Any:
+    return getattr(contactverif_nts, name)(penalty=C, **options)
+
+
+def with_random_multipliers(formulation: Any, seed: int) -> tuple[Interface, Any]:
+    """A bent scene, half of its multipliers negative, so that some points let go."""
+    interface, z = scene(seed)
+    multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
+    return interface, np.append(z, multipliers)
+
+
+@OF_ALL
+def test_the_tangent_is_the_complex_step(name: str, options: dict[str, Any]) -> None:
+    formulation = made_of(name, **options)
+    held = let_go = cuts = 0
+    for seed in range(100):
+        interface, z = with_random_multipliers(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        h = 2.0**-100
+        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
+        assert np.abs(moved.imag.T / h - tangent).max() <= 1e-14 * np.abs(tangent).max()
+        held += int(pairing["active"].sum())
+        let_go += int((~pairing["active"]).sum())
+        cuts += "cut_p" in pairing and bool((pairing["frame"] >= 0).any())
+    assert held > 100
+    assert let_go > 100
+    assert cuts > 50 or options.get("free_end") != "cover"
+
+
+@OF_ALL
+def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]) -> None:
+    formulation = made_of(name, **options)
+    worst = {"symmetric": 0.0, "force": 0.0, "moment": 0.0}
+    for seed in range(50):
+        interface, z = with_random_multipliers(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        forces = formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
+        if not forces.any():
+            continue
+        x, size = z[: interface.n_unknowns].reshape(-1, 2), np.abs(forces).sum()
+        moment = (x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()
+        worst["symmetric"] = max(worst["symmetric"], np.abs(tangent - tangent.T).max() / np.abs(tangent).max())
+        worst["force"] = max(worst["force"], np.abs(forces.sum(axis=0)).max() / size)
+        worst["moment"] = max(worst["moment"], abs(moment) / size)
+    traits = formulation.traits
+    assert bool(worst["symmetric"] < 1e-13) is traits.symmetric
+    if traits.conserves_force is not None:  # nothing is promised of a balanced transmission past a free end
+        assert bool(worst["force"] < 1e-13) is traits.conserves_force
+        assert bool(worst["moment"] < 1e-12) is traits.conserves_moment
+
+
+@OF_ALL
+def test_a_multiplier_that_is_the_pressure_of_the_spring_does_what_the_spring_does(
+    name: str, options: dict[str, Any]
+) -> None:
+    """On bent surfaces λ = −ε̂ g gives the forces of the penalty method; rows are −area × g."""
+    formulation = made_of(name, **options)
+    balanced = "_balanced" if "transmission" in options else ""
+    others = {option: value for option, value in options.items() if option != "transmission"}
+    spring = made_of(SPRINGS[name] + balanced, **({"free_end": "truncate"} if balanced else {}) | others)
+    in_contact = 0
+    for seed in range(50):
+        interface, z = scene(seed)
+        points = spring.contact_points(interface, spring.pair(interface, z), z)
+        state = np.append(z, -C * points.gap)
+        pairing = formulation.pair(interface, state)
+        assert pairing == spring.pair(interface, z)
+        answer = formulation.residual(interface, pairing, state)
+        forces, rows = np.split(answer, [interface.n_unknowns])
+        exact = spring.residual(interface, pairing, z)
+        assert forces == pytest.approx(exact, rel=1e-13, abs=1e-14)
+        active = pairing["active"]
+        assert rows[active] == pytest.approx((-points.weight * points.gap)[active], rel=1e-13)
+        found = formulation.contact_points(interface, pairing, state)
+        assert np.array_equal(found.pressure, points.pressure)
+        in_contact += int(active.sum())
+    assert in_contact > 50
+
+
+@OF_ALL
+def test_a_point_that_lets_go_has_its_multiplier_for_a_row(name: str, options: dict[str, Any]) -> None:
+    formulation = made_of(name, **options)
+    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3], shift=40.0)  # nothing faces anything
+    multipliers = np.arange(1.0, 1 + formulation.n_multipliers(interface))
+    state = np.append(z * 2, multipliers)  # and areas are those of the reference
+    pairing = formulation.pair(interface, state)
+    forces, rows = np.split(formulation.residual(interface, pairing, state), [interface.n_unknowns])
+    assert not forces.any()
+    n = 1 if name == "nts_lm" else options.get("n", 2)
+    area = np.ones(5) if name == "nts_lm" else np.repeat([2, 2, 4, 4], n) / n
+    assert rows == pytest.approx(area * multipliers, rel=1e-15)
+    assert not formulation.contact_points(interface, pairing, state).pressure.any()
+
+
+@pytest.mark.parametrize(
+    ("penetration", "multiplier", "active"),
+    [
+        (GAP, 0.0, True),
+        (0.0, 0.0, True),  # bodies that touch exactly begin in contact
+        (-GAP, 0.0, False),
+        (-GAP, C * GAP, True),
+        (-GAP, C * GAP * (1 - 2.0**-50), False),
+        (GAP, -C * GAP, True),
+        (GAP, -C * GAP * (1 + 2.0**-50), False),
+    ],
+)
+@pytest.mark.parametrize("name", SPRINGS)
+def test_who_is_active(name: str, penetration: float, multiplier: float, active: bool) -> None:
+    formulation = made_of(name)
+    interface, z = flat([2, 2], [3, 1])
+    x = z.reshape(-1, 2).copy()
+    x[: interface.n_slave_nodes, 1] = -penetration
+    state = np.append(x, np.full(formulation.n_multipliers(interface), multiplier))
+    assert (formulation.pair(interface, state)["active"] == active).all()
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "expected"),
+    [
+        (case, f"{name}_lm", expected)
+        for case, (_, _, rows) in TABLE.items()
+        for name, expected in rows.items()
+        if f"{name}_lm" in SPRINGS
+    ],
+)
+def test_uniform_multipliers_transmit_the_forces_of_the_tables(case: str, name: str, expected: str) -> None:
+    slave, master, _ = TABLE[case]
+    formulation = made_of(name)
+    interface, z = flat(slave, master)
+    state = np.append(z, np.ones(formulation.n_multipliers(interface)))
+    answer = -formulation.residual(interface, formulation.pair(interface, state), state)
+    forces = answer[: interface.n_unknowns].reshape(-1, 2)
+    found = [Fraction(float(value)).limit_denominator(60) for value in -forces[interface.n_slave_nodes :, 1][::-1]]
+    assert found == exactly(expected)
+    assert not forces[:, 0].any()
+
+
+def test_they_are_counted() -> None:
+    interface, _ = flat([2, 2, 4, 4], [3, 3, 3, 3])
+    assert made_of("nts_lm").n_multipliers(interface) == 5
+    assert made_of("vts_me_lm", n=3).n_multipliers(interface) == 12
+    assert made_of("vts_ppt_lm").n_multipliers(interface) == 8
+    assert all(made_of(name).n_multipliers(interface) == 0 for name in SPRINGS.values())
+
+
+@OF_ALL
+def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    formulation = made_of(name, **options)
+    scenes = [with_random_multipliers(formulation, seed) for seed in range(4)]
+
+    def answers() -> list[Any]:
+        found = []
+        for interface, z in scenes:
+            pairing = formulation.pair(interface, z)
+            found += [formulation.residual(interface, pairing, z), formulation.tangent(interface, pairing, z).toarray()]
+        return found
+
+    compiled = answers()
+    for module in (projection, eq6, walk, box3):
+        for attribute, value in list(vars(module).items()):
+            if hasattr(value, "py_func"):
+                monkeypatch.setattr(module, attribute, uncompiled(value))
+    for one, other in zip(compiled, answers(), strict=True):
+        assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
+
+
+@OF_ALL
+def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
+    formulation = made_of(name, **options)
+    interface, z = with_random_multipliers(formulation, 3)
+    pairing = formulation.pair(interface, z)
+    states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
+    batch = formulation.residual(interface, pairing, states)
+    assert batch.shape == states.shape
+    for i in range(3):
+        for j in range(2):
+            assert np.array_equal(batch[i, j], formulation.residual(interface, pairing, states[i, j]))
+
+
+def test_options_are_those_of_the_springs() -> None:
+    with pytest.raises(MisuseError, match="n: found 0"):
+        contactverif_nts.vts_me_lm(penalty=1.0, n=0)
+    with pytest.raises(MisuseError, match="penalty: found 0"):
+        contactverif_nts.nts_lm(penalty=0)
+
+
+# Solved: on which scenes the stress is right, to roundoff or not at all, and what the multipliers are there.
+
+PRESSURE = 100.0
+ROUNDOFF = 1e-11  # of a stress or a multiplier over the pressure, on meshes whose segments differ little
+RIGHT = {
+    "nts_lm": {"a1", "a2-uniform", "a2-graded"},
+    "vts_me_lm": {"a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1"},
+    "vts_ppt_lm": {"a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"},
+}
+SCENES = sorted(RIGHT["vts_ppt_lm"])
+
+
+def solved(name: str, scene: Scene, *, penalty: float | None = None, **options: Any) -> Trace:
+    subject = Subject(name, lambda *, penalty: getattr(contactverif_nts, name)(penalty=penalty, **options))
+    return solve(scene, subject.on(scene.case()) if penalty is None else subject.with_penalty(penalty))
+
+
+def stress_error(trace: Trace) -> float:
+    """Largest error of a stress at a Gauss point, over the pressure."""
+    p, worst = float(trace.scene.facts["pressure"]), 0.0
+    for body, stresses in zip(trace.scene.bodies, trace.scene.stresses(trace.solution), strict=True):
+        if not body.rigid:
+            exact = [-p * body.poisson / (1 - body.poisson), -p, 0.0]
+            worst = max(worst, float(np.abs(stresses - exact).max()) / p)
+    return worst
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("name", RIGHT)
+def test_who_finds_the_uniform_stress(name: str, scene_name: str) -> None:
+    trace = solved(name, made(scene_name, pressure=PRESSURE))
+    assert trace.converged
+    if scene_name in RIGHT[name]:
+        assert stress_error(trace) < ROUNDOFF
+    else:
+        assert stress_error(trace) > 1e-2
+
+
+def spread_of(trace: Trace) -> tuple[float, float]:
+    """Least and largest multiplier over the pressure."""
+    return trace.multipliers.min() / PRESSURE, trace.multipliers.max() / PRESSURE
+
+
+def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
+    on_c, on_c_prime = (solved("vts_me_lm", made(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
+    assert spread_of(on_c) == pytest.approx((0, 2), abs=ROUNDOFF)
+    assert spread_of(on_c_prime) == pytest.approx((13 / 45, 77 / 45), abs=ROUNDOFF)
+    assert on_c.deficiency == on_c_prime.deficiency == 0  # so that there are no others
+
+
+@pytest.mark.parametrize("scene_name", ["b", "c", "c-prime", "example-1", "example-1bis"])
+def test_multipliers_of_vts_ppt_are_uniform_and_found_in_one_step(scene_name: str) -> None:
+    trace = solved("vts_ppt_lm", made(scene_name, pressure=PRESSURE))
+    assert spread_of(trace) == pytest.approx((1, 1), abs=ROUNDOFF)
+    assert trace.n_iterations == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "deficiency"),
+    [("vts_ppt_lm", {}, 7), ("vts_me_lm", {}, 7), ("vts_ppt_lm", {"n": 1}, 0), ("nts_lm", {}, 0)],
+)
+def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: dict[str, Any], deficiency: int) -> None:
+    """Eight slave segments with two points each: 16 constraints, and gaps that nine nodal values describe."""
+    heights = np.linspace(0, 4, 3)
+    blocks = two_blocks(
+        np.arange(9), heights, [0, 4, 8], heights - 4, young=(1e4, 1e4), poisson=(0.3, 0.3), pressure=PRESSURE
+    )
+    trace = solved(name, blocks, penalty=1e4, **options)
+    assert trace.converged
+    assert trace.deficiency == deficiency
+    assert stress_error(trace) < ROUNDOFF
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_the_scale_of_the_decision_changes_no_solution(name: str) -> None:
+    scenes = made("b", pressure=PRESSURE)
+    soft, hard = (solved(name, scenes, penalty=scale) for scale in (1e2, 1e7))
+    assert soft.u[-1] == pytest.approx(hard.u[-1], rel=1e-11, abs=1e-13)

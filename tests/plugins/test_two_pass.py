@@ -1,0 +1,295 @@
+"""Two passes of a formulation: what they are, what they do not provide, and what becomes of the patch test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_forces import GAP, PENALTY, flat, pushed
+from test_tangents import scene
+
+import contactverif_nts
+from contactverif import Interface, Pairing, Traits
+from contactverif.blocks import two_blocks
+from contactverif.catalogue import made
+from contactverif.errors import ContractError
+from contactverif.newton import Trace, solve
+from contactverif.registry import load_formulation
+from contactverif.scene import Scene
+from contactverif.subject import Subject
+from contactverif_nts import two_pass
+
+INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]
+
+
+def both(name: str, **options: Any) -> Any:
+    def inner(*, penalty: float) -> Any:
+        return getattr(contactverif_nts, name)(penalty=penalty, **options)
+
+    return two_pass(penalty=PENALTY, inner=inner)
+
+
+def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
+    """A bent scene, with random multipliers where there are any."""
+    interface, z = scene(seed)
+    multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
+    return interface, np.append(z, multipliers)
+
+
+def exchanged(formulation: Any, interface: Interface) -> Any:
+    """Where the unknowns of `interface.swapped()` are among those of the interface, multipliers too."""
+    there, n = 2 * interface.n_slave_nodes, interface.n_unknowns
+    total = formulation.n_multipliers(interface)
+    first = formulation._inner.n_multipliers(interface)
+    return np.concatenate([np.roll(np.arange(n), -there), n + np.roll(np.arange(total), -first)])
+
+
+@pytest.mark.parametrize("name", INNERS)
+def test_it_is_the_sum_of_both_passes(name: str) -> None:
+    formulation, one = both(name), getattr(contactverif_nts, name)(penalty=PENALTY)
+    for seed in range(20):
+        interface, z = state(formulation, seed)
+        swapped, n, there = interface.swapped(), interface.n_unknowns, 2 * interface.n_slave_nodes
+        first = one.n_multipliers(interface)
+        x, multipliers = z[:n], z[n:]
+        states = np.append(x, multipliers[:first]), np.concatenate([x[there:], x[:there], multipliers[first:]])
+        parts = [
+            one.residual(side, one.pair(side, own), own) for side, own in zip((interface, swapped), states, strict=True)
+        ]
+        forces = parts[0][:n] + np.roll(parts[1][:n], there)
+        expected = np.concatenate([forces, parts[0][n:], parts[1][n:]])
+        assert np.array_equal(formulation.residual(interface, formulation.pair(interface, z), z), expected)
+
+
+@pytest.mark.parametrize("name", INNERS)
+def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
+    formulation, in_contact = both(name), 0
+    for seed in range(50):
+        interface, z = state(formulation, seed)
+        places, swapped = exchanged(formulation, interface), interface.swapped()
+        pairing, other = formulation.pair(interface, z), formulation.pair(swapped, z[places])
+        forces = formulation.residual(interface, pairing, z)
+        assert np.array_equal(formulation.residual(swapped, other, z[places]), forces[places])
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        swapped_tangent = formulation.tangent(swapped, other, z[places]).toarray()
+        assert np.abs(swapped_tangent - tangent[np.ix_(places, places)]).max() <= 1e-14 * np.abs(tangent).max()
+        in_contact += bool(forces[: interface.n_unknowns].any())
+    assert in_contact > 30
+
+
+@pytest.mark.parametrize("name", INNERS)
+def test_the_tangent_is_the_complex_step(name: str) -> None:
+    formulation = both(name)
+    for seed in range(50):
+        interface, z = state(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        h = 2.0**-100
+        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
+        assert np.abs(moved.imag.T / h - tangent).max() <= 1e-13 * np.abs(tangent).max()
+
+
+@pytest.mark.parametrize("name", ["nts_ar", "vts_ppt_balanced", "nts_lm"])
+def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> None:
+    formulation = both(name)
+    for seed in range(20):
+        interface, z = state(formulation, seed)
+        pairing = formulation.pair(interface, z)
+        points = formulation.contact_points(interface, pairing, z)
+        on_slave = -formulation.residual(interface, pairing, z)[: 2 * interface.n_slave_nodes].reshape(-1, 2)
+        pushes = (points.pressure * points.weight)[:, None] * points.normal
+        assert pushes.sum(axis=0) == pytest.approx(on_slave.sum(axis=0), rel=1e-12, abs=1e-13)
+        of_second = points.slave_segment < 0
+        assert np.isnan(points.c[of_second]).all()
+        ends = z[: interface.n_unknowns].reshape(-1, 2)[interface.master.segments[points.master_segment[of_second]]]
+        xi = points.xi[of_second][:, None]
+        assert (1 - xi) * ends[:, 0] + xi * ends[:, 1] == pytest.approx(points.position[of_second], abs=1e-14)
+
+
+def test_names_of_a_pairing_say_whose_they_are() -> None:
+    formulation = both("vts_ppt")
+    interface, z = state(formulation, 0)
+    pairing = formulation.pair(interface, z)
+    own = contactverif_nts.vts_ppt(penalty=PENALTY).pair(interface, z)
+    assert {name.partition(".")[2] for name in pairing} == set(own)
+    assert np.array_equal(pairing["pass_1.first"], own["first"])
+    assert len(pairing["pass_2.first"]) == 2 * len(interface.master)
+
+
+class Springs:
+    """A spring at each slave node against the line y = 0, one state at a time, and what else a test gives it."""
+
+    def __init__(self, penalty: float, **parts: Any) -> None:
+        self.penalty = penalty
+        for name, part in parts.items():
+            setattr(self, name, part)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        assert z.ndim == 1
+        assert pairing is None or isinstance(pairing, Pairing)
+        forces = np.zeros_like(z)
+        forces[1 : 2 * interface.n_slave_nodes : 2] = self.penalty * z[1 : 2 * interface.n_slave_nodes : 2]
+        return forces
+
+
+def wrapped(**parts: Any) -> Subject:
+    inner: Callable[..., Any] = lambda *, penalty: Springs(penalty, **parts)  # noqa: E731
+    return Subject("springs", lambda *, penalty: two_pass(penalty=penalty, inner=inner))
+
+
+def dense_tangent(interface: Any, pairing: Any, z: Any) -> Any:
+    diagonal = np.zeros(z.size)
+    diagonal[1 : 2 * interface.n_slave_nodes : 2] = 3.0
+    return np.diag(diagonal)
+
+
+def test_the_least_plugin_in_two_passes() -> None:
+    subject, (interface, z) = wrapped(), flat([2, 2], [3, 1])
+    assert subject.provides == frozenset()
+    assert subject.traits == Traits(batched=True)
+    formulation = subject.with_penalty(3.0)
+    assert formulation.pair(interface, z) is None
+    assert formulation.n_multipliers(interface) == 0
+    states = np.array([[z, 2 * z], [3 * z, 4 * z]])
+    expected = np.where(np.arange(z.size) % 2 == 1, 3 * states, 0.0)
+    assert np.array_equal(formulation.residual(interface, None, states), expected)
+
+
+def test_parts_that_a_stranger_does_provide() -> None:
+    subject = wrapped(tangent=dense_tangent, pair=lambda interface, z: {"a": np.arange(len(interface.slave))})
+    assert subject.provides == {"tangent", "pair"}
+    interface, z = flat([2, 2, 1], [3, 2])
+    formulation = subject.with_penalty(3.0)
+    pairing = formulation.pair(interface, z)
+    assert pairing is not None
+    assert [(name, list(values)) for name, values in pairing.items()] == [("pass_1.a", [0, 1, 2]), ("pass_2.a", [0, 1])]
+    tangent = formulation.tangent(interface, pairing, z).toarray()
+    assert np.array_equal(tangent, np.diag(np.where(np.arange(z.size) % 2 == 1, 3.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"residual": lambda interface, pairing, z: np.float64(0)}, "residual: returned a float64"),
+        ({"residual": lambda interface, pairing, z: z.astype(np.float32)}, "residual: returned dtype float32"),
+        ({"residual": lambda interface, pairing, z: np.nan * z}, "residual: nan in"),
+        ({"pair": lambda interface, z: [1]}, "pair: returned a list"),
+        ({"pair": lambda interface, z: {"xi": z}}, "pair: 'xi' is dtype float64"),
+        ({"pair": lambda interface, z: {"a": np.array([99])}}, "pair: 'a' holds 99"),
+    ],
+)
+def test_what_a_stranger_breaks_is_said_of_it(parts: dict[str, Any], said: str) -> None:
+    interface, z = flat([2, 2], [3, 1])
+    formulation = wrapped(**parts).with_penalty(3.0)
+    with pytest.raises(ContractError, match=said):
+        formulation.residual(interface, formulation.pair(interface, z), z)
+
+
+def test_what_it_promises() -> None:
+    def promised(name: str) -> Traits:
+        traits: Traits = both(name).traits
+        return traits
+
+    springs = promised("nts_ar")
+    one: Traits = contactverif_nts.nts_ar(penalty=1.0).traits
+    kept = ("tangent", "symmetric", "conserves_force", "conserves_moment", "penalty", "takes_complex", "enforcement")
+    assert all(getattr(springs, name) == getattr(one, name) for name in kept)
+    assert (springs.passes_flat_patch, springs.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
+    assert promised("vts_ppt").passes_flat_patch is False  # springs that act twice
+    assert promised("vts_ppt").witness("balance.force") == "tilted"
+    assert promised("nts_lm").passes_flat_patch is True
+    assert promised("nts_lm").independent_multipliers is False
+    assert promised("vts_ppt_lm").passes_flat_patch is None  # λ of which pass?
+    assert replace(promised("vts_ppt_balanced"), source="").continuity == "C1"
+
+
+def test_by_name_with_options_and_nested() -> None:
+    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3])
+    for name in ("two-pass/nts-ar:area=reference", "two-pass/two-pass/nts-ar:area=reference"):
+        subject = load_formulation(name)
+        assert isinstance(subject, Subject)
+        assert subject.name == name
+        formulation = subject.with_penalty(PENALTY)
+        tangent = formulation.tangent(interface, formulation.pair(interface, z), z).toarray()
+        assert tangent == pytest.approx(tangent.T, abs=1e-14)
+        assert tangent.any()
+
+
+def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
+    interface, z = flat([2, 1, 4], [2, 1, 4])
+    forces = pushed(both("nts_ar"), interface, z)
+    assert forces[:4, 1].tolist() == [2, 3, 5, 4]
+    assert forces[4:, 1].tolist() == [-4, -5, -3, -2]
+    assert GAP * PENALTY == 1
+
+
+# Solved
+
+ROUNDOFF = 1e-11  # of a stress over the pressure, on meshes whose segments differ little
+FAILS = 1e-2
+
+
+def solved(name: str, scenes: Scene) -> Trace:
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject)
+    trace = solve(scenes, subject.on(scenes.case()))
+    assert trace.converged
+    return trace
+
+
+def stress_error(trace: Trace) -> float:
+    """Largest error of a stress at a Gauss point, over the pressure."""
+    p, worst = float(trace.scene.facts["pressure"]), 0.0
+    for body, stresses in zip(trace.scene.bodies, trace.scene.stresses(trace.solution), strict=True):
+        if not body.rigid:
+            exact = [-p * body.poisson / (1 - body.poisson), -p, 0.0]
+            worst = max(worst, float(np.abs(stresses - exact).max()) / p)
+    return worst
+
+
+@pytest.mark.parametrize("scene_name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1bis"])
+@pytest.mark.parametrize("name", ["two-pass/nts", "two-pass/nts-ar"])
+def test_springs_in_two_passes_fail(name: str, scene_name: str) -> None:
+    assert stress_error(solved(name, made(scene_name))) > FAILS
+
+
+def blocks(slave: list[float], master: list[float]) -> Scene:
+    y = np.linspace(0, 4, 3)
+    return two_blocks(slave, y, master, y - 4, young=(1e4, 1e4), poisson=(0.3, 0.3), pressure=100.0, penalty=5e4)
+
+
+MATCHING = blocks([0, 2, 3, 7], [0, 2, 3, 7])
+# Slave nodes face the middles of master segments and master nodes those of slave segments: what one pass gives too
+# much to a node, the other gives too little.
+STAGGERED = blocks([-3, -1, 1, 3], [-6, -4, -2, 0, 2, 4, 6])
+
+
+@pytest.mark.parametrize("scenes", [MATCHING, STAGGERED], ids=["matching", "staggered"])
+def test_they_pass_where_roles_are_symmetric(scenes: Scene) -> None:
+    assert stress_error(solved("two-pass/nts-ar", scenes)) < ROUNDOFF
+    assert stress_error(solved("nts-ar", STAGGERED)) > FAILS
+
+
+def test_elsewhere_they_lock_which_is_not_passing() -> None:
+    errors = [stress_error(solved("two-pass/nts-ar", made("c", penalty=penalty))) for penalty in (1e6, 1e7, 1e8)]
+    assert np.diff(np.log10(errors)) == pytest.approx(-1, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("scene_name", "deficiency"), [("a1", 2), ("a2-graded", 2), ("b", 2), ("c", 2), ("c-prime", 2), ("example-1bis", 0)]
+)
+def test_nodal_multipliers_in_two_passes_pass_and_are_too_many_where_nodes_coincide(
+    scene_name: str, deficiency: int
+) -> None:
+    trace = solved("two-pass/nts-lm", made(scene_name))
+    assert stress_error(trace) < ROUNDOFF
+    assert trace.deficiency == deficiency
+
+
+def test_on_matching_meshes_half_of_them_are_too_many() -> None:
+    trace = solved("two-pass/nts-lm", MATCHING)
+    assert stress_error(trace) < ROUNDOFF
+    assert (len(trace.multipliers), trace.deficiency) == (8, 4)
