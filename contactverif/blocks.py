@@ -1,7 +1,7 @@
 """Two blocks, one on the other: the scene of the patch test, and what is known exactly about it.
 
 Both blocks stand on rollers at their sides, so that nothing strains laterally: the pressure and the gap are exact
-whatever the method's configuration, and nothing overhangs.
+whatever the method's configuration. What of either block lies beside the other carries the pressure too.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def two_blocks(
 
     Parameters
     ----------
-    slave_x, slave_y, master_x, master_y : ascending grid lines; the slave's lowest and the master's highest y agree,
-        and the slave's x lie within the master's. Where the master is wider, and a pressure is given, the pressure
-        acts beside the slave too, so that all stays uniform.
+    slave_x, slave_y, master_x, master_y : ascending grid lines; the slave's lowest and the master's highest y agree.
+        Where one block is wider, and a pressure is given, the pressure acts beside the other one too, so that all
+        stays uniform.
     young, poisson : of slave and master.
     penalty : ε̂, also for the depth of the first guess.
     pressure : on top of the slave, or
@@ -80,6 +80,7 @@ def two_blocks(
         tilt=tilt,
         lowered=lowered,
         free_sides=free_sides,
+        over=(float(master_x[0]), float(master_x[-1])),
         axis=placing.axis,
         shift=placing.shift,
         scale=placing.scale,
@@ -110,8 +111,9 @@ def two_blocks(
         "along": np.concatenate([slave_x, master_x[::-1] if rigid_master else master_x]) * placing.scale,
         "direction": np.array(placing.axis),
     }
-    same_width = slave_x[0] == master_x[0] and slave_x[-1] == master_x[-1]
-    if tilt == 0 and not free_sides and (same_width or pressure is not None or rigid_master):
+    left, right = slave_x[0] - master_x[0], master_x[-1] - slave_x[-1]  # by how much the master is wider
+    all_touch = left >= 0 and right >= 0 if rigid_master else left == right == 0
+    if tilt == 0 and not free_sides and (pressure is not None or all_touch):
         heights = (np.ptp(slave_y), 0.0 if rigid_master else np.ptp(master_y))
         moduli = (upper.oedometer, lower.oedometer)
         facts["compliance"] = np.array([h / m for h, m in zip(heights, moduli, strict=True)]) * placing.scale
@@ -125,6 +127,12 @@ def two_blocks(
 def is_uniform(case: Case) -> bool:
     """Whether the pressure of the scene is known, and the same everywhere."""
     return "compliance" in case.parameters
+
+
+def overhangs(case: Case) -> bool:
+    """Whether the slave of a uniform scene lies beside its master somewhere."""
+    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    return bool(slave.min() < master.min() or slave.max() > master.max())
 
 
 def pressure_of(case: Case, penalty: float) -> float:

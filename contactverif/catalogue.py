@@ -1,16 +1,17 @@
-"""The scenes that have a name: those of the reference paper. Data, with their source and with what we had to choose.
+"""The scenes that have a name: those of the reference paper, and one of ours. Data, with source and what we chose.
 
-Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1. Lengths along the interface are the paper's where it
+Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7. Lengths along the interface are the paper's where it
 prints them (A1, B, C). It prints no heights, materials, lateral supports or dimensions of A2 and of Examples 1 and
-1bis: those are chosen, and `chosen` says so.
+1bis, and little of the meshes of Example 2: those are chosen, and `chosen` says so.
 """
 
 from __future__ import annotations
 
 import inspect
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import cos, inf, isfinite, radians, sin
 from typing import Any, Literal
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from contactverif.arrays import FloatArray
 from contactverif.blocks import Placing, two_blocks
+from contactverif.disk import Problem, disk_on_foundation
 from contactverif.errors import MisuseError
 from contactverif.names import parsed, unknown
 from contactverif.scene import Scene
@@ -29,13 +31,26 @@ _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)} 
 
 @dataclass(frozen=True, slots=True)
 class NamedScene:
-    """A drawing of two blocks, upright, in the paper's units.
+    """What there is to say of a scene.
 
     Attributes
     ----------
     summary : what it is, in one line.
-    source : where in the paper.
-    chosen : what the paper does not print.
+    source : where in the paper; empty if it is ours.
+    chosen : what the paper does not print; of a scene of ours, why it is as it is.
+    """
+
+    summary: str
+    source: str
+    chosen: str
+
+
+@dataclass(frozen=True, slots=True)
+class NamedBlocks(NamedScene):
+    """A drawing of two blocks, upright, in the paper's units; the pressure between them is uniform.
+
+    Attributes
+    ----------
     slave, master : lengths of the segments from left to right.
     slave_from, master_from : where they begin.
     height : of each block.
@@ -43,9 +58,6 @@ class NamedScene:
     rigid_master : a rigid floor.
     """
 
-    summary: str
-    source: str
-    chosen: str
     slave: Sequence[float]
     master: Sequence[float]
     slave_from: float = 0.0
@@ -55,15 +67,15 @@ class NamedScene:
     rigid_master: bool = False
 
 
-SCENES: Mapping[str, NamedScene] = {
-    "a1": NamedScene(
+BLOCKS: Mapping[str, NamedBlocks] = {
+    "a1": NamedBlocks(
         "two slave segments over one master segment",
         "case test A1, Fig. 8",
         _MATERIAL,
         [2, 2],
         [4],
     ),
-    "a2-uniform": NamedScene(
+    "a2-uniform": NamedBlocks(
         "a uniform mesh on a rigid floor",
         "case test A2, Fig. 11(a)",
         f"the lengths; {_MATERIAL}",
@@ -71,7 +83,7 @@ SCENES: Mapping[str, NamedScene] = {
         [8],
         rigid_master=True,
     ),
-    "a2-graded": NamedScene(
+    "a2-graded": NamedBlocks(
         "a graded mesh on a rigid floor",
         "case test A2, Fig. 11(c)",
         f"the lengths; {_MATERIAL}",
@@ -79,38 +91,38 @@ SCENES: Mapping[str, NamedScene] = {
         [8],
         rigid_master=True,
     ),
-    "b": NamedScene(
+    "b": NamedBlocks(
         "non-matching; each area of competence lies over one master segment",
         "case test B, Fig. 16",
         _MATERIAL,
         [2, 2, 4, 4],
         [3, 3, 4, 2],
     ),
-    "c": NamedScene(
+    "c": NamedBlocks(
         "non-matching; areas of competence cross master nodes, one virtual slave node sits on one",
         "case test C, Fig. 20",
         _MATERIAL,
         [2, 2, 4, 4],
         [3, 3, 3, 3],
     ),
-    "c-prime": NamedScene(
+    "c-prime": NamedBlocks(
         "c with no virtual slave node on a master node",
         "case test C, lower lengths changed",
         f"the last two lower lengths; {_MATERIAL}",
         [2, 2, 4, 4],
         [3, 3, 3.2, 2.8],
     ),
-    "example-1": NamedScene(
+    "example-1": NamedBlocks(
         "Taylor and Papadopoulos' punch; each area of competence lies over one master segment",
         "Example 1, Fig. 31",
         f"the meshes; {_MATERIAL}",
         [2, 2, 2],
-        [2, 2, 2, 2, 2, 2],
+        [3, 1, 4, 1, 3],
         slave_from=-3.0,
         master_from=-6.0,
         pressure=1.0,
     ),
-    "example-1bis": NamedScene(
+    "example-1bis": NamedBlocks(
         "the same punch; areas of competence cross master nodes",
         "Example 1bis, Fig. 34",
         f"the meshes; {_MATERIAL}",
@@ -119,6 +131,25 @@ SCENES: Mapping[str, NamedScene] = {
         slave_from=-3.0,
         master_from=-6.0,
         pressure=1.0,
+    ),
+    "dead-zone": NamedBlocks(
+        "the slave overhangs the master on either side, inside a slave segment",
+        "",
+        f"all; the pressure also acts on what the master does not cover; {_MATERIAL}",
+        [1.6, 2.3, 1.8, 2.2, 2.1, 2.0],
+        [1.7, 2.0, 1.8, 1.1],
+        slave_from=-6.0,
+        master_from=-3.3,
+    ),
+}
+
+SCENES: Mapping[str, NamedScene] = {
+    **BLOCKS,
+    "example-2": NamedScene(
+        "an elastic disk on an elastic foundation: pressures that vary, and a contact that has an edge",
+        "Example 2, Fig. 37",
+        "the mesh of the disk; how the 160 × 30 elements of the foundation, 20 wide and 10 deep, are graded; the "
+        "foundation is clamped below, the axis of the disk moves up and down only",
     ),
 }
 
@@ -133,16 +164,75 @@ def scene_named(text: str, argument: str = "--scene") -> Scene:
     name, options = parsed(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
     if name not in SCENES:
         raise unknown(argument, name, SCENES)
+    own = options_of(name)
     for option, value in options.items():
-        if option not in OPTIONS:
-            error = unknown(f"{argument}: option of {text!r}", option, OPTIONS)
-            raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(OPTIONS)}")
-        if needed := _refused(option, value):
+        if option not in own:
+            error = unknown(f"{argument}: option of {text!r}", option, own)
+            raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(own)}")
+        if needed := _refused(name, option, value):
             raise MisuseError(f"{argument}: {option} of {text!r}", repr(value), needed)
     return made(name, **options)
 
 
-def made(
+def made(name: str, **options: Any) -> Scene:
+    """The scene of that name; `options_of` says which options it has, `blocks` and `disk` what they mean.
+
+    Raises
+    ------
+    MisuseError : for a name or an option that is none, and for a value that cannot be.
+    """
+    if name not in SCENES:
+        raise unknown("scene", name, SCENES)
+    own = options_of(name)
+    for option, value in options.items():
+        if option not in own:
+            raise unknown(f"option of scene {name}", option, own)
+        left_open = value is None and own[option] is None
+        if not left_open and (needed := _refused(name, option, value)):
+            raise MisuseError(f"{option} of scene {name}", repr(value), needed)
+    return _maker(name)(**options)
+
+
+def options_of(name: str) -> Mapping[str, Any]:
+    """The options of a scene with their defaults; None is what the scene itself says."""
+    return {option: entry.default for option, entry in inspect.signature(_maker(name)).parameters.items()}
+
+
+def _maker(name: str) -> Callable[..., Scene]:
+    return partial(blocks, name) if name in BLOCKS else disk
+
+
+def disk(
+    *,
+    refine: int = 1,
+    penalty: float = 1e9,
+    young: float = 1e8,
+    ratio: float = 10.0,
+    poisson: float = 0.0,
+    force: float = 1e6,
+    lowered: float | None = None,
+) -> Scene:
+    """The disk on its foundation, in the paper's units.
+
+    Parameters
+    ----------
+    refine : parts that each side of each cell is divided into.
+    penalty : ε̂.
+    young, poisson : E of the disk, ν of both.
+    ratio : E of the foundation over E of the disk.
+    force : on top of the disk, per unit of thickness.
+    lowered : how deep the disk is pushed in the first guess; by default so deep that the contact is about as wide as in
+        the solution.
+
+    Raises
+    ------
+    MisuseError : for a force so large or a penalty so soft that the contact is wider than the meshes are fine.
+    """
+    problem = Problem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
+    return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
+
+
+def blocks(
     name: str,
     *,
     refine: int = 1,
@@ -155,7 +245,7 @@ def made(
     sides: Literal["rollers", "free"] = "rollers",
     lowered: float | None = None,
 ) -> Scene:
-    """The scene of that name.
+    """The pair of blocks of that name.
 
     Parameters
     ----------
@@ -167,20 +257,8 @@ def made(
     degrees : by which all of it is turned, counter-clockwise.
     sides : on rollers, or free to strain, so that the contact area changes.
     lowered : how deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default.
-
-    Raises
-    ------
-    MisuseError : for a value that cannot be.
     """
-    if name not in SCENES:
-        raise unknown("scene", name, SCENES)
-    numbers = {"young": young, "ratio": ratio, "poisson": poisson, "degrees": degrees}
-    optional = {"penalty": penalty, "pressure": pressure, "lowered": lowered}
-    given = {option: value for option, value in optional.items() if value is not None}
-    for option, value in {"refine": refine, **numbers, "sides": sides, **given}.items():
-        if needed := _refused(option, value):
-            raise MisuseError(f"{option} of scene {name}", repr(value), needed)
-    drawing = SCENES[name]
+    drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure
     slave_x, master_x = (
         _grid(start, lengths, refine)
@@ -207,13 +285,14 @@ def made(
     )
 
 
-def _refused(option: str, value: Any) -> str:
+def _refused(name: str, option: str, value: Any) -> str:
     """Empty, or what the option needs instead of the value."""
     if option == "sides":
         return "" if value in ("rollers", "free") else "rollers or free"
     if option == "refine":
         whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        return "" if whole and 1 <= value <= _FINEST else f"a whole number from 1 to {_FINEST}"
+        finest = _FINEST if name in BLOCKS else _FINEST_DISK
+        return "" if whole and 1 <= value <= finest else f"a whole number from 1 to {finest}"
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return "a number"
     try:
@@ -227,9 +306,9 @@ def _refused(option: str, value: Any) -> str:
     return "" if isfinite(number) else "a finite number"
 
 
-OPTIONS = tuple(inspect.signature(made).parameters)[1:]
-_ABOVE_ZERO = ("penalty", "young", "ratio", "pressure")
-_FINEST = 64
+OPTIONS = tuple(dict.fromkeys(option for name in SCENES for option in options_of(name)))
+_ABOVE_ZERO = ("penalty", "young", "ratio", "pressure", "force")
+_FINEST, _FINEST_DISK = 64, 4  # that disk has 65,000 cells
 
 
 def _grid(start: float, lengths: Sequence[float], refine: int) -> FloatArray:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
 import textwrap
 from collections.abc import Iterator
+from typing import Any
 
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.catalogue import SCENES, made, scene_named
-from contactverif_reports.scene_text import blocks_as_text
+from contactverif.catalogue import BLOCKS, SCENES, options_of, scene_named
+from contactverif_reports.scene_text import blocks_as_text, silhouettes_as_text
 
 SOURCE = "Zavarise & De Lorenzis (2009)"
 MEANINGS = {
@@ -23,6 +23,7 @@ MEANINGS = {
     "degrees": "by which all of it is turned, counter-clockwise",
     "sides": "rollers, or free to strain, so that the contact area changes",
     "lowered": "how deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default",
+    "force": "on top of the disk, per unit of thickness",
 }
 _MARGIN = 4
 _NARROW = 96  # columns of running text at most
@@ -35,23 +36,34 @@ class Gallery:
         width = min(options.max_width, _NARROW)
         for name, drawing in SCENES.items():
             yield Text(name, style="bold")
-            for label, words in (("", drawing.summary), ("source: ", f"{SOURCE}, {drawing.source}")):
+            source = f"{SOURCE}, {drawing.source}" if drawing.source else "ours"
+            for label, words in (("", drawing.summary), ("source: ", source)):
                 yield _folded(f"{label}{words}", width)
-            yield _folded(f"chosen: {drawing.chosen}; pressure {drawing.pressure:g}", width)
+            pressure = f"; pressure {BLOCKS[name].pressure:g}" if name in BLOCKS else ""
+            yield _folded(f"chosen: {drawing.chosen}{pressure}", width)
+            if name not in BLOCKS:
+                own = (f"{option} {_shown(default)}".strip() for option, default in options_of(name).items())
+                yield _folded(f"options: {', '.join(own)}", width)
             scene = scene_named(name)
             slave, master = scene.bodies
-            picture = blocks_as_text(scene.case(), slave, master, width - _MARGIN)
+            draw = blocks_as_text if name in BLOCKS else silhouettes_as_text
+            picture = draw(scene.case(), slave, master, width - _MARGIN)
             yield _as_it_is(textwrap.indent(picture, " " * _MARGIN))
             yield Text("")
         yield Text("options, as in --scene c:refine=2,penalty=1e4", style="bold")
-        defaults = inspect.signature(made).parameters
+        defaults = {option: default for name in [*SCENES][::-1] for option, default in options_of(name).items()}
         longest = max(map(len, MEANINGS))
         for option, meaning in MEANINGS.items():
-            default = defaults[option].default
-            said = meaning if default is None else f"{meaning} ({default:g})" if not isinstance(default, str) else ""
-            said = said or f"{meaning} ({default})"
+            said = f"{meaning} {_shown(defaults[option])}".strip()
             lines = textwrap.wrap(said, width - longest - _MARGIN)
             yield _as_it_is(f"\n{' ' * (longest + _MARGIN)}".join([f"  {option:{longest}}  {lines[0]}", *lines[1:]]))
+
+
+def _shown(default: Any) -> str:
+    """A default in parentheses; nothing where the scene has its own."""
+    if default is None:
+        return ""
+    return f"({default})" if isinstance(default, str) else f"({default:g})"
 
 
 def _folded(words: str, width: int) -> Text:

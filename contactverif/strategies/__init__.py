@@ -7,13 +7,21 @@ on a second, coprime lattice (sevenths), so that they are not at kinks; exact ti
 from contactverif.strategies.flat import flat_cases
 from contactverif.strategies.general import general_cases, smooth_cases
 from contactverif.strategies.named import NAMED, named_case
-from contactverif.strategies.solids import VARIANTS, block_cases, named_scene, solid_cases, variant_cases
+from contactverif.strategies.solids import (
+    VARIANTS,
+    block_cases,
+    dead_zone_cases,
+    named_scene,
+    solid_cases,
+    variant_cases,
+)
 from contactverif.strategies.ties import tie_cases
 
 __all__ = [
     "NAMED",
     "VARIANTS",
     "block_cases",
+    "dead_zone_cases",
     "flat_cases",
     "general_cases",
     "named_case",

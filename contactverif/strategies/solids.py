@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.arrays import FloatArray
-from contactverif.blocks import Placing, two_blocks
+from contactverif.blocks import Placing, is_uniform, overhangs, two_blocks
 from contactverif.case import Case
 from contactverif.catalogue import MODERATE, scene_named
 from contactverif.scene import has_bodies
@@ -29,6 +29,10 @@ POSITIONS = 200  # of a punch that slides over one master segment
 _LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
 _POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
 _STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
+_OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # left and right; −1: the master overhangs
+_PARTS = 8  # of a slave segment, at which a master may end
+_PART = st.sampled_from([4, 2, 6, 1, 3, 5, 7])
+_WIDER = st.integers(1, 4)
 _MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
 
 
@@ -52,17 +56,25 @@ def named_scene(text: str) -> Case:
 def block_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
     """Two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
 
-    Given a scene, that scene alone; None if its pressure is not known.
+    Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
     """
-    return _two_blocks() if given is None else _itself(given, "compliance")
+    return _two_blocks() if given is None else _uniform(given, overhang=False)
 
 
 def variant_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
     """The patch test's variants: each case has the parameter "variant", an index into VARIANTS.
 
-    Given a scene, that scene alone; None if its pressure is not known.
+    Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
     """
-    return _variants() if given is None else _itself(given, "compliance")
+    return _variants() if given is None else _uniform(given, overhang=False)
+
+
+def dead_zone_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
+    """A random block that overhangs its master inside a slave segment, on one side or both, under a uniform pressure.
+
+    Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
+    """
+    return _dead_zones() if given is None else _uniform(given, overhang=True)
 
 
 def solid_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
@@ -70,11 +82,13 @@ def solid_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
 
     Given a scene, that scene alone.
     """
-    return _tilted() if given is None else _itself(given)
+    if given is None:
+        return _tilted()
+    return st.just(given) if has_bodies(given) else None
 
 
-def _itself(given: Case, *facts: str) -> SearchStrategy[Case] | None:
-    fits = has_bodies(given) and all(fact in given.parameters for fact in facts)
+def _uniform(given: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
+    fits = has_bodies(given) and is_uniform(given) and overhangs(given) == overhang
     return st.just(given) if fits else None
 
 
@@ -116,6 +130,26 @@ def _variants(draw: DrawFn) -> Case:
         rigid_master=VARIANTS[variant] == "rigid master",
         variant=variant,
     )
+
+
+@st.composite
+def _dead_zones(draw: DrawFn) -> Case:
+    x, (left, right) = _grid(draw(_widths())), draw(_OVERHANGS)
+    segments = np.diff(x)
+    first = draw(st.integers(0, len(segments) - 1)) if left > 0 else 0
+    last = draw(st.integers(first, len(segments) - 1)) if right > 0 else len(segments) - 1
+    parts = 2 * _PARTS if first == last else _PARTS  # of a segment; both ends of the master may lie in the same one
+    begin = x[first] + (draw(_PART) / parts * segments[first] if left > 0 else left * draw(_WIDER))
+    end = x[last + 1] - (draw(_PART) / parts * segments[last] if right > 0 else right * draw(_WIDER))
+    master = draw(_widths())
+    unit = float(x[-1]) / 4  # a thin body bends at nearly no force, and its stress would be roundoff
+    layers = tuple([unit * height for height in draw(_LAYERS)] for _ in range(2))
+    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
+    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    stiff = draw(st.sampled_from([MODERATE, 1.0, 100.0]))
+    master_x = begin + _cut(master, float(end - begin))
+    pressure = strain * min(young)
+    return _case(x, master_x, layers, young, poisson, motion, seed, pressure=pressure, stiff=stiff)
 
 
 @st.composite

@@ -19,7 +19,7 @@ from contactverif_properties.solved import MULTIPLIERS, QUANTITIES, exact_pictur
 
 
 def overhanging(case: Case, subject: Subject) -> Measurement:
-    """As `solved_once`; where a part A of the slave's length L carries the rounding of loads on all, L/A as tolerant."""
+    """As `solved_once`, L/A as tolerant: the part A of the slave's length L bears the rounding of loads on all."""
     found = solved_once(case, subject)
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     covered = min(slave.max(), master.max()) - max(slave.min(), master.min())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, optimize
 
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.blocks import exact_unknowns, pressure_of
@@ -38,7 +38,7 @@ def right_multipliers(case: Case, subject: Subject, formulation: Guarded, pressu
     pressed = with_multipliers(case, uniform)
     transfer = -force_columns(pressed, formulation, formulation.pair(case.interface, pressed.z))
     exact = consistent_forces(case, pressure).reshape(-1)
-    nearest = np.linalg.lstsq(transfer, exact, rcond=None)[0].astype(np.float64)
+    nearest: FloatArray = optimize.nnls(transfer, exact)[0]  # one below 0 would be let go
     if subject.traits.penalty != "nodal":
         uniform[~transfer.any(axis=0)] = 0.0
         errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]

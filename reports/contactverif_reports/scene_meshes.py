@@ -1,4 +1,7 @@
-"""Draws the bodies of a solved scene, displacements and penetration each with its magnification. Slow to import."""
+"""Draws the bodies of a solved scene, displacements and penetration each with its magnification. Slow to import.
+
+A contact that is small against the bodies is drawn from near, and beside it all of the meshes.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
+from matplotlib.patches import Rectangle
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.body import Body
 from contactverif.case import Case
 from contactverif_reports.geometry import Gaps
@@ -20,6 +24,9 @@ from contactverif_reports.solved import Solution, Solved, pressures_across
 _SEEN_MOVE = 0.06  # of the scene: the largest displacement is drawn about as large
 _SEEN_GAP = 0.06  # of the scene: so is the deepest penetration
 _SUPPORT = 0.1  # of the scene: width of the hatching that stands for a rigid body
+_SMALL = 0.2  # of the scene; a contact that is shorter is drawn from near
+_AROUND = 1.6  # half-widths of the contact from its middle to the edge of such a drawing
+_MANY = 500  # cells; more of them are drawn with finer lines
 _COLOURS = "cividis"  # its lightness rises steadily, so that it reads in grey
 _FLAT = 1e-6  # relative differences of stress below which all is drawn in one colour
 
@@ -33,10 +40,16 @@ class Magnification:
 
     @classmethod
     def of(cls, solved: Solved, solutions: list[Solution]) -> Magnification:
-        """One significant digit each, for solutions that are to be compared."""
+        """One significant digit each, for solutions that are to be compared.
+
+        From near, displacements are as they are: magnified they would close gaps that stay open.
+        """
         moves = max(float(np.abs(u).max(initial=0.0)) for one in solutions for u in one.displacements)
         gaps = max(float(np.abs(_gaps(solved, one.z).gap).max()) for one in solutions)
         roundoff = 64 * UNIT_ROUNDOFF * solved.case.largest_coordinate
+        if (box := close_up(solved)) is not None:
+            deep = max(-float(_gaps(solved, one.z).gap.min()) for one in solutions)
+            return cls(1.0, 1.0 if deep <= roundoff else _one_digit(_SEEN_GAP * float(np.ptp(box[:, 0])) / deep))
         move = 1.0 if moves <= roundoff else _one_digit(_SEEN_MOVE * solved.size / moves)
         return cls(move, 1.0 if gaps <= roundoff else _one_digit(_SEEN_GAP * solved.size / gaps))
 
@@ -69,14 +82,45 @@ def colour_scale(solved: Solved) -> ScalarMappable:
     return ScalarMappable(Normalize(low, high), _COLOURS)
 
 
+def close_up(solved: Solved) -> FloatArray | None:
+    """Lower left and upper right corner (2, 2) of a square around what penetrates; None if that is not small."""
+    if solved.course.flat:
+        return None
+    touching = [one.z.reshape(-1, 2)[np.flatnonzero(_gaps(solved, one.z).gap < 0)] for one in solved.solutions]
+    places = np.vstack(
+        [nodes for nodes in touching if np.ptp(nodes, axis=0).max(initial=0.0) < solved.size] or touching
+    )
+    extent = float(np.ptp(places, axis=0).max()) if len(places) > 1 else 0.0
+    if not 0 < extent < _SMALL * solved.size:
+        return None
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    box: FloatArray = middle + np.array([[-1.0], [1.0]]) * _AROUND * extent / 2
+    return box
+
+
+def draw_meshes(axes: Axes, solved: Solved, box: FloatArray) -> None:
+    """All of the meshes before anything moves, and where the close-up is taken."""
+    for body in solved.bodies:
+        axes.add_collection(
+            PolyCollection(list(body.nodes[body.cells]), facecolor="none", edgecolor="0.35", linewidth=0.15, zorder=2)
+        )
+    (left, low), (right, high) = box
+    axes.add_patch(Rectangle((left, low), right - left, high - low, fill=False, linewidth=1.2, zorder=3))
+    axes.set_aspect("equal", adjustable="box")
+    axes.margins(0.04)
+    axes.autoscale_view()
+
+
 def draw_bodies(axes: Axes, solved: Solved, solution: Solution, large: Magnification, scale: ScalarMappable) -> None:
     """Bodies by the pressure across the interface, the slave over the master, what penetrates hatched."""
+    box = close_up(solved)
     moved = [body.nodes + large.move * u for body, u in zip(solved.bodies, solution.displacements, strict=True)]
     surface = solved.case.interface.nodes + large.move * (
         solution.z.reshape(-1, 2) - solved.case.interface.nodes
     )  # (n_nodes, 2) of the interface
     gaps, drawn = _gaps(solved, solution.z), _gaps(solved, surface.reshape(-1))
-    shifts = (large.gap * gaps.gap - drawn.gap)[:, None] * drawn.normal  # (n_slave_nodes, 2)
+    shown = large.gap * gaps.gap if box is None else np.where(gaps.gap < 0, large.gap * gaps.gap, drawn.gap)
+    shifts = (shown - drawn.gap)[:, None] * drawn.normal  # (n_slave_nodes, 2)
     for index, side in sorted(enumerate(solved.sides), key=lambda pair: pair[1] == "slave"):
         body, nodes = solved.bodies[index], moved[index]
         if side == "slave":
@@ -84,10 +128,13 @@ def draw_bodies(axes: Axes, solved: Solved, solution: Solution, large: Magnifica
         if body.rigid:
             _draw_rigid(axes, body, nodes, _SUPPORT * solved.size)
         else:
+            seen = slice(None) if box is None else _seen(nodes[body.cells], box)
+            cells = nodes[body.cells[seen]]
+            thin = 0.4 if len(cells) <= _MANY else 0.2
             faces = axes.add_collection(
-                PolyCollection(list(nodes[body.cells]), edgecolor="0.25", linewidth=0.4, zorder=2, alpha=None)
+                PolyCollection(list(cells), edgecolor="0.25", linewidth=thin, zorder=2, alpha=None)
             )
-            faces.set_array(pressures_across(body, solution.stresses[index]))
+            faces.set_array(pressures_across(body, solution.stresses[index])[seen])
             faces.set(cmap=scale.cmap, norm=scale.norm)
         line = "solid" if side == "slave" else (0, (4, 1.5))
         axes.add_collection(
@@ -109,6 +156,14 @@ def draw_bodies(axes: Axes, solved: Solved, solution: Solution, large: Magnifica
     _draw_penetration(axes, solved, surface[: len(shifts)] + shifts, large.gap * gaps.gap, drawn.normal)
     axes.set_aspect("equal", adjustable="box")
     axes.margins(0.04)
+    if box is not None:
+        axes.set(xlim=box[:, 0], ylim=box[:, 1])
+
+
+def _seen(corners: FloatArray, box: FloatArray) -> IntArray:
+    """The cells, of corners (n_cells, n_corners, 2), that the box may show."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    return np.flatnonzero((high >= box[0]).all(axis=1) & (low <= box[1]).all(axis=1))
 
 
 def _gaps(solved: Solved, z: FloatArray) -> Gaps:

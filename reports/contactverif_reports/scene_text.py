@@ -1,9 +1,10 @@
-"""Draws two blocks, one on the other, in a few lines of text: their meeting sides to scale, the bodies as boxes."""
+"""Draws bodies in a few lines of text: two blocks with their meeting sides to scale, any others as silhouettes."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from contactverif.arrays import BoolArray, FloatArray
 from contactverif.body import Body
 from contactverif.case import Case
 from contactverif_reports.geometry import Course
@@ -11,6 +12,9 @@ from contactverif_reports.lengths import unit_of
 from contactverif_reports.strips import MASTER_NODE, SLAVE_NODE, strips
 
 _LABEL = 8  # columns that `strips` writes the sides' names in
+_HEIGHT = 20  # rows of silhouettes
+_ASPECT = 2.0  # a character is twice as high as wide
+_INKS = {"slave": "▒", "master": "░"}
 
 
 def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
@@ -51,3 +55,42 @@ def _arrows(side: str, node: str) -> str:
 def _rigid(side: str) -> list[str]:
     first, last = side.index(MASTER_NODE), side.rindex(MASTER_NODE)
     return [f"{' ' * first}{'/' * (last - first + 1)}"]
+
+
+def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
+    """Two bodies of any shape, filled, to scale, and what presses on them; lines of at most `width` columns."""
+    inked = [(_INKS["master"], master), (_INKS["slave"], slave)]
+    nodes = np.vstack([slave.nodes, master.nodes])
+    (left, low), (right, high) = nodes.min(axis=0), nodes.max(axis=0)
+    row = max((high - low) / _HEIGHT, (right - left) * _ASPECT / width)  # height of a row, a length
+    columns, rows = (max(int(np.ceil(size)), 1) for size in ((right - left) * _ASPECT / row, (high - low) / row))
+    x = left + (np.arange(columns) + 0.5) * row / _ASPECT
+    y = high - (np.arange(rows) + 0.5) * row
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    canvas = np.full(len(places), " ")
+    for ink, body in inked:
+        canvas[_inside(body, places)] = ink
+    lines = ["".join(line) for line in canvas.reshape(rows, columns).tolist()]
+    arrows = [" "] * columns
+    for place in slave.nodes[(slave.load != 0).any(axis=1)]:
+        arrows[min(int((place[0] - left) / row * _ASPECT), columns - 1)] = "↓"
+    sides = zip(_INKS, (case.interface.slave, case.interface.master), strict=True)
+    said = [
+        f"{_INKS[name]} {name}, {len(side)} segments of {side.lengths(case.positions).min():.3g} or more"
+        for name, side in sides
+    ]
+    return "\n".join(line.rstrip() for line in ["".join(arrows), *lines, *said])
+
+
+def _inside(body: Body, places: FloatArray) -> BoolArray:
+    """(n_places,) whether a place lies in a body: a ray from it crosses the boundary an odd number of times."""
+    following = np.roll(body.cells, -1, axis=1)
+    edges = {(a, b) for a, b in np.stack([body.cells, following], axis=-1).reshape(-1, 2).tolist()}
+    outer = body.nodes[np.array([edge for edge in edges if edge[::-1] not in edges])]  # (n_edges, 2, 2)
+    (x1, y1), (x2, y2) = outer[:, 0].T, outer[:, 1].T
+    x, y = places.T[:, :, None]
+    crosses = (y1 > y) != (y2 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        right = x < x1 + (y - y1) * (x2 - x1) / (y2 - y1)
+    odd: BoolArray = (crosses & right).sum(axis=1) % 2 == 1
+    return odd

@@ -10,8 +10,9 @@ import pytest
 
 from contactverif import catalogue, newton
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.blocks import exact_unknowns, is_uniform, pressure_of
-from contactverif.catalogue import OPTIONS, SCENES, made, scene_named
+from contactverif.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
+from contactverif.catalogue import BLOCKS, OPTIONS, SCENES, made, options_of, scene_named
+from contactverif.disk import disk_on_foundation
 from contactverif.errors import MisuseError
 from contactverif.names import parsed, unknown
 from contactverif.newton import System
@@ -19,7 +20,8 @@ from contactverif.registry import load_formulation
 from contactverif.scene import Scene
 from contactverif.subject import Subject
 
-every_name = pytest.mark.parametrize("name", SCENES)
+every_name = pytest.mark.parametrize("name", BLOCKS)
+every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])
 
 
 def coordinates(scene: Scene) -> tuple[list[float], list[float]]:
@@ -32,7 +34,7 @@ def coordinates(scene: Scene) -> tuple[list[float], list[float]]:
 
 def printed(name: str) -> tuple[list[float], list[float]]:
     """The nodes as the drawing has them."""
-    drawing = SCENES[name]
+    drawing = BLOCKS[name]
     sides = ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
     return tuple(
         [start, *(start + total for total in itertools.accumulate(map(float, lengths)))] for start, lengths in sides
@@ -52,7 +54,7 @@ def test_every_scene_solves(name: str, text: str) -> None:
     formulation = subject.on(scene.case())
     trace = newton.solve(scene, formulation)
     assert trace.converged
-    p = SCENES[name].pressure
+    p = BLOCKS[name].pressure
     system = System(scene, formulation)
     matrix, floor = system.matrix(trace.solution, system.pair(trace.solution))
     off = (
@@ -68,9 +70,9 @@ def test_every_scene_solves(name: str, text: str) -> None:
     assert np.abs(trace.solution - exact_unknowns(scene, p, scene.penalty)).max() <= 2 * off
 
 
-@every_name
+@every_name_of_the_paper
 def test_what_is_known_of_a_scene(name: str) -> None:
-    drawing, scene = SCENES[name], made(name)
+    drawing, scene = BLOCKS[name], made(name)
     assert scene.name == name
     assert drawing.summary
     assert drawing.source
@@ -88,12 +90,26 @@ def test_what_is_known_of_a_scene(name: str) -> None:
     assert pressure_of(case, 123.0) == drawing.pressure
 
 
+def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
+    drawing, scene = BLOCKS["dead-zone"], made("dead-zone")
+    assert (drawing.source, scene.name) == ("", "dead-zone")
+    slave, master = coordinates(scene)
+    assert slave == pytest.approx([-6, -4.4, -2.1, -0.3, 1.9, 4, 6], abs=1e-15)
+    assert master == pytest.approx([-3.3, -1.6, 0.4, 2.2, 3.3], abs=1e-15)
+    assert overhangs(scene.case())
+    assert pressure_of(scene.case(), 123.0) == drawing.pressure
+    upper, lower = (body.load[:, 1].sum() for body in scene.bodies)
+    assert upper == pytest.approx(-drawing.pressure * 6.6, rel=1e-14)  # what the master is pressed with
+    assert lower == 0
+    assert not any(overhangs(made(name).case()) for name in BLOCKS if name != "dead-zone")
+
+
 def under(name: str, points: FloatArray) -> set[float]:
     """Points that lie exactly on a master node."""
     return set(points.tolist()) & set(printed(name)[1])
 
 
-@every_name
+@every_name_of_the_paper
 def test_where_areas_of_competence_lie(name: str) -> None:
     """What the summaries say: over one master segment or across a master node, on a node or not."""
     slave, master = map(np.array, printed(name))
@@ -119,7 +135,7 @@ def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> Non
         assert len(here) == refine * (len(there) - 1) + 1
         gaps = np.diff(here).reshape(-1, refine)
         assert np.abs(gaps - gaps.mean(axis=1, keepdims=True)).max() <= 4 * UNIT_ROUNDOFF * np.abs(there).max()
-    assert len(fine.bodies[0].cells) == 2 * refine * refine * len(SCENES[name].slave)
+    assert len(fine.bodies[0].cells) == 2 * refine * refine * len(BLOCKS[name].slave)
     assert fine.penalty == pytest.approx(refine * made(name).penalty, rel=4 * UNIT_ROUNDOFF, abs=0)
 
 
@@ -146,11 +162,29 @@ def test_any_other_turn() -> None:
         assert np.abs(one.frame - turn).max() <= UNIT_ROUNDOFF
 
 
+def test_the_disk() -> None:
+    """By name it is what `disk` makes, with the paper's numbers; no pressure is known of it."""
+    assert SCENES["example-2"].source
+    one, other = made("example-2"), disk_on_foundation()
+    for body, same in zip(one.bodies, other.bodies, strict=True):
+        assert np.array_equal(body.nodes, same.nodes)
+        assert (body.young, body.poisson) == (same.young, same.poisson)
+    assert one.penalty == other.penalty
+    assert one.name == "example-2"
+    assert not is_uniform(one.case())
+    stiffer = made("example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2)
+    assert [body.young for body in stiffer.bodies] == [2e8, 4e8]
+    assert [body.poisson for body in stiffer.bodies] == [0.25, 0.25]
+    assert (stiffer.penalty, stiffer.bodies[0].load.sum()) == (2e9, -3e6)
+    assert stiffer.bodies[0].start.tolist() == [0, -0.01]
+    assert len(stiffer.bodies[1].cells) == 4 * 160 * 30
+
+
 # --- options ----------------------------------------------------------------------------------------------------
 
 
 def test_options_from_text_are_those_of_python() -> None:
-    texts = {
+    texts: dict[str, dict[str, Any]] = {
         "c:refine=2": {"refine": 2},
         "c:penalty=1e4": {"penalty": 1e4},
         "c:penalty=10000": {"penalty": 1e4},
@@ -164,10 +198,11 @@ def test_options_from_text_are_those_of_python() -> None:
         "c:lowered=0": {"lowered": 0},
         "c:lowered=-0.5,refine=3": {"lowered": -0.5, "refine": 3},
         "c": {},
+        "example-2:force=2e6,ratio=1": {"force": 2e6, "ratio": 1},
     }
     assert {option for options in texts.values() for option in options} == set(OPTIONS)
     for text, options in texts.items():
-        one, other = scene_named(text).case().to_arrays(), made("c", **options).case().to_arrays()  # type: ignore[arg-type]
+        one, other = scene_named(text).case().to_arrays(), made(text.partition(":")[0], **options).case().to_arrays()
         assert all(np.array_equal(one[key], other[key]) for key in one), text
 
 
@@ -186,7 +221,7 @@ def test_what_options_do() -> None:
     assert not is_uniform(made("c", sides="free").case())
 
 
-NAMES = "a1, a2-graded, a2-uniform, b, c, c-prime, example-1, example-1bis"
+NAMES = "a1, a2-graded, a2-uniform, b, c, c-prime, dead-zone, example-1, example-1bis, example-2"
 FORM = "needed NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 ALL_OPTIONS = "there are refine, penalty, young, ratio, poisson, pressure, degrees, sides, lowered"
 WRONG = {
@@ -231,6 +266,10 @@ WRONG = {
     },
     "c:sides=fre": "--scene: sides of 'c:sides=fre': found 'fre'; needed rollers or free",
     "c:sides=1": "--scene: sides of 'c:sides=1': found 1; needed rollers or free",
+    "example-2:refine=5": "--scene: refine of 'example-2:refine=5': found 5; needed a whole number from 1 to 4",
+    "example-2:force=0": "--scene: force of 'example-2:force=0': found 0; needed a number > 0",
+    "example-2:sides=free": "--scene: option of 'example-2:sides=free': found 'sides'; needed one of force, lowered, "
+    "penalty, poisson, ratio, refine, young; there are refine, penalty, young, ratio, poisson, force, lowered",
     f"c:young=1{'0' * 400}": f"--scene: young of 'c:young=1{'0' * 400}': found 1{'0' * 400}; needed a number > 0",
 }
 
@@ -251,6 +290,8 @@ def test_what_is_no_scene(text: str, message: str) -> None:
         ("c", {"refine": 1.5}, "refine of scene c: found 1.5; needed a whole number from 1 to 64"),
         ("c", {"young": None}, "young of scene c: found None; needed a number"),
         ("c", {"penalty": "1"}, "penalty of scene c: found '1'; needed a number"),
+        ("c", {"force": 1.0}, f"option of scene c: found 'force'; needed one of {', '.join(sorted(options_of('c')))}"),
+        ("example-2", {"force": None}, "force of scene example-2: found None; needed a number"),
         ("c", {"lowered": float("nan")}, "lowered of scene c: found nan; needed a finite number"),
     ],
 )
@@ -261,7 +302,7 @@ def test_what_is_no_scene_in_python(name: str, options: dict[str, Any], message:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    made("c", refine=np.int64(2), young=np.float32(8), degrees=np.int32(90))  # type: ignore[arg-type]
+    made("c", refine=np.int64(2), young=np.float32(8), degrees=np.int32(90))
 
 
 # --- names ------------------------------------------------------------------------------------------------------

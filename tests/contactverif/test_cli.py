@@ -101,9 +101,9 @@ CASE = "nts.patch.flat.transmission"
 
 MISTAKES = [
     # argument, found, needed
-    (["verify"], r"NAME: found nothing; needed --all, or some of nts, nts-ar, .*"),
+    (["verify"], r"NAME: found nothing; needed --all, or some of chen-hisada, mortar, .*"),
     (["verify", "vts-pt"], r"formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt.*"),
-    (["verify", "xyz"], r"formulation: found 'xyz'; needed one of nts, nts-ar, .*"),
+    (["verify", "xyz"], r"formulation: found 'xyz'; needed one of chen-hisada, mortar, .*"),
     (["verify", ""], r"formulation: found ''; needed NAME, NAME:OPTION=VALUE.*"),
     (["verify", "nts:"], r"formulation: found '' in 'nts:'; needed NAME, NAME:OPTION=VALUE.*"),
     (["verify", "nts:tau"], r"formulation: found 'tau' in 'nts:tau'; needed NAME, NAME:OPTION=VALUE.*"),
@@ -351,7 +351,7 @@ def test_a_known_failure_that_passes_fails_the_run(ask: Ask) -> None:
 def test_all_is_every_installed_formulation(ask: Ask) -> None:
     answer = ask("verify", "--all", "-p", "purity", "--examples", "1", "--seed", "1")
     assert answer.status == 0
-    assert {formulation for formulation, _ in rows(answer.out)} == set(registry.formulation_names())
+    assert {formulation for formulation, _ in rows(answer.out)} == set(registry.standalone_names())
 
 
 def test_a_mesh_of_the_user_is_judged(ask: Ask) -> None:
@@ -371,7 +371,7 @@ def test_the_table_lines_up_at_any_width(ask: Ask, columns: int) -> None:
     head, *lines = table
     verdict, tolerance = head.index("verdict"), head.index("tolerance") + len("tolerance")
     for line in lines:
-        if line.startswith(" "):
+        if re.match(r"  \S", line) and "not applicable" not in line:
             assert line[verdict : verdict + 5].rstrip() in ("pass", "fail")
             assert line[:tolerance].rstrip() == line[:tolerance]
             assert re.search(r"[≤≥] \S+$", line[:tolerance])

@@ -13,7 +13,7 @@ import pytest
 from handmade_run import run_with
 
 from contactverif import cli, drawing, pictures, runner
-from contactverif.catalogue import OPTIONS, SCENES, scene_named
+from contactverif.catalogue import OPTIONS, SCENES, NamedBlocks, scene_named
 from contactverif.gallery import MEANINGS
 from contactverif.result import NotLoaded
 from contactverif.strategies import named_case
@@ -83,8 +83,13 @@ def test_scenes_lists_all_with_drawings_and_fits(ask: Ask, columns: int) -> None
     assert list(blocks)[:-1] == list(SCENES)
     for name, drawing_ in SCENES.items():
         words = " ".join(blocks[name].split())
-        for said in (drawing_.summary, f"source: Zavarise & De Lorenzis (2009), {drawing_.source}", drawing_.chosen):
+        source = f"Zavarise & De Lorenzis (2009), {drawing_.source}" if drawing_.source else "ours"
+        for said in (drawing_.summary, f"source: {source}", drawing_.chosen):
             assert said in words
+        if not isinstance(drawing_, NamedBlocks):
+            assert {"▒", "░", "↓"} <= set(blocks[name])
+            assert "options: refine (1), penalty (1e+09)" in words
+            continue
         n_slave = len(drawing_.slave) + 1
         assert blocks[name].count("●") == n_slave
         assert "┌" in blocks[name]
@@ -109,11 +114,11 @@ MISTAKES = [
     (["draw", "r.nc", "--case", "a.b"], r"REPORT: found r.nc, which does not exist; needed a report .*"),
     (["draw", "r.nc", "--case", "a.b", "--scene", "c"], r"--scene: found c and --case a.b; needed one of the two"),
     (["draw", "r.nc", "--scene", "c", "-f", "nts"], r"--scene: found c and REPORT r.nc; needed one of the two"),
-    (["draw", "--scene", "c"], r"--formulation: found nothing; needed some of nts, .*vts-ppt.*"),
+    (["draw", "--scene", "c"], r"--formulation: found nothing; needed some of .*nts, .*vts-ppt.*"),
     (["draw", "--scene", "cc", "-f", "nts"], r"--scene: found 'cc'; needed a name that exists; the nearest: .*"),
     (["draw", "--scene", "c:refien=2", "-f", "nts"], r"--scene: option of .*: found 'refien'; needed .* refine.*"),
     (["draw", "--scene", "c:sides=up", "-f", "nts"], r"--scene: sides of .*: found 'up'; needed rollers or free"),
-    (["draw", "--scene", "c", "-f", "nst"], r"formulation: found 'nst'; needed .* nearest: nts.*"),
+    (["draw", "--scene", "c", "-f", "nst"], r"formulation: found 'nst'; needed .* nearest: .*nts.*"),
     (["draw", "--scene", "c", "-f", "nts", "-f", "nts"], r"--formulation: found nts twice; needed each of them once"),
     ([*DRAW_C, "--out", "c.pdf"], r"--out: found 'c.pdf'; needed a name that ends in .png or .svg"),
     ([*DRAW_C, "--out", "no/c.png"], r"--out: found no/c.png in .*, which is no folder; needed a folder that exists"),

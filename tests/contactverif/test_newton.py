@@ -158,7 +158,7 @@ def test_a_two_cycle_is_named() -> None:
 
 
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
-@pytest.mark.parametrize("name", catalogue.SCENES)
+@pytest.mark.parametrize("name", catalogue.BLOCKS)
 def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
     name: str, dense: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

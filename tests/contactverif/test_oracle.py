@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from fractions import Fraction
 
@@ -21,7 +22,7 @@ from contactverif.oracle import (
     uniform_pressure_weights_exact,
     usual_places,
 )
-from contactverif.strategies import flat_cases, general_cases, named_case, smooth_cases
+from contactverif.strategies import dead_zone_cases, flat_cases, general_cases, named_case, smooth_cases
 
 CHECKED = settings(max_examples=100, derandomize=True, database=None, deadline=None)
 
@@ -53,6 +54,47 @@ def test_an_overhanging_master_is_loaded_where_it_is_covered() -> None:
     weights = uniform_pressure_weights_exact(interface, interface.nodes[:, 0])
     half = Fraction(1, 2)
     assert weights == [half, half, Fraction(3, 8), Fraction(5, 8)]
+
+
+def test_an_overhanging_slave_is_loaded_where_it_is_covered() -> None:
+    """The other way round the same numbers, whichever surface is the slave; and both sides may overhang."""
+    interface, _ = chains([(0, 0), (4, 0)], [(2, 0), (1, 0)])
+    half = Fraction(1, 2)
+    assert uniform_pressure_weights_exact(interface, interface.nodes[:, 0]) == [
+        *(Fraction(5, 8), Fraction(3, 8)),
+        *(half, half),
+    ]
+    crossed, _ = chains([(0, 0), (4, 0)], [(8, 0), (3, 0)])  # over [3, 4]
+    assert uniform_pressure_weights_exact(crossed, crossed.nodes[:, 0]) == [
+        *(Fraction(1, 8), Fraction(7, 8)),
+        *(Fraction(1, 10), Fraction(9, 10)),
+    ]
+    apart, _ = chains([(0, 0), (4, 0)], [(8, 0), (5, 0)])
+    assert uniform_pressure_weights_exact(apart, apart.nodes[:, 0]) == [0] * 4
+
+
+@CHECKED
+@given(st.one_of(flat_cases(), dead_zone_cases()))  # type: ignore[arg-type]
+def test_the_weights_are_the_integrals_of_the_shapes_over_what_both_surfaces_cover(case: Case) -> None:
+    """Between two neighbouring nodes of both surfaces all is linear, so the middle is the mean; roles do not matter."""
+    interface, places = case.interface, [Fraction(place) for place in case.parameters["along"].tolist()]
+    expected = [Fraction(0)] * len(places)
+    breaks = sorted(set(places))
+    for low, high in itertools.pairwise(breaks):
+        middle = (low + high) / 2
+        values: list[dict[int, Fraction]] = [{}, {}]
+        for values_here, surface in zip(values, (interface.slave, interface.master), strict=True):
+            for a, b in surface.segments.tolist():
+                if min(places[a], places[b]) < middle < max(places[a], places[b]):
+                    share = (middle - places[a]) / (places[b] - places[a])
+                    values_here |= {a: 1 - share, b: share}
+        if all(values):
+            for node, value in {**values[0], **values[1]}.items():
+                expected[node] += (high - low) * value
+    assert uniform_pressure_weights_exact(interface, case.parameters["along"]) == expected
+    n_slave = interface.n_slave_nodes
+    swapped = uniform_pressure_weights_exact(interface.swapped(), np.roll(case.parameters["along"], -n_slave))
+    assert swapped == expected[n_slave:] + expected[:n_slave]
 
 
 def test_several_chains_load_what_each_covers() -> None:

@@ -198,7 +198,7 @@ def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     "scene",
-    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.made, catalogue.SCENES)],
+    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.made, catalogue.BLOCKS)],
     ids=lambda scene: scene.name or "pressed",
 )
 @pytest.mark.parametrize("factor", [1.0, 0.5])

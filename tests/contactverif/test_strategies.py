@@ -12,19 +12,33 @@ from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.arrays import UNIT_ROUNDOFF
+from contactverif.blocks import is_uniform, overhangs
 from contactverif.case import Case
 from contactverif.errors import MisuseError
 from contactverif.interface import Interface
 from contactverif.oracle import kink_margin, projection_cases, usual_places
-from contactverif.strategies import NAMED, flat_cases, general_cases, named_case, smooth_cases, tie_cases
+from contactverif.scene import scene_of
+from contactverif.strategies import (
+    NAMED,
+    block_cases,
+    dead_zone_cases,
+    flat_cases,
+    general_cases,
+    named_case,
+    named_scene,
+    smooth_cases,
+    tie_cases,
+    variant_cases,
+)
 from contactverif.strategies.parts import lengths
 from contactverif.strategies.rings import Ring
 
 FIXED = settings(derandomize=True, database=None, deadline=None)
 
 
-def drawn(strategy: SearchStrategy[Case], count: int) -> list[Case]:
+def drawn(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
     """Many cases, always the same."""
+    assert strategy is not None
     cases: list[Case] = []
 
     @settings(FIXED, max_examples=count, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
@@ -158,6 +172,56 @@ def test_shapes_and_states_of_all_kinds_occur() -> None:
 def test_impossible_arguments_are_refused() -> None:
     with pytest.raises(MisuseError, match="most"):
         lengths(most=0)
+
+
+@pytest.fixture(scope="module")
+def dead_zones() -> list[Case]:
+    return drawn(dead_zone_cases(), 300)
+
+
+def test_the_simplest_dead_zone_is_one_segment_a_side() -> None:
+    strategy = dead_zone_cases()
+    assert strategy is not None
+    case = find(strategy, lambda _: True, settings=FIXED)
+    assert case.parameters["along"].tolist() == [0, 1, 0.25, 1]
+    assert [(body.young, body.poisson, len(body.cells)) for body in scene_of(case).bodies] == [(1, 0, 1), (1, 0, 1)]
+    assert scene_of(case).bodies[0].axis.tolist() == [1, 0]
+    assert case.penalty == 10
+
+
+def test_in_a_dead_zone_the_master_ends_inside_a_slave_segment(dead_zones: list[Case]) -> None:
+    seen: Counter[str] = Counter()
+    for case in dead_zones:
+        slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+        ends = {"left": master.min(), "right": master.max()}
+        overhang = {"left": slave.min() < master.min(), "right": master.max() < slave.max()}
+        assert overhangs(case)
+        assert is_uniform(case)
+        assert slave.min() < ends["right"]
+        assert ends["left"] < slave.max()
+        for side, over in overhang.items():
+            assert not over or ends[side] not in slave
+        both = all(overhang.values())
+        seen["both"] += both
+        seen["in one segment"] += both and not ((slave > ends["left"]) & (slave < ends["right"])).any()
+        seen["the master overhangs on the other side"] += bool(master.min() < slave.min() or slave.max() < master.max())
+        seen["a whole slave segment touches nothing"] += bool((np.sort(slave)[1:-1] < ends["left"]).any())
+        seen["turned"] += scene_of(case).bodies[0].axis.tolist() != [1, 0]
+    print("\n", seen)
+    assert len(seen) == 5
+    assert min(seen.values()) >= 20
+
+
+def test_a_scene_is_asked_where_its_overhang_belongs() -> None:
+    """The dead zone is nothing for who promises the patch test on an interface that is covered, nor the other way."""
+    covered, overhanging, bent = map(named_scene, ("c", "dead-zone", "dead-zone:sides=free"))
+    for strategy in (block_cases, variant_cases):
+        assert strategy(overhanging) is None
+        assert drawn(strategy(covered), 2)[0] is covered
+    assert dead_zone_cases(covered) is None
+    assert dead_zone_cases(bent) is None
+    assert dead_zone_cases(named_case("c")) is None
+    assert drawn(dead_zone_cases(overhanging), 2)[0] is overhanging
 
 
 # Interfaces that somebody gives

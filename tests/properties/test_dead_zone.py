@@ -1,0 +1,241 @@
+"""The dead zone: what is exact where the slave overhangs, who passes, and which contact points count."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactverif_mortar
+import contactverif_nts
+from contactverif.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
+from contactverif.case import Case
+from contactverif.catalogue import BLOCKS, made
+from contactverif.formulation import ContactPoints
+from contactverif.property import Verdict, judge
+from contactverif.registry import load_formulation
+from contactverif.runner import judge_case, run
+from contactverif.scene import scene_of
+from contactverif.strategies import dead_zone_cases, named_scene
+from contactverif.subject import Subject
+from contactverif_properties.dead_zone import DEAD_ZONE
+from contactverif_properties.patch import consistent_forces
+from contactverif_properties.solved import FLAT_SOLVE, VARIANTS, gap_error, solved_once, stress_error
+
+RIGHT = ("sts", "mortar", "mortar-dual", "mortar-lm", "mortar-dual-lm", "vts-ppt-balanced", "vts-ppt:free_end=cover")
+WRONG = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt:free_end=extend", "chen-hisada")
+DRAWING = BLOCKS["dead-zone"]
+
+
+@cache
+def the(name: str) -> Subject:
+    found = load_formulation(name)
+    assert isinstance(found, Subject), found
+    return found
+
+
+# --- what is exact ----------------------------------------------------------------------------------------------
+
+
+def test_the_exact_forces_by_hand() -> None:
+    """p × what lies over the master, from −3.3 to 3.3, of the shape functions of −6, −4.4, −2.1, −0.3, 1.9, 4, 6."""
+    case = named_scene("dead-zone:pressure=1")
+    left, right = (2.3**2 - 1.1**2) / (2 * 2.3), (2.1**2 - 0.7**2) / (2 * 2.1)  # of the two segments that end nearby
+    slave = [0, 1.2 - left, left + 0.9, 0.9 + 1.1, 1.1 + right, 1.4 - right, 0]
+    master = [0.85, 0.85 + 1, 1 + 0.9, 0.9 + 0.55, 0.55]
+    forces = consistent_forces(case, 1.0)
+    assert forces[:, 1] == pytest.approx([*slave, *(-np.array(master))], abs=1e-14)
+    assert not forces[:, 0].any()
+
+
+@pytest.mark.parametrize("text", ["", ":degrees=17.3", ":refine=2,ratio=0.25,poisson=0", ":degrees=180,penalty=1e8"])
+def test_in_the_exact_solution_the_stress_is_uniform_and_needs_those_forces(text: str) -> None:
+    case = named_scene(f"dead-zone{text}")
+    scene, p = scene_of(case), DRAWING.pressure
+    assert is_uniform(case)
+    assert overhangs(case)
+    q = exact_unknowns(scene, p, case.penalty)
+    assert stress_error(scene, q, p) <= 1e-12
+    assert np.abs(scene.nodal_forces(q) - consistent_forces(case, p)).max() <= 1e-12 * p * 12
+
+
+def test_either_block_may_overhang() -> None:
+    scene = two_blocks([0, 2, 4], [0, 1], [1, 3, 7], [-2, 0], pressure=0.5, penalty=10)
+    q = exact_unknowns(scene, 0.5, 10)
+    assert stress_error(scene, q, 0.5) <= 1e-14
+    assert overhangs(scene.case())
+    assert not overhangs(two_blocks([1, 2], [0, 1], [0, 3], [-2, 0], pressure=0.5).case())
+
+
+def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
+    floor = {"approach": 0.1, "rigid_master": True}
+    assert is_uniform(two_blocks([0, 1, 2], [0, 1], [0, 2], [0], **floor).case())  # type: ignore[arg-type]
+    assert not is_uniform(two_blocks([0, 1, 2], [0, 1], [0.5, 2], [0], **floor).case())  # type: ignore[arg-type]
+
+
+# --- who passes -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_who_passes(name: str) -> None:
+    assert solved_once(named_scene("dead-zone"), the(name)).values["stress"] <= 1e-14
+    for text in ("dead-zone", "dead-zone:degrees=17.3,refine=2", "dead-zone:ratio=1e3,poisson=0.45"):
+        outcome = judge_case(DEAD_ZONE, named_scene(text), the(name))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_who_passes_where_the_master_ends_at_a_slave_node_as_roundoff_will_have_it(name: str) -> None:
+    case = named_scene("dead-zone:degrees=33,refine=3")  # the right end
+    outcome = judge_case(DEAD_ZONE, case, the(name))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_who_fails(name: str) -> None:
+    found = solved_once(named_scene("dead-zone"), the(name))
+    assert found.values["stress"] > 0.02
+    assert {"stress", "slave forces", "master forces"} <= {
+        quantity for quantity, value in found.values.items() if value > found.tolerances[quantity]
+    }
+
+
+def test_the_numbers_of_the_design() -> None:
+    """Where no heights were said: blocks half as high as wide, one cell high, ε̂ = 30 E/h."""
+    x, master_x = (
+        start + np.concatenate([[0], np.cumsum(lengths)])
+        for start, lengths in ((DRAWING.slave_from, DRAWING.slave), (DRAWING.master_from, DRAWING.master))
+    )
+    scene = two_blocks(
+        x, [0, 6], master_x, [-6, 0], young=(1e4, 1e4), poisson=(0.3, 0.3), penalty=30 * 1e4 / 2, pressure=100
+    )
+    errors = {name: solved_once(scene.case(), the(name)).values["stress"] for name in (*RIGHT[:2], *WRONG)}
+    assert max(errors[name] for name in RIGHT[:2]) <= 1e-13
+    assert errors["nts-ar"] == pytest.approx(0.22, rel=0.1)
+    assert errors["vts-me"] == pytest.approx(8e-2, rel=0.05)
+    assert errors["vts-ppt"] >= 2e-2
+
+
+@pytest.mark.parametrize("name", ["vts-ppt-balanced", "sts"])
+def test_who_is_right_is_not_accused(name: str) -> None:
+    (row,) = run([the(name)], [DEAD_ZONE], examples=200, seed=5).rows
+    assert (row.verdict, row.judged, row.unexpected) == (Verdict.PASS, 200, ""), row.reason
+
+
+# --- promises ---------------------------------------------------------------------------------------------------
+
+
+class Claims:
+    """A formulation with other promises."""
+
+    def __init__(self, inner: Any, **promises: Any) -> None:
+        self._inner, self.traits = inner, replace(inner.traits, **promises)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+
+@pytest.mark.parametrize(
+    ("make", "promises", "unexpected"),
+    [
+        (contactverif_nts.vts_me, {}, ""),
+        (contactverif_nts.vts_ppt, {}, ""),
+        (contactverif_nts.vts_ppt, {"covers_overhang": None}, ""),
+        (contactverif_nts.vts_ppt, {"covers_overhang": True}, "promised, and fails"),
+        (contactverif_nts.vts_ppt_balanced, {}, ""),
+        (contactverif_mortar.sts, {"covers_overhang": False}, "crashed"),  # and names no witness
+        (
+            contactverif_mortar.sts,
+            {"covers_overhang": False, "witnesses": {"patch.dead-zone": "dead-zone"}},
+            "said to fail, and passes",
+        ),
+    ],
+)
+def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: str) -> None:
+    subject = Subject("claims", lambda *, penalty: Claims(make(penalty=penalty), **promises))
+    (row,) = run([subject], [DEAD_ZONE], examples=20, seed=2).rows
+    assert row.unexpected == unexpected
+    if subject.traits.covers_overhang is False and not unexpected:
+        assert row.witness is not None
+        assert (row.witness.verdict, row.witness.case.name) == (Verdict.FAIL, "dead-zone")
+
+
+def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
+    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, VARIANTS], scene=named_scene("dead-zone"))
+    assert [row.verdict for row in found.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
+    assert found.passed
+    (row,) = run([the("sts")], [DEAD_ZONE], scene=named_scene("c")).rows
+    assert row.verdict is Verdict.NOT_APPLICABLE
+    assert dead_zone_cases(made("c").case()) is None
+
+
+# --- what is measured -------------------------------------------------------------------------------------------
+
+
+def told(points: ContactPoints, **more: Any) -> ContactPoints:
+    """The points, and the first of them once more, changed."""
+    first = {field.name: getattr(points, field.name)[:1] for field in fields(points)} | {
+        name: np.array([value]) for name, value in more.items()
+    }
+    return ContactPoints(**{name: np.concatenate([getattr(points, name), values]) for name, values in first.items()})
+
+
+def telling(**more: Any) -> Subject:
+    """Segment to segment that tells of one more point."""
+
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_mortar.sts(penalty=penalty)
+        told_more = Claims(inner)
+        told_more.contact_points = lambda *given: told(inner.contact_points(*given), **more)  # type: ignore[attr-defined]
+        return told_more
+
+    return Subject("telling", make)
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        ({"slave_segment": 0, "c": -1.0, "active": False, "pressure": 0.0}, set()),  # idle, beside the master
+        ({"slave_segment": 1, "c": -1 + 2 * 1.1 / 2.3, "active": False}, set()),  # at its end, as near as roundoff
+        ({"slave_segment": 1, "c": 0.5, "active": False}, {"pressure"}),  # idle, opposite
+        ({"slave_segment": 1, "c": 0.5, "active": False, "weight": 0.0}, set()),
+        ({"slave_segment": 1, "c": 0.5, "active": False, "master_segment": -1}, set()),
+        ({"slave_segment": 0, "c": -1.0, "active": True, "pressure": 99.0}, {"pressure"}),
+        ({"slave_segment": 0, "c": -1.0, "active": True, "master_segment": -1, "pressure": 99.0}, {"pressure"}),
+        ({"slave_segment": -1, "c": np.nan, "active": False}, {"pressure"}),  # no place on the slave: opposite
+        ({"slave_segment": 1, "c": 0.5, "gap": 0.0}, {"gap"}),
+    ],
+)
+def test_which_points_count(more: dict[str, Any], wrong: set[str]) -> None:
+    found = solved_once(named_scene("dead-zone"), telling(**more))
+    assert {name for name, value in found.values.items() if value > found.tolerances[name]} == wrong
+
+
+def test_what_overhangs_may_bend() -> None:
+    """The gap is asked for where there are two surfaces."""
+    case = named_scene("dead-zone")
+    n_slave = case.interface.n_slave_nodes
+    penetration = DRAWING.pressure / case.penalty
+    flat = case.interface.nodes - penetration * np.where(np.arange(n_slave + 5) < n_slave, 1.0, 0.0)[:, None] * [0, 1]
+
+    def error(node: int, by: float) -> float:
+        moved: Case = replace(case, z=(flat + by * np.eye(len(flat))[node][:, None] * [0, 1]).reshape(-1))
+        return gap_error(moved, penetration, 1.0)
+
+    assert error(0, 0.0) <= 1e-15
+    assert error(0, 0.5) == error(0, 0.0)  # the segment from node 0 to node 1 has no master opposite
+    assert error(1, 0.5) == pytest.approx(0.5 * 1.2 / 2.3)  # what is seen of it opposite the master's end
+    assert error(2, 0.5) == pytest.approx(0.5)
+    assert error(n_slave, 0.5) == pytest.approx(0.5 * 4 / 5)  # over the mean of five master nodes
+
+
+def test_a_part_of_the_slave_bears_the_rounding_of_all() -> None:
+    case = named_scene("dead-zone")
+    plain, found = (measure(case, the("sts")) for measure in (solved_once, DEAD_ZONE.measure))
+    assert found.values == plain.values
+    for name, tolerance in plain.tolerances.items():
+        assert found.tolerances[name] == pytest.approx(tolerance * 12 / 6.6, rel=1e-14)
+    assert judge(DEAD_ZONE, found)[0] is Verdict.PASS

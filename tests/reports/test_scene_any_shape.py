@@ -1,0 +1,76 @@
+"""Scenes that are no pair of blocks: silhouettes in text, and a close-up where the contact is small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactverif.body import block
+from contactverif.catalogue import scene_named
+from contactverif.pictures import solved
+from contactverif.registry import load_formulation
+from contactverif.scene import Scene
+from contactverif_reports.scene_figures import draw_solved
+from contactverif_reports.scene_meshes import close_up, magnifications
+from contactverif_reports.scene_text import silhouettes_as_text
+from contactverif_reports.solved import Solved
+
+
+@pytest.fixture(scope="module")
+def disk() -> Solved:
+    return solved(scene_named("example-2").case(), [load_formulation("vts-ppt")])
+
+
+@pytest.mark.parametrize("width", [40, 72, 120])
+def test_silhouettes_are_to_scale(width: int) -> None:
+    scene = scene_named("example-2")
+    slave, master = scene.bodies
+    lines = silhouettes_as_text(scene.case(), slave, master, width).splitlines()
+    assert max(map(len, lines)) <= width
+    disk = [line.count("▒") for line in lines if "▒" in line and "segments" not in line]
+    foundation = [line.count("░") for line in lines if "░" in line and "segments" not in line]
+    assert len(disk) == pytest.approx(2 * len(foundation), abs=2)
+    assert len(set(foundation)) == 1
+    assert max(disk) == pytest.approx(foundation[0], abs=1)
+    area = 20 * 10 / sum(foundation)  # of a character
+    assert sum(disk) * area == pytest.approx(np.pi * 100, rel=0.1)
+    assert lines[0].strip() == "↓"
+    assert lines[-2:] == [
+        "▒ slave, 60 segments of 0.025 or more",
+        "░ master, 82 segments of 0.02 or more",
+    ]
+
+
+def test_a_flat_pair_has_silhouettes_too() -> None:
+    upper = block([0, 1, 2], [0, 1], contact="bottom", approach=0.1, name="slave")
+    lower = block([0, 2], [-1, 0], contact="top", approach=0.0, name="master")
+    text = silhouettes_as_text(Scene((upper, lower)).case(), upper, lower, 40).splitlines()
+    assert text[0] == ""
+    assert set(text[1]) == {"▒"}
+    assert set(text[-3]) == {"░"}
+
+
+def test_a_small_contact_is_drawn_from_near(disk: Solved) -> None:
+    box = close_up(disk)
+    assert box is not None
+    assert np.abs(box.mean(axis=0)).max() <= 0.05
+    assert np.ptp(box, axis=0) == pytest.approx([1.6 * 2 * 0.42] * 2, rel=0.02)
+    assert magnifications(disk)["vts-ppt"].move == 1
+
+
+@pytest.mark.parametrize("name", ["c", "c-prime:sides=free", "example-1", "b:degrees=33"])
+def test_a_contact_as_wide_as_its_bodies_is_not(name: str) -> None:
+    assert close_up(solved(scene_named(name).case(), [load_formulation("nts-ar")])) is None
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_it_is_drawn(disk: Solved, suffix: str, tmp_path: Path) -> None:
+    target = tmp_path / f"a.{suffix}"
+    draw_solved(disk, target, title="example-2")
+    assert target.stat().st_size > 10_000
+    if suffix == "svg":
+        words = target.read_text()
+        assert "displacements × 1, penetration × 50" in words
+        assert "all of the meshes" in words
