@@ -1,0 +1,114 @@
+"""Reads an HTML page as strictly as the standard library lets one: what is nested, named, referred to, said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+
+VOID = {"meta", "link", "img", "br", "hr", "input", "col"}
+
+
+@dataclass
+class Table:
+    """Texts of the cells; `headers` of the column headers with a scope."""
+
+    caption: str = ""
+    headers: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+
+
+class Page(HTMLParser):
+    """All that a test asks about a page.
+
+    Attributes
+    ----------
+    errors : what is not nested as it was opened.
+    ids : in their order, twice if they are there twice.
+    links : targets of every `href`, `src` and `url(…)`.
+    text : of the page, style sheets left out, spaces made one.
+    """
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.errors: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.tables: list[Table] = []
+        self._words: list[str] = []
+        self._cell: list[str] | None = None
+        self.feed(html)
+        self.close()
+        self.errors += [f"{tag} is not closed" for tag in self.open]
+        self.text = " ".join(" ".join(self._words).split())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._take(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "table":
+            self.tables.append(Table())
+        if tag == "tr" and self.tables:
+            self.tables[-1].rows.append([])
+        if tag in ("td", "th", "caption"):
+            self._cell = []
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._take(tag, attrs)
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.errors.append(f"</{tag}> at {self.getpos()}")
+        if tag in ("td", "th", "caption") and self._cell is not None:
+            text = " ".join("".join(self._cell).split())
+            if tag == "caption":
+                self.tables[-1].caption = text
+            else:
+                self.tables[-1].rows[-1].append(text)
+                if tag == "th" and self._attribute_of_last("th", "scope") == "col":
+                    self.tables[-1].headers.append(text)
+            self._cell = None
+
+    def handle_data(self, data: str) -> None:
+        if "style" in self.open:
+            return
+        self._words.append(data)
+        if self._cell is not None:
+            self._cell.append(data)
+
+    def _take(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = {name: value or "" for name, value in attrs}
+        self.tags.append((tag, found))
+        if "id" in found:
+            self.ids.append(found["id"])
+        self.links += [found[name] for name in ("href", "src", "srcset", "data", "poster") if name in found]
+        self.links += [part.partition(")")[0] for value in found.values() for part in value.split("url(")[1:] if part]
+
+    def _attribute_of_last(self, tag: str, name: str) -> str:
+        return next((attrs.get(name, "") for found, attrs in reversed(self.tags) if found == tag), "")
+
+
+def complaints(html: str) -> list[str]:
+    """What is wrong with a page of ours, a line each."""
+    page = Page(html)
+    found = list(page.errors)
+    found += [f"id {name!r} twice" for name in sorted({name for name in page.ids if page.ids.count(name) > 1})]
+    found += [f"outside: {link}" for link in page.links if not link.startswith("#")]
+    found += [f"leads nowhere: {link}" for link in page.links if link[:1] == "#" and link[1:] not in page.ids]
+    found += [f"script: {attrs}" for tag, attrs in page.tags if tag in ("script", "link", "iframe", "object")]
+    found += [f"@import in {tag}" for tag in ("style",) if "@import" in html]
+    tags = [tag for tag, _ in page.tags]
+    found += [f"{tags.count(tag)} × {tag}" for tag in ("html", "title", "h1", "main", "header") if tags.count(tag) != 1]
+    found += [] if any(tag == "html" and attrs.get("lang") for tag, attrs in page.tags) else ["no language"]
+    for number, table in enumerate(page.tables):
+        if not table.headers:
+            found.append(f"table {number} ({table.caption}) has no column headers with a scope")
+        if not table.caption:
+            found.append(f"table {number} has no caption")
+        if len({len(row) for row in table.rows}) != 1:
+            found.append(f"table {number} ({table.caption}) is ragged")
+    for tag, attrs in page.tags:
+        if tag == "svg" and not (attrs.get("aria-label") or attrs.get("aria-hidden")):
+            found.append("an svg says nothing")
+    return found
