@@ -11,7 +11,7 @@ from contactverif import runner
 
 
 class Bar:
-    """A bar that `runner.run` tells how far it is."""
+    """A bar that is told how far something is."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
@@ -35,9 +35,12 @@ class Bar:
 
     def told(self, step: runner.Progress) -> None:
         """One more case is done."""
+        self.at(f"{step.formulation}  {step.property_id}  {step.phase}", step.done, step.planned)
+
+    def at(self, description: str, done: int, planned: int) -> None:
+        """So many of so many are done, and this comes next."""
         if self._progress.disable:
             return
-        description = f"{step.formulation}  {step.property_id}  {step.phase}"
         if self._task is None:
             self._task = self._progress.add_task(description)
-        self._progress.update(self._task, description=description, completed=step.done, total=step.planned)
+        self._progress.update(self._task, description=description, completed=done, total=planned)

@@ -1,0 +1,79 @@
+"""Lagrange multipliers on the paper's patch tests: stress, range of the multipliers, and how many are not unique.
+
+The paper uses penalties throughout and states what multipliers do: one-pass NTS fails the patch test, two-pass NTS
+passes it, and VTS-PPT passes it.
+
+Source: Zavarise & De Lorenzis (2009), Sections 2, 5.1.3, 6 and 7.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from contactverif import catalogue, newton
+from contactverif.blocks import two_blocks
+from contactverif.oracle import uniform_pressure_weights
+from contactverif.scene import Scene
+from contactverif.studies.paper import cast
+from contactverif.studies.paper.patch import roundoff, stress_error
+from contactverif_reports.paper_data import Member, MultiplierRow
+
+SCENES = ("a1", "b", "example-1", "c", "c-prime", "example-1bis")
+EIGHT_ON_TWO = "eight on two"
+SAID: Mapping[str, Mapping[str, int]] = {
+    "nts-lm": {"example-1": 0},
+    "two-pass/nts-lm": {"b": 1, "example-1": 1},
+    "vts-ppt-lm": dict.fromkeys(("c", "example-1bis"), 1),
+}
+
+
+def multipliers(told: Callable[[str], None]) -> tuple[MultiplierRow, ...]:
+    """A row for each formulation and scene; eight slave on two master segments for the rank."""
+    rows = []
+    for member in cast.installed(cast.MULTIPLIERS):
+        told(f"patch tests of {member.formulation}")
+        rows += [_row(member, name, catalogue.made(name)) for name in SCENES]
+        rows.append(_row(member, EIGHT_ON_TWO, eight_on_two()))
+    return tuple(rows)
+
+
+def eight_on_two() -> Scene:
+    """Eight slave segments on two master segments: the rows of VTS-PPT's constraints depend on one another."""
+    layers = np.linspace(0.0, 4.0, 3)
+    return two_blocks(
+        np.linspace(0.0, 8.0, 9),
+        layers,
+        np.linspace(0.0, 8.0, 3),
+        layers - 4.0,
+        young=(1e4, 1e4),
+        poisson=(0.3, 0.3),
+        penalty=1e5,
+        pressure=100.0,
+    )
+
+
+def _row(member: Member, name: str, scene: Scene) -> MultiplierRow:
+    subject, tolerance = cast.subject(member), roundoff(scene)
+    trace = newton.solve(scene, subject.on(scene.case()))
+    found = trace.multipliers / float(scene.facts["pressure"])
+    if subject.traits.penalty == "nodal":
+        lengths = uniform_pressure_weights(scene.interface, scene.facts["along"])[: len(found)]
+        found = found[lengths > 0] / lengths[lengths > 0]  # the slave's nodes, in a second pass the master's too
+    return MultiplierRow(
+        member=member,
+        scene=name,
+        end=trace.end.words,
+        error=stress_error(scene, trace.solution) if trace.converged else np.nan,
+        tolerance=tolerance,
+        low=_plain(found.min(initial=np.inf), tolerance),
+        high=_plain(found.max(initial=-np.inf), tolerance),
+        deficiency=trace.deficiency,
+        said=SAID.get(member.formulation, {}).get(name, -1),
+    )
+
+
+def _plain(value: float, tolerance: float) -> float:
+    """Without roundoff where it would stand for 0."""
+    return 0.0 if abs(value) <= tolerance else float(value)

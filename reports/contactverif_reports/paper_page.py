@@ -1,0 +1,134 @@
+"""The page and the files of the reproduction of the paper: one netCDF file, figures as SVG, one HTML page."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import matplotlib
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from contactverif.errors import MisuseError
+from contactverif_reports.files import check_writable, whole
+from contactverif_reports.pages import render, svg_inline, write_page
+from contactverif_reports.paper_data import MultiplierRow, Paper, Said
+from contactverif_reports.paper_figures import drawings
+from contactverif_reports.paper_tree import REFERENCE, tree_of
+
+NUMBERS, PAGE = "paper.nc", "paper.html"
+MARKS = {Said.AGREES: "✓", Said.DIFFERS: "✗", Said.SILENT: "–", Said.DEFECT: "!"}
+CLASSES = {Said.AGREES: "good", Said.DIFFERS: "bad", Said.SILENT: "soft", Said.DEFECT: "warn"}
+CHOICES = (
+    ("Patch tests", "E = 10⁴ and ν = 0.3 in both bodies, heights 4, two layers of cells, rollers at all sides"),
+    ("Case A2, Examples 1 and 1bis", "the lengths of the segments, which are drawn but not printed"),
+    ("Penalty of the figures", "ε̂ = E per unit of length: the pressures of case A1 then fill the printed axis"),
+    ("Penalty of the pass/fail table", "ε̂ = 10 E/h with the mean slave segment h; NTS: ε = ε̂ h"),
+    ("Pressure of NTS and of two passes", "nodal force over the node's share of the interface, Eq. 3"),
+    (
+        "Fig. 30",
+        "ε̂ = E, p = E/100, free sides, the slave begins where it touches; both blocks alike, and one half as stiff",
+    ),
+    ("Ties at a vertex, feet past a free end, the end of a walk", "see plugins/README.md and the docstrings there"),
+)
+
+
+def check_folder(folder: Path, argument: str = "--out") -> None:
+    """Makes the folder, and says before anything takes long what would stop files from being written to it.
+
+    Raises
+    ------
+    MisuseError : if it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MisuseError(argument, f"{folder} ({error.strerror})", "a folder that can be written") from None
+    for name in (NUMBERS, PAGE):
+        check_writable(folder / name, argument, f"a folder that may hold {name}")
+
+
+def write(
+    paper: Paper, folder: Path, told: Callable[[str], None] = lambda _: None, argument: str = "--out"
+) -> tuple[Path, ...]:
+    """Writes all files, each whole or not at all, and returns their paths; `told` hears of each figure.
+
+    Raises
+    ------
+    MisuseError : as `check_folder`.
+    """
+    check_folder(folder, argument)
+    written = [folder / NUMBERS]
+    with whole(folder / NUMBERS) as part:
+        tree_of(paper).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+    inlined: dict[str, Markup] = {}
+    for drawing in drawings(paper):
+        told(drawing.caption)
+        figure = drawing.drawn()
+        written.append(folder / f"{drawing.name}.svg")
+        with whole(written[-1]) as part:
+            part.write_text(svg(figure), encoding="utf-8", newline="\n")
+        inlined[drawing.name] = svg_inline(figure, f"{drawing.figure}. {drawing.caption}")
+    written.append(folder / PAGE)
+    write_page(written[-1], page(paper, inlined), argument)
+    return tuple(written)
+
+
+def page(paper: Paper, figures: dict[str, Markup]) -> str:
+    """The page, with the figures by name."""
+    return render(
+        "paper.html.j2",
+        paper=paper,
+        figures=figures,
+        drawings=[drawing for drawing in drawings(paper) if not drawing.name.startswith("defect")],
+        defects=[drawing for drawing in drawings(paper) if drawing.name.startswith("defect")],
+        said=Said,
+        marks_of=MARKS,
+        class_of=CLASSES,
+        choices=CHOICES,
+        reference=REFERENCE,
+        counts={verdict: sum(one.verdict is verdict for one in paper.statements) for verdict in Said},
+        about=_about(paper),
+        scenes=list(dict.fromkeys(row.scene for row in paper.multipliers)),
+        multipliers=_by_legend(paper.multipliers),
+        rounding=max(row.rounding for table in paper.forces for row in table.rows),
+    )
+
+
+def summary(paper: Paper) -> str:
+    """Every statement that does not merely note a silence, a line each, and how many there are of each kind."""
+    lines = [
+        f"  {MARKS[one.verdict]} {one.verdict.mark:8} {one.figure}: {one.found}"
+        for one in paper.statements
+        if one.verdict is not Said.SILENT
+    ]
+    missing = f"not installed: {', '.join(paper.missing)}" if paper.missing else ""
+    return "\n".join([*lines, *([missing] if missing else [])])
+
+
+def _by_legend(rows: Sequence[MultiplierRow]) -> dict[str, list[MultiplierRow]]:
+    """{legend: its rows, a scene each}."""
+    found: dict[str, list[MultiplierRow]] = {}
+    for row in rows:
+        found.setdefault(row.member.legend, []).append(row)
+    return found
+
+
+def _about(paper: Paper) -> dict[str, list[int]]:
+    """{drawing: numbers of the statements that it shows}."""
+    found: dict[str, list[int]] = {}
+    for number, statement in enumerate(paper.statements):
+        found.setdefault(statement.drawing, []).append(number)
+    return found
+
+
+def svg(figure: Figure) -> str:
+    """The figure with its letters as paths, the same for the same figure, without what nothing is drawn from."""
+    buffer = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "contactverif"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = re.sub(r"<!--.*?-->\s*", "", buffer.getvalue(), flags=re.DOTALL)
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    return "\n".join(line.strip() for line in text.splitlines()) + "\n"
