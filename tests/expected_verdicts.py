@@ -35,12 +35,25 @@ FAILS: Mapping[str, frozenset[str]] = {
     "vts-ppt": PRINTED,
     "vts-ppt-basic": PRINTED | INEXACT,
     "vts-ppt-balanced": frozenset(),
+    "nts-lm": PATCHES,
+    "vts-me-lm": PATCHES | {RANK},
+    "vts-ppt-lm": PRINTED | {RANK},
+    "two-pass/nts": PATCHES,
+    "two-pass/nts-ar": PATCHES,
+    "two-pass/nts-lm": frozenset({RANK}),
+    "sts": frozenset(),
+    "mortar": frozenset(),
+    "mortar:normals=averaged": frozenset(),
+    "mortar-dual": frozenset(),
+    "mortar-lm": frozenset(),
+    "mortar-dual-lm": frozenset(),
+    "chen-hisada": frozenset({DEAD_ZONE}),
 }
 
 # What makes no sense to ask: springs at nodes have no area, springs that act twice no total; springs no multipliers.
-WITHOUT_AREA = ("nts",)
-WITH_MULTIPLIERS: tuple[str, ...] = ()
-NOT_UNIQUE: tuple[str, ...] = ()  # multipliers: Newton has nothing to converge to
+WITHOUT_AREA = ("nts", "nts-lm", "two-pass/nts", "two-pass/nts-ar", "two-pass/nts-lm")
+WITH_MULTIPLIERS = ("nts-lm", "vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm", "mortar-lm", "mortar-dual-lm")
+NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # multipliers: Newton has nothing to converge to
 
 MARKS = {Verdict.PASS: "✓", Verdict.FAIL: "✗", Verdict.NOT_APPLICABLE: "·"}
 

@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from contactverif import catalogue, newton
-from contactverif.registry import load_formulation
+from contactverif.arrays import FloatArray
+from contactverif.blocks import two_blocks
+from contactverif.property import Property, Verdict
+from contactverif.registry import load_formulation, load_properties
+from contactverif.runner import judge_case
 from contactverif.subject import Subject
 
 FAILS = 1e-2  # of the pressure
@@ -25,13 +29,24 @@ TABLE = {
     "vts-ppt": (True, True, True),
     "vts-ppt-basic": (True, True, True),
     "vts-ppt-balanced": (True, True, True),
+    "two-pass/nts-ar": (False, False, False),
+    "sts": (True, True, True),
+    "mortar": (True, True, True),
+    "mortar-dual": (True, True, True),
+    "chen-hisada": (True, True, True),
+    "nts-lm": (True, False, False),
+    "two-pass/nts-lm": (True, True, True),
+    "vts-ppt-lm": (True, True, True),
+    "mortar-lm": (True, True, True),
+    "mortar-dual-lm": (True, True, True),
 }
+PRINTED = [name for name, drawing in catalogue.BLOCKS.items() if drawing.source]
 GROUPS = (ELASTIC_A, ("b", "example-1"), ("c", "c-prime", "example-1bis"))
 
 
 def roundoff(name: str) -> float:
     """Of a stress over the pressure: 1e-11 + 1e-13 ε̂h/E + 5e-15 over the smallest ratio of segments."""
-    drawing = catalogue.SCENES[name]
+    drawing = catalogue.BLOCKS[name]
     lengths = [*drawing.slave, *drawing.master]
     return 1e-11 + 1e-13 * catalogue.MODERATE + 5e-15 * max(lengths) / min(lengths)
 
@@ -52,11 +67,11 @@ def stress_error(formulation: str, name: str) -> float:
 
 
 def test_the_table_is_whole() -> None:
-    assert [name for group in GROUPS for name in group] == sorted(catalogue.SCENES, key=[*sum(GROUPS, ())].index)
+    assert [name for group in GROUPS for name in group] == sorted(PRINTED, key=[*sum(GROUPS, ())].index)
     assert all(len(row) == len(GROUPS) for row in TABLE.values())
 
 
-@pytest.mark.parametrize("name", catalogue.SCENES)
+@pytest.mark.parametrize("name", PRINTED)
 @pytest.mark.parametrize("formulation", TABLE)
 def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
     passes = next(said for group, said in zip(GROUPS, TABLE[formulation], strict=True) if name in group)
@@ -65,3 +80,54 @@ def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
         assert error <= roundoff(name)
     else:
         assert error > FAILS
+
+
+def multipliers(formulation: str, name: str) -> FloatArray:
+    """Of the solved scene (n_multipliers,), over the pressure."""
+    scene = catalogue.made(name)
+    subject = load_formulation(formulation)
+    assert isinstance(subject, Subject)
+    found: FloatArray = newton.solve(scene, subject.on(scene.case())).multipliers / scene.facts["pressure"]
+    return found
+
+
+@pytest.mark.parametrize("name", ["b", "c", "c-prime", "example-1", "example-1bis"])
+@pytest.mark.parametrize("formulation", ["vts-ppt-lm", "mortar-lm", "mortar-dual-lm"])
+def test_who_passes_has_uniform_multipliers(formulation: str, name: str) -> None:
+    assert np.abs(multipliers(formulation, name) - 1).max() <= 100 * roundoff(name)
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("c", 0, 2), ("c-prime", 13 / 45, 77 / 45)])
+def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multipliers(
+    name: str, least: float, most: float
+) -> None:
+    """There are forces that it transmits exactly, by multipliers that are not uniform."""
+    assert stress_error("vts-me-lm", name) <= roundoff(name)
+    found = multipliers("vts-me-lm", name)
+    assert found.min() == pytest.approx(least, abs=1e-10)
+    assert found.max() == pytest.approx(most, abs=1e-10)
+    (question,) = load_properties(["patch.flat.solve"])
+    assert isinstance(question, Property)
+    subject = load_formulation("vts-me-lm")
+    assert isinstance(subject, Subject)
+    outcome = judge_case(question, catalogue.made(name).case(), subject)
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    beyond = {key for key, value in outcome.measurement.values.items() if value > outcome.measurement.tolerances[key]}
+    assert beyond == {"multipliers"}
+
+
+def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_too_many() -> None:
+    grid = np.linspace(0, 8, 9)
+    scene = two_blocks(grid, [4, 8], [0, 4, 8], [0, 4], penalty=10.0, pressure=1.0)
+    subject = load_formulation("vts-ppt-lm")
+    (question,) = load_properties(["multipliers.rank"])
+    assert isinstance(subject, Subject)
+    assert isinstance(question, Property)
+    outcome = judge_case(question, scene.case(), subject)
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    assert outcome.measurement.values == {"multipliers too many": 7.0}
+    trace = newton.solve(scene, subject.on(scene.case()))
+    assert trace.converged
+    assert trace.deficiency == 7

@@ -10,7 +10,9 @@ from killing import EXAMPLES, KEY, OTHERS, as_lines
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """One row a mutant, one column a property; it travels in the reports, so that workers of xdist can send it."""
-    reports = [report for every in terminalreporter.stats.values() for report in every if hasattr(report, "when")]
+    reports = [
+        report for every in terminalreporter.stats.values() for report in every if hasattr(report, "user_properties")
+    ]
     carried = [dict(report.user_properties)[KEY] for report in reports if KEY in dict(report.user_properties)]
     if not carried:
         return

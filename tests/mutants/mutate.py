@@ -17,7 +17,8 @@ from typing import Any
 import contactverif_nts
 
 PACKAGE = "contactverif_nts"
-MODULES = ("eq6", "walk", "box3", "options", "points", "ppt")  # in the order in which they import each other
+# In the order in which they import each other.
+MODULES = ("state", "eq6", "options", "walk", "box3", "points", "ppt", "multipliers")
 
 _numbers = itertools.count()
 
@@ -49,8 +50,7 @@ def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0,
         sys.modules[f"{copy}.{name}"] = part
         setattr(package, name, part)
         exec(compile(source, f"<{copy}.{name}>", "exec"), vars(part))
-    home = "points" if hasattr(sys.modules[f"{copy}.points"], factory) else "ppt"
-    make = getattr(sys.modules[f"{copy}.{home}"], factory)
+    make = next(vars(part)[factory] for name in MODULES if factory in vars(part := sys.modules[f"{copy}.{name}"]))
 
     def mutant(*, penalty: float) -> Any:
         return make(penalty=penalty, **options)

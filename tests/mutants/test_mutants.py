@@ -71,6 +71,7 @@ def test_every_property_has_its_mutant() -> None:
     "name",
     [
         "nts-ar",
+        "nts-lm",
         "vts-me",
         "vts-me:n=3",
         "vts-ppt:free_end=extend",
