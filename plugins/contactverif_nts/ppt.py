@@ -203,7 +203,6 @@ def vts_ppt_balanced(
         conserves_force=covers,
         conserves_moment=covers,
         area="current" if current else "reference",
-        continuity="C1" if covers else None,
         witnesses={},
     )
     return replace(

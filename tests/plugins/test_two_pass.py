@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -203,7 +202,6 @@ def test_what_it_promises() -> None:
     assert promised("nts_lm").passes_flat_patch is True
     assert promised("nts_lm").independent_multipliers is False
     assert promised("vts_ppt_lm").passes_flat_patch is None  # λ of which pass?
-    assert replace(promised("vts_ppt_balanced"), source="").continuity == "C1"
 
 
 def test_by_name_with_options_and_nested() -> None:
