@@ -345,7 +345,7 @@ def paper(
 
     Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416.
     Writes paper.html, one page with all of it; paper.nc, the numbers; and
-    each figure as SVG.
+    each figure as SVG. Takes about a minute.
 
     \bExit status
       0  written; whether it agrees is what the page says
@@ -355,13 +355,14 @@ def paper(
       contactverif paper
       contactverif paper --out reports/paper
     """
+    from contactverif_reports.paper_page import N_FIGURES, check_folder, summary, write
+
+    check_folder(out)  # before what computes is imported, which takes its time
+    folder = out.absolute()  # a plugin may change where we are
     from contactverif.progress import Bar
     from contactverif.studies.paper import compute, steps
-    from contactverif_reports.paper_page import check_folder, summary, write
 
-    folder = out.absolute()
-    check_folder(folder)
-    done, planned = 0, steps()
+    done, planned = 0, steps() + N_FIGURES
     with Bar() as bar:
 
         def told(what: str) -> None:
@@ -378,6 +379,11 @@ def paper(
 @app.command()
 def scenes() -> None:
     """List the scenes that have a name, with drawings, and their options.
+
+    A scene with options is written NAME:OPTION=VALUE,OPTION=VALUE.
+
+    \bExit status
+      0  listed
 
     \bExamples
       contactverif scenes

@@ -192,19 +192,9 @@ class ChangesTable:
             rows = "all rows" if others == len(found.changes) else f"{others} rows (marked *)"
             yield Text(f"{rows} asked other cases: their errors are compared as distributions, not case by case")
         yield Text("")
-        table = plain_table("error over tolerance, old → new; time of a case, new/old, which decides nothing")
-        table.add_column("", no_wrap=True)
-        for column in ("verdict", "median", "worst"):
-            table.add_column(column, no_wrap=True)
-        for column in ("better", "equal", "worse", "time"):
-            table.add_column(column, justify="right", no_wrap=True)
-        before = None
-        for change in found.changes:
-            if change.new.formulation != before:
-                table.add_row(Text(change.new.formulation, style="bold"))
-            before = change.new.formulation
-            table.add_row(*_change(change))
-        yield table
+        yield moved_verdicts(found)
+        if any(_has_moved(change) for change in found.changes):
+            yield moved_errors(found)
         if found.iterations:
             yield moved_iterations(found)
         for what, names in (("only in the old", found.gone), ("only in the new", found.added)):
@@ -212,10 +202,53 @@ class ChangesTable:
                 yield Text(f"{what}: {'; '.join(names)}")
 
 
+def moved_verdicts(found: Changes) -> Table:
+    """Verdicts, numbers of cases, time: a line for each row that both have."""
+    table = plain_table("verdict, old → new; cases better, equal, worse; time of a case, new/old (decides nothing)")
+    table.add_column("", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for column in ("better", "equal", "worse", "time"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for change in found.changes:
+        _group(table, change, found.changes)
+        table.add_row(*_change(change))
+    return table
+
+
+def moved_errors(found: Changes) -> Table:
+    """Errors where they are not what they were."""
+    table = plain_table("error over tolerance, old → new, where it changed")
+    for column in ("", "median", "worst"):
+        table.add_column(column, no_wrap=True)
+    moved = [change for change in found.changes if _has_moved(change)]
+    for change in moved:
+        _group(table, change, moved)
+        old, new = change.old, change.new
+        errors = (_moved(number(old.median), number(new.median)), _moved(number(old.worst), number(new.worst)))
+        table.add_row(_indented(change), *errors)
+    return table
+
+
+def _group(table: Table, change: Change, among: Sequence[Change]) -> None:
+    """The name of the formulation, above its first line."""
+    first = next(other for other in among if other.new.formulation == change.new.formulation)
+    if change is first:
+        table.add_row(Text(change.new.formulation, style="bold"))
+
+
+def _has_moved(change: Change) -> bool:
+    old, new = change.old, change.new
+    return (number(old.median), number(old.worst)) != (number(new.median), number(new.worst))
+
+
+def _indented(change: Change) -> str:
+    return f"  {change.new.property_id}{'' if change.paired else ' *'}"
+
+
 def moved_iterations(found: Changes) -> Table:
     """Newton iterations where they are not what they were."""
     table = plain_table("Newton iterations that changed, old → new, where it converged")
-    table.add_column("", no_wrap=True)
+    table.add_column("")  # wraps at 80 columns
     for column in ("converged", "median", "most"):
         table.add_column(column, no_wrap=True)
     for column in ("fewer", "same", "more"):
@@ -238,10 +271,8 @@ def _change(change: Change) -> list[str | Text]:
     counts = [str(count) for count in (paired.better, paired.equal, paired.worse)] if paired and counted else [""] * 3
     time = f"{change.slower:.2f}" if isfinite(change.slower) else "–"
     return [
-        f"  {new.property_id}{'' if paired else ' *'}",
+        _indented(change),
         Text(_moved(str(old.verdict), str(new.verdict)), style=style),
-        _moved(number(old.median), number(new.median)),
-        _moved(number(old.worst), number(new.worst)),
         *counts,
         time,
     ]

@@ -55,7 +55,9 @@ ROOMS = {
     "projection": Room(("projection",), ("contracts", "compiled"), ("numpy", "numba"), QUIET),
     "mesh": Room(("mesh",), ("contracts",), ("numpy", "meshio")),
     "bulk": Room(("bulk",), ("contracts",), ("numpy", "scipy", "skfem"), QUIET),
-    "scene": Room(("scene", "blocks", "disk", "hertz", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET),
+    "scene": Room(
+        ("scene", "blocks", "disk", "hertz", "catalogue"), ("contracts", "bulk", "scene"), ("numpy", "scipy"), QUIET
+    ),
     "newton": Room(("newton", "linear"), ("contracts", "scene", "newton"), ("numpy", "scipy"), QUIET),
     "strategies": Room(("strategies",), ("contracts", "scene", "strategies", "oracle"), ("numpy", "hypothesis"), QUIET),
     "oracle": Room(("oracle",), ("contracts", "oracle"), ("numpy",), QUIET),

@@ -157,7 +157,10 @@ def _drawn(case: Case, forces: FloatArray | None, exact: FloatArray | None, labe
 
     if has_outline(case):
         return svg_inline(outline(case, _INCHES), label)
-    return svg_inline(drawn(case, title="", forces=forces, exact=exact, width=_INCHES), label)
+    figure = drawn(case, title="", forces=forces, exact=exact, width=_INCHES)
+    for legend in figure.legends:
+        legend.set_ncols(2)  # with forces it has four entries, which are wider than the figure beside each other
+    return svg_inline(figure, label)
 
 
 def _about(provenance: Mapping[str, str]) -> dict[str, str]:

@@ -51,6 +51,7 @@ _STYLE: dict[Any, Any] = {
 }
 _EXACT: dict[str, Any] = {"color": "0.75", "linewidth": 2.2, "zorder": 1}
 _TALLEST = 2.6  # inches, of a panel with a deformed mesh
+_MEGA = 1e6  # pressures of Example 2 are drawn in it
 _LOWEST = 1e-17  # where a number that is exactly zero is drawn on a logarithmic axis
 
 
@@ -83,24 +84,41 @@ def drawings(paper: Paper) -> tuple[Drawing, ...]:
 
 
 _CAPTIONS = {
-    "fig30": "Case C: residual against iterates, and the linear rate of the basic version over the penalty.",
-    "why": "Example 2: the largest pressure over the size of an element, and over the slope of the contact.",
-    "tilt": "Defect 1: force and moment that are lost between slave and master when the slave is tilted.",
-    "jump": "Defect 2: what reaches the master while the end of an area of competence slides past a master node, and "
-    "the largest jump of a nodal force there.",
-    "ends": "Defect 3: error of the stress in a uniform patch test whose slave overhangs the master inside a segment.",
+    "fig30": "Case C: (a, b) residual against iterates, grey where it is roundoff; (c) the linear rate of the basic "
+    "version over the penalty.",
+    "fig38": "Example 2: (a) contact pressure; (b) close-up of its middle.",
+    "why": "Example 2: the largest pressure (a) over the size of an element and (b) over the slope of the contact.",
+    "tilt": "Defect 1: (a) force and (b) moment that are lost between slave and master when the slave is tilted.",
+    "jump": "Defect 2: (a) what reaches the master while the end of an area of competence slides past a master node, "
+    "and (b) the largest jump of a nodal force there.",
+    "ends": "Defect 3: error of the stress in a uniform patch test whose slave overhangs the master inside a segment. "
+    "Half a segment is an area of competence: nothing is cut there.",
 }
 
 
 def _of_patches(patches: Sequence[Patch]) -> tuple[Drawing, Drawing]:
     meshes, pressures = _number(patches[0].meshes), _number(patches[0].pressures)
     title = patches[0].title.partition(",")[0]
+    of_meshes = of_pressures = ""
+    if len(patches) > 1:  # the paper's letters: (a, b) of the first scene and (c, d) of the second
+        kinds = [patch.title.partition(", ")[2] for patch in patches]
+        of_meshes, of_pressures = (
+            "; " + ", ".join(f"{_letters(figure)} {kind}" for figure, kind in zip(numbers, kinds, strict=True))
+            for numbers in ([patch.meshes for patch in patches], [patch.pressures for patch in patches])
+        )
+    elif patches[0].close_up:
+        of_pressures = "; (b) close-up"
     return (
-        Drawing(f"fig{meshes}", f"Fig. {int(meshes)}", f"{title}: magnified penetrations.", lambda: _meshes(patches)),
+        Drawing(
+            f"fig{meshes}",
+            f"Fig. {int(meshes)}",
+            f"{title}: magnified penetrations{of_meshes}.",
+            lambda: _meshes(patches),
+        ),
         Drawing(
             f"fig{pressures}",
             f"Fig. {int(pressures)}",
-            f"{title}: contact pressure over the exact one.",
+            f"{title}: contact pressure over the exact one{of_pressures}.",
             lambda: _pressures(patches),
         ),
     )
@@ -108,7 +126,7 @@ def _of_patches(patches: Sequence[Patch]) -> tuple[Drawing, Drawing]:
 
 def _of_disk(disk: Disk) -> tuple[Drawing, ...]:
     drawn = [
-        Drawing("fig38", "Fig. 38", "Example 2: contact pressure, and its middle.", lambda: _disk_pressures(disk)),
+        Drawing("fig38", "Fig. 38", _CAPTIONS["fig38"], lambda: _disk_pressures(disk)),
         Drawing("fig39", "Fig. 39", "Example 2: VTS-PPT minus VTS-ME.", lambda: _disk_difference(disk)),
     ]
     study = disk.study
@@ -127,6 +145,10 @@ def _of_defects(defects: Defects) -> tuple[Drawing, ...]:
 
 def _number(figure: str) -> str:
     return figure.partition("(")[0].zfill(2)
+
+
+def _letters(figure: str) -> str:
+    return f"({figure.partition('(')[2]}"
 
 
 def _figure(wide: float, high: float) -> Figure:
@@ -320,16 +342,16 @@ def _disk_pressures(disk: Disk) -> Figure:
     figure = _figure(TWO_COLUMNS, 3.0)
     whole, middle = _panels(figure, 2)
     for axes, end in ((whole, 0.5), (middle, 0.1)):
-        axes.plot(disk.winkler_x, disk.winkler_pressure, **_EXACT)
+        axes.plot(disk.winkler_x, disk.winkler_pressure / _MEGA, **_EXACT)
         for curve in disk.curves:
             seen = (curve.x >= 0) & (curve.x <= end)
-            axes.plot(curve.x[seen], curve.pressure[seen], **_look(curve.member, int(seen.sum())))
+            axes.plot(curve.x[seen], curve.pressure[seen] / _MEGA, **_look(curve.member, int(seen.sum())))
         axes.set_xlabel("x along the interface (length)")
         axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    whole.set_ylabel("contact pressure (force / length)")
+    whole.set_ylabel("contact pressure (10⁶ force / length)")
     whole.set_xlim(0, 0.5)
     middle.set_xlim(0, 0.1)
-    near = [curve.pressure[(curve.x >= 0) & (curve.x <= 0.1)] for curve in disk.curves]
+    near = [curve.pressure[(curve.x >= 0) & (curve.x <= 0.1)] / _MEGA for curve in disk.curves]
     low, high = min(float(values.min()) for values in near), max(float(values.max()) for values in near)
     middle.set_ylim(low - 0.15 * (high - low), high + 0.25 * (high - low))
     _legend(figure, [curve.member for curve in disk.curves], exact="Hertz on springs ε̂", columns=5)
@@ -351,10 +373,10 @@ def _disk_difference(disk: Disk) -> Figure:
 def _why(study: DiskStudy, disk: Disk) -> Figure:
     figure = _figure(TWO_COLUMNS, 2.8)
     meshes, slopes = _panels(figure, 2)
-    meshes.axhline(disk.winkler[0], **_EXACT)
-    _series(meshes, Series(study.members, study.size, study.largest))
+    meshes.axhline(disk.winkler[0] / _MEGA, **_EXACT)
+    _series(meshes, Series(study.members, study.size, study.largest / _MEGA))
     meshes.set_xlabel("element size in the middle (length)")
-    meshes.set_ylabel("largest pressure (force / length)")
+    meshes.set_ylabel("largest pressure (10⁶ force / length)")
     slopes.axhline(0.0, **_EXACT)
     _series(slopes, study.slopes)
     slopes.set_xlabel("a/R over that of the paper (–)")

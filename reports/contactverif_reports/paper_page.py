@@ -21,6 +21,7 @@ from contactverif_reports.paper_tree import REFERENCE, tree_of
 NUMBERS, PAGE = "paper.nc", "paper.html"
 MARKS = {Said.AGREES: "✓", Said.DIFFERS: "✗", Said.SILENT: "–", Said.DEFECT: "!"}
 CLASSES = {Said.AGREES: "good", Said.DIFFERS: "bad", Said.SILENT: "soft", Said.DEFECT: "warn"}
+N_FIGURES = 19  # drawn by `write`, where every formulation is installed
 CHOICES = (
     ("Patch tests", "E = 10⁴ and ν = 0.3 in both bodies, heights 4, two layers of cells, rollers at all sides"),
     ("Case A2, Examples 1 and 1bis", "the lengths of the segments, which are drawn but not printed"),
@@ -44,6 +45,8 @@ def check_folder(folder: Path, argument: str = "--out") -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise MisuseError(argument, f"{folder}, which is no folder", "a folder that can be written") from None
     except OSError as error:
         raise MisuseError(argument, f"{folder} ({error.strerror})", "a folder that can be written") from None
     for name in (NUMBERS, PAGE):
@@ -91,6 +94,7 @@ def page(paper: Paper, figures: dict[str, Markup]) -> str:
         reference=REFERENCE,
         counts={verdict: sum(one.verdict is verdict for one in paper.statements) for verdict in Said},
         about=_about(paper),
+        titles=_titles(paper),
         scenes=list(dict.fromkeys(row.scene for row in paper.multipliers)),
         multipliers=_by_legend(paper.multipliers),
         rounding=max(row.rounding for table in paper.forces for row in table.rows),
@@ -116,6 +120,11 @@ def _by_legend(rows: Sequence[MultiplierRow]) -> dict[str, list[MultiplierRow]]:
     return found
 
 
+def _titles(paper: Paper) -> dict[str, str]:
+    """{scene: what the paper calls it}, as the head of a column."""
+    return {"c-prime": "C′ (ours)"} | {patch.scene: patch.title.removeprefix("Case ") for patch in paper.patches}
+
+
 def _about(paper: Paper) -> dict[str, list[int]]:
     """{drawing: numbers of the statements that it shows}."""
     found: dict[str, list[int]] = {}
@@ -125,10 +134,20 @@ def _about(paper: Paper) -> dict[str, list[int]]:
 
 
 def svg(figure: Figure) -> str:
-    """The figure with its letters as paths, the same for the same figure, without what nothing is drawn from."""
+    """The figure with its letters as paths, the same for the same figure, without what nothing is drawn from.
+
+    Lengths are rounded to a hundredth of a point, which nobody sees; matplotlib writes a millionth.
+    """
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "contactverif"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = re.sub(r"<!--.*?-->\s*", "", buffer.getvalue(), flags=re.DOTALL)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(?<= )(?:d|x|y)="[^"]*"', _rounded, text)
     return "\n".join(line.strip() for line in text.splitlines()) + "\n"
+
+
+def _rounded(attribute: re.Match[str]) -> str:
+    """Its numbers with two decimals at most, and a blank for each end of a line."""
+    short = re.sub(r"-?\d+\.\d{3,}", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), attribute[0])
+    return " ".join(short.split())

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from contactverif_reports.pages import number
 from contactverif_reports.paper_data import (
     Convergence,
     Defects,
@@ -42,7 +43,7 @@ def statements(
         *map(_of_range, patches),
         *_of_passes(passes),
         *_of_convergence(convergence),
-        *_of_multipliers(multipliers),
+        *_of_multipliers(multipliers, _titles(patches)),
         *(_of_disk(disk) if disk is not None else ()),
         *_of_defects(defects),
     )
@@ -50,6 +51,11 @@ def statements(
 
 def _verdict(agrees: bool) -> Said:
     return Said.AGREES if agrees else Said.DIFFERS
+
+
+def _titles(patches: Sequence[Patch]) -> dict[str, str]:
+    """{scene: what the paper calls it}, within a sentence."""
+    return {"c-prime": "case C′"} | {patch.scene: patch.title.replace("Case", "case") for patch in patches}
 
 
 def _of_forces(table: ForceTable) -> Statement:
@@ -65,8 +71,11 @@ def _of_range(patch: Patch) -> Statement:
     low, high = patch.printed
     ours = [float(value) for curve in patch.curves for value in curve.pressure]
     inside = low <= min(ours) and max(ours) <= high
-    says = f"{patch.title}: curves on an axis from {low:.2f} to {high:.2f} of the exact pressure, without materials"
-    found = f"{min(ours):.3f} to {max(ours):.3f} at ε̂ = E, {'inside' if inside else 'not inside'} that axis"
+    says = (
+        f"{patch.title}: the axis runs from {low:.2f} to {high:.2f} of the exact pressure; materials and penalty are "
+        "not printed"
+    )
+    found = f"curves from {min(ours):.3f} to {max(ours):.3f} at ε̂ = E, {'inside' if inside else 'not inside'} that axis"
     drawing = f"fig{patch.pressures.partition('(')[0].zfill(2)}"
     return Statement(f"Fig. {patch.pressures}", says, found, Said.SILENT if inside else Said.DIFFERS, drawing)
 
@@ -94,7 +103,7 @@ def _of_passes(table: PassTable) -> list[Statement]:
         Statement(
             "Sections 4, 5, 7.1",
             "no numbers are given for errors, materials, supports, heights or penalties of the patch tests",
-            "errors of the stress are at roundoff or above 1e-2 at ε̂ = 10 E/h; nothing lies between"
+            "errors of the stress are at roundoff or above 0.01 at ε̂ = 10 E/h; nothing lies between"
             if not between
             else f"{between} errors lie between",
             Said.SILENT,
@@ -112,7 +121,7 @@ def _of_convergence(convergence: Convergence) -> list[Statement]:
     return [
         Statement(
             "Fig. 30",
-            "case C: the basic version needs about 16 iterations for 14 decades, the consistent one and VTS-ME a few",
+            "Case C: the basic version needs about 16 iterations for 14 decades, the consistent one and VTS-ME a few",
             f"{counts} (master half as stiff as the slave); {others} (equal materials)",
             _verdict(right),
             "fig30",
@@ -129,11 +138,14 @@ def _of_convergence(convergence: Convergence) -> list[Statement]:
     ]
 
 
-def _of_multipliers(rows: Sequence[MultiplierRow]) -> list[Statement]:
+def _of_multipliers(rows: Sequence[MultiplierRow], titles: Mapping[str, str]) -> list[Statement]:
+    def named(row: MultiplierRow) -> str:
+        return f"{row.member.legend.removesuffix(', multipliers')} on {titles.get(row.scene, row.scene)}"
+
     if not rows:
         return []
     spoken = [row for row in rows if row.said >= 0]
-    wrong = [f"{row.member.legend} on {row.scene}" for row in spoken if row.stress != (row.said == 1)]
+    wrong = [named(row) for row in spoken if row.stress != (row.said == 1)]
     found = f"{len(spoken) - len(wrong)} of {len(spoken)} verdicts on the stress are the same"
     found += f"; others: {', '.join(wrong)}" if wrong else ""
     result = [
@@ -146,18 +158,23 @@ def _of_multipliers(rows: Sequence[MultiplierRow]) -> list[Statement]:
     ]
     hidden = [row for row in rows if row.stress and not row.uniform and "two-pass" not in row.member.formulation]
     if hidden:
-        named = "; ".join(f"{row.member.legend} on {row.scene}: {row.low:.3g} to {row.high:.3g}" for row in hidden)
+        ranges = "; ".join(f"{named(row)}: {number(row.low)} to {number(row.high)}" for row in hidden)
         result.append(
-            Statement("–", "whether multipliers are uniform where the stress is", f"not here: {named}", Said.SILENT)
+            Statement(
+                "–",
+                "it is not said whether multipliers are uniform where the stress is",
+                f"some are not, over the exact pressure: {ranges}",
+                Said.SILENT,
+            )
         )
     short = [row for row in rows if row.deficiency and "two-pass" not in row.member.formulation]
     if short:
-        named = "; ".join(f"{row.member.legend} on {row.scene}: {row.deficiency}" for row in short)
+        counts = "; ".join(f"{named(row)}: {row.deficiency}" for row in short)
         result.append(
             Statement(
                 "Section 6.3",
                 "no proof of stability (inf-sup) is given",
-                f"multipliers that are not unique: {named}",
+                f"multipliers that are not unique: {counts}",
                 Said.SILENT,
             )
         )
@@ -168,23 +185,24 @@ def _of_disk(disk: Disk) -> list[Statement]:
     largest = [curve.largest for curve in disk.curves]
     counts = sorted({curve.iterations for curve in disk.curves})
     widths = [curve.half_width for curve in disk.curves]
-    spread = float(np.abs(disk.difference).max(initial=0.0))
+    low, high = float(disk.difference.min()), float(disk.difference.max())
     same = "the same number" if len(counts) == 1 else "different numbers"
     return [
         Statement(
             "Fig. 38",
             "Example 2: the pressure in the middle is about 1.61e6, and curves are nearly the same for all",
-            f"{min(largest):.4g} to {max(largest):.4g}, within 3 %; half-width {min(widths):.3f} to {max(widths):.3f}. "
-            f"Hertz: {disk.hertz[0]:.4g} and {disk.hertz[1]:.3f}; Hertz on a layer of springs ε̂: "
-            f"{disk.winkler[0]:.4g} and {disk.winkler[1]:.3f}",
+            f"{number(min(largest), 4)} to {number(max(largest), 4)}, within 3 %; half-width {min(widths):.3f} to "
+            f"{max(widths):.3f}. Hertz: {number(disk.hertz[0], 4)} and {disk.hertz[1]:.3f}; Hertz on a layer of "
+            f"springs ε̂: {number(disk.winkler[0], 4)} and {disk.winkler[1]:.3f}",
             _verdict(all(abs(value / 1.61e6 - 1) <= 0.03 for value in largest)),
             "fig38",
         ),
         Statement(
             "Fig. 39",
-            "Example 2: VTS-PPT and VTS-ME differ by less than 1.5e3 in local pressure",
-            f"by at most {spread:.2g} on our meshes, held against 2.5e3",
-            _verdict(spread <= 2.5e3),
+            "Example 2: VTS-PPT and VTS-ME differ by little: the axis runs from −1e3 to 1.5e3; the mesh is not printed",
+            f"{number(low, 2)} to {number(high, 2)} on our mesh, {max(-low, high) / max(largest):.2%} of the pressure: "
+            "as little, held against ±2.5e3, not against that axis",
+            _verdict(max(-low, high) <= 2.5e3),
             "fig39",
         ),
         Statement(
@@ -226,23 +244,24 @@ def _of_defects(defects: Defects) -> list[Statement]:
     return [
         Statement(
             "Boxes 1–3",
-            "all cases have parallel surfaces; nothing is said of tilted ones",
-            f"action is not reaction: the master gets 1 − cos θ less than the slave, {lost[0]:.2e} of the force at "
-            f"θ = 0.1 and {lost[1]:.2e} at 0.3, and a moment is lost with it",
+            "surfaces in contact are parallel, or nearly so on the disk; nothing is said of tilted ones",
+            f"action is not reaction: the master gets 1 − cos θ less than the slave, {number(lost[0])} of the force at "
+            f"θ = 0.1 and {number(lost[1])} at 0.3, and a moment is lost with it",
             Said.DEFECT,
             "defect-tilt",
         ),
         Statement(
             "Eq. 6 and Box 3",
             "one segment under the area: Eq. 6; several: Box 3; nothing is said of the change from one to the other",
-            f"nodal forces jump there by {jumps[0]:.1e} of the slave's force at θ = 0.1 and {jumps[1]:.1e} at 0.3",
+            f"nodal forces jump there by {number(jumps[0], 2)} of the slave’s force at θ = 0.1 and "
+            f"{number(jumps[1], 2)} at 0.3",
             Said.DEFECT,
             "defect-jump",
         ),
         Statement(
             "Boxes 2, 3",
             "nothing is said of an area of competence that overhangs the end of the master",
-            f"cut on the master's side only (our reading), the patch test fails, with errors of the stress up to "
+            f"cut on the master’s side only (our reading), the patch test fails, with errors of the stress up to "
             f"{np.nanmax(ends):.2g} of the pressure",
             Said.DEFECT,
             "defect-ends",
