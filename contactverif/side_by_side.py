@@ -1,4 +1,7 @@
-"""How a comparison reads in a terminal: verdicts, errors, Newton iterations and cost side by side, then the meshes."""
+"""How a comparison reads in a terminal: verdicts, errors, Newton iterations and cost side by side, then the meshes.
+
+Where a table is too wide only its first column gives way: a number that is cut off is a wrong number.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,7 @@ from contactverif_reports.regression import Change, Changes
 
 DIFFERS = "≠"
 REASON = 100  # characters of a reason
+WIDE = 112  # columns in which the table of errors has room for what went furthest
 DRAWN = 3  # meshes in a terminal; more would bury the tables
 _STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
 
@@ -41,7 +45,7 @@ class SideBySide:
         )
         yield Text("")
         yield verdicts_table(found)
-        yield errors_table(found)
+        yield errors_table(found, with_worst=options.max_width >= WIDE)
         if found.iterations:
             yield iterations_table(found)
         yield cost_table(self._study)
@@ -70,13 +74,21 @@ def _verdict(cell: Cell | None, reference: Cell | None) -> Text:
     return Text(said, style=_STYLES.get(cell.verdict, "dim"))
 
 
-def errors_table(found: Comparison) -> Table:
-    """For each property how far each formulation went towards its tolerance, and beside the reference case by case."""
+def errors_table(found: Comparison, *, with_worst: bool = True) -> Table:
+    """For each property how far each formulation went towards its tolerance, and beside the reference case by case.
+
+    Parameters
+    ----------
+    with_worst : the number that went furthest too, for which there is no room in 80 columns.
+    """
     table = _table(f"error over tolerance, above 1 fails; ratio and numbers of cases beside {found.reference}")
-    table.add_column("", no_wrap=True)
+    table.add_column("", overflow="fold")
     for column in ("median", "worst", "ratio", "better", "equal", "worse"):
         table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("worst number", no_wrap=True, overflow="ellipsis")
+    if not with_worst:
+        table.padding = (0, 1, 0, 0)
+    else:
+        table.add_column("worst number", no_wrap=True, overflow="ellipsis")
     for property_id in found.properties:
         cells = [found.cells[name, property_id] for name in found.formulations if (name, property_id) in found.cells]
         if all(isnan(cell.worst) for cell in cells):
@@ -90,14 +102,15 @@ def errors_table(found: Comparison) -> Table:
             if paired is not None:
                 beside = [number(paired.ratio), *map(str, (paired.better, paired.equal, paired.worse))]
             worst = f"{number(cell.worst_value)} {cell.worst_quantity}" if cell.worst_quantity else ""
-            table.add_row(f"  {cell.formulation}", number(cell.median), number(cell.worst), *beside, worst)
+            errors = (number(cell.median), number(cell.worst))
+            table.add_row(f"  {cell.formulation}", *errors, *beside, *([worst] if with_worst else []))
     return table
 
 
 def iterations_table(found: Comparison) -> Table:
     """For each property that solves: how many iterations, and beside the reference where both converged."""
     table = _table(f"Newton iterations where it converged; numbers of cases beside {found.reference}")
-    table.add_column("", no_wrap=True)
+    table.add_column("", overflow="fold")
     for column in ("converged", "median", "most", "fewer", "same", "more", "order"):
         table.add_column(column, justify="right", no_wrap=True)
     before = None
@@ -122,7 +135,7 @@ def iterations_table(found: Comparison) -> Table:
 def cost_table(study: Study) -> Table:
     """Time of an evaluation on shared states, in turns."""
     table = _table(f"time of one evaluation, µs, in turns on the same state; ratio to {_of(study)}")
-    table.add_column("", no_wrap=True)
+    table.add_column("", overflow="fold")
     for column in (*PARTS, "all", "a segment", "ratio"):
         table.add_column(column, justify="right", no_wrap=True)
     reference = {cost.n_segments: cost.total for cost in study.costs if cost.formulation == _of(study)}
@@ -205,7 +218,7 @@ class ChangesTable:
 def moved_verdicts(found: Changes) -> Table:
     """Verdicts, numbers of cases, time: a line for each row that both have."""
     table = plain_table("verdict, old → new; cases better, equal, worse; time of a case, new/old (decides nothing)")
-    table.add_column("", no_wrap=True)
+    table.add_column("", overflow="fold")
     table.add_column("verdict", no_wrap=True)
     for column in ("better", "equal", "worse", "time"):
         table.add_column(column, justify="right", no_wrap=True)
@@ -218,7 +231,8 @@ def moved_verdicts(found: Changes) -> Table:
 def moved_errors(found: Changes) -> Table:
     """Errors where they are not what they were."""
     table = plain_table("error over tolerance, old → new, where it changed")
-    for column in ("", "median", "worst"):
+    table.add_column("", overflow="fold")
+    for column in ("median", "worst"):
         table.add_column(column, no_wrap=True)
     moved = [change for change in found.changes if _has_moved(change)]
     for change in moved:
@@ -248,7 +262,7 @@ def _indented(change: Change) -> str:
 def moved_iterations(found: Changes) -> Table:
     """Newton iterations where they are not what they were."""
     table = plain_table("Newton iterations that changed, old → new, where it converged")
-    table.add_column("")  # wraps at 80 columns
+    table.add_column("", overflow="fold")
     for column in ("converged", "median", "most"):
         table.add_column(column, no_wrap=True)
     for column in ("fewer", "same", "more"):

@@ -21,6 +21,7 @@ from contactverif_reports.solved import Solved
 
 _ABOUT = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "platform")
 _INCHES = 5.6  # wide; two stand side by side on a wide page
+_LEGEND = 7  # points: its four entries, with forces, are else wider than the figure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,14 +153,15 @@ def _mesh(one: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
 
 
 def _drawn(case: Case, forces: FloatArray | None, exact: FloatArray | None, label: str) -> Markup:
-    from contactverif_reports.figures import drawn  # matplotlib takes its time
+    import matplotlib  # it takes its time
+
+    from contactverif_reports.figures import drawn
     from contactverif_reports.scene_outline import has_outline, outline
 
     if has_outline(case):
         return svg_inline(outline(case, _INCHES), label)
-    figure = drawn(case, title="", forces=forces, exact=exact, width=_INCHES)
-    for legend in figure.legends:
-        legend.set_ncols(2)  # with forces it has four entries, which are wider than the figure beside each other
+    with matplotlib.rc_context({"legend.fontsize": _LEGEND}):
+        figure = drawn(case, title="", forces=forces, exact=exact, width=_INCHES)
     return svg_inline(figure, label)
 
 

@@ -143,7 +143,10 @@ def svg(figure: Figure) -> str:
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = re.sub(r"<!--.*?-->\s*", "", buffer.getvalue(), flags=re.DOTALL)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r'(?<= )(?:d|x|y)="[^"]*"', _rounded, text)
+    text = re.sub(r'(?<= )(?:d|x|y)="[^"]*"|translate\([^)]*\)', _rounded, text)
+    text = re.sub(r'<g id="[^"]*"', "<g", text)  # to which nothing refers
+    text = re.sub(r'(?<= )style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
+    text = text.replace("stroke-dashoffset:0;", "")  # which it is anyway
     return "\n".join(line.strip() for line in text.splitlines()) + "\n"
 
 

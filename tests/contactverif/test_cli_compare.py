@@ -189,6 +189,19 @@ def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: P
     assert ask(reports / "worse.nc", reports / "old.nc").status == 0
 
 
+def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    tables = ask(reports / "old.nc", reports / "worse.nc").out.partition("\nvts-ppt, patch")[0]
+    assert "…" not in tables
+    assert re.search(r"better +equal +worse +time", tables)
+    asked = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
+    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *asked).out.partition("\npatch.flat.")[0]
+    assert "…" not in tables
+    assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)
+    assert re.search(r"converged +median +most +fewer +same +more +order *\n", tables)
+    assert max(map(len, tables.splitlines())) == 80
+
+
 def test_other_seeds_are_compared_as_distributions_and_it_is_said(ask: Ask, reports: Path) -> None:
     answer = ask(reports / "old.nc", reports / "other.nc")
     assert answer.status == 0
