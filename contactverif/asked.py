@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from contactverif import runner
 from contactverif.arrays import FloatArray
 from contactverif.case import Case
 from contactverif.errors import ContractError, MisuseError
 from contactverif.property import Outcome, Property, Verdict
 from contactverif.registry import load_formulation, load_properties
 from contactverif.result import NotLoaded
-from contactverif.runner import judge_case
 from contactverif.subject import Subject
 
 
@@ -44,7 +44,7 @@ def judged(question: Property, case: Case, subject: Subject) -> Outcome:
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
         return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
-    return judge_case(question, case, subject)
+    return runner.judge_case(question, case, subject)
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:

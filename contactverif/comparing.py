@@ -83,7 +83,7 @@ def compare_reports(paths: Sequence[Path], globs: Sequence[str], html: Path | No
             raise MisuseError(f"--{option}", "two reports beside it", "formulations, which can be asked something")
     if html is not None:
         check_page(html)
-    old, new = (read_cells(path) for path in paths)
+    old, new = (_read(path, argument) for path, argument in zip(paths, ("OLD.nc", "NEW.nc"), strict=True))
     changes = Changes.of(*(_only(report, globs, [old, new]) for report in (old, new)))
     if not changes.changes and not changes.lost:
         kind = "formulation" if not set(old.formulations) & set(new.formulations) else "property"
@@ -123,7 +123,10 @@ def compare_formulations(names: Sequence[str], globs: Sequence[str], html: Path 
     # a plugin may change where we are
     target, page, folder = (path and path.absolute() for path in (asked.report, html, asked.pictures))
     questions = load_properties(globs or ["*"])
-    reference = load_formulation(asked.against)
+    try:
+        reference = load_formulation(asked.against)
+    except MisuseError as error:
+        raise MisuseError("--against", error.found, error.needed) from None
     if isinstance(reference, NotLoaded):
         raise MisuseError("--against", f"{asked.against}, which does not load ({reference.reason})", "one that loads")
     candidates = [load_formulation(name) for name in names]
@@ -215,6 +218,13 @@ def _only(report: StoredCells, globs: Sequence[str], both: Sequence[StoredCells]
 
 def _named(report: StoredCells, kind: str) -> Sequence[str]:
     return report.formulations if kind == "formulation" else report.properties
+
+
+def _read(path: Path, argument: str) -> StoredCells:
+    try:
+        return read_cells(path)
+    except MisuseError as error:
+        raise MisuseError(argument, error.found, error.needed) from None
 
 
 def _make(folder: Path) -> None:

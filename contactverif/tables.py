@@ -242,7 +242,7 @@ def _asked(about: Mapping[str, str]) -> str:
 
 
 def _promises(traits: Traits, every_trait: bool) -> list[str]:
-    said = []
+    said: list[str] = [] if traits.enforcement == "penalty" else [f"by {traits.enforcement}"]
     if traits.passes_flat_patch is not None:
         said.append("passes the flat patch test" if traits.passes_flat_patch else "fails the flat patch test")
     if traits.tangent is not None:
@@ -251,6 +251,7 @@ def _promises(traits: Traits, every_trait: bool) -> list[str]:
         return said
     for name, positive, negative in (
         ("covers_overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
+        ("independent_multipliers", "independent multipliers", "dependent multipliers"),
         ("conserves_force", "conserves force", "does not conserve force"),
         ("conserves_moment", "conserves moment", "does not conserve moment"),
         ("symmetric", "symmetric", "unsymmetric"),

@@ -113,8 +113,12 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
     except (OSError, RuntimeError) as error:
         raise MisuseError(_ARGUMENT, f"{found}, which is no netCDF file ({error})", "a report (netCDF-4)") from error
     with report:
-        if "contactverif" not in str(getattr(report, "title", "")) or not hasattr(report, "schema"):
-            raise MisuseError(_ARGUMENT, f"{found}, a netCDF file of something else", "a report of contactverif")
+        if str(getattr(report, "title", "")) != schema.TITLE or not hasattr(report, "schema"):
+            raise MisuseError(
+                _ARGUMENT,
+                f"{found}, a netCDF file of something else",
+                "a report that `contactverif verify --report` wrote",
+            )
         if str(report.schema) != schema.SCHEMA:
             raise MisuseError(_ARGUMENT, f"{found} of schema {report.schema}", f"schema {schema.SCHEMA}")
         report.set_auto_maskandscale(False)

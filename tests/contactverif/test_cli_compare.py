@@ -226,7 +226,7 @@ MISTAKES = [
     ([], r"--against: found nothing; needed the formulation to compare with, or two reports OLD.nc NEW.nc"),
     (["nts"], r"--against: found nothing; needed .*"),
     (["--against", "vts-ppt"], r"NAME: found nothing; needed some of .*nts, .*, or two reports OLD.nc NEW.nc"),
-    (["nts", "--against", "vts-pt"], r"formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
+    (["nts", "--against", "vts-pt"], r"--against: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
     (["vts-pt", "--against", "nts"], r"formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
     (["nts", "--against", "nts"], r"--against: found nts, which is compared too; needed another formulation .*"),
     (["nts", "nts", "--against", "vts-ppt"], r"formulation: found nts 2 times; needed each of them once"),
@@ -245,8 +245,8 @@ MISTAKES = [
     (["a.nc", "b.nc", "--against", "nts"], r"--against: found two reports beside it; needed formulations, which .*"),
     (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations, which .*"),
     (["a.nc", "b.nc", "--report", "r.nc"], r"--report: found two reports beside it; needed formulations, which .*"),
-    (["a.nc", "b.nc"], r"REPORT: found a.nc, which does not exist; needed a report that .*"),
-    ([str(PUNCH), "b.nc"], r"REPORT: found .*punch.msh, which is no netCDF file .*; needed a report \(netCDF-4\)"),
+    (["a.nc", "b.nc"], r"OLD.nc: found a.nc, which does not exist; needed a report that .*"),
+    ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file .*; needed a report \(netCDF-4\)"),
 ]  # fmt: skip
 
 
@@ -271,9 +271,9 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
         ("purity.nc", [], r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
         ("old.nc", ["-p", "purity"], r"--property: found 'purity'; needed one of patch.flat.transmission"),
         ("old.nc", ["--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
-        ("else.nc", [], r"REPORT: found .*else.nc, a netCDF file of something else; needed a report of contactverif"),
-        ("schema.nc", [], r"REPORT: found .*schema.nc of schema 0; needed schema 1"),
-        ("damaged.nc", [], r"REPORT: found .*damaged.nc, where .* is missing; needed an undamaged report"),
+        ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
+        ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0; needed schema 1"),
+        ("damaged.nc", [], r"(OLD|NEW).nc: found .*damaged.nc, where .* is missing; needed an undamaged report"),
     ],
 )
 def test_a_mistake_in_a_report_is_one_line(

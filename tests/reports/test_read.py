@@ -13,6 +13,7 @@ from made import ERROR, awkward, small_run
 from contactverif.case import Case
 from contactverif.errors import MisuseError
 from contactverif.property import Verdict
+from contactverif_reports import schema
 from contactverif_reports.read import case_ids, read_case, same_data
 from contactverif_reports.write import write
 
@@ -75,9 +76,9 @@ def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
     (tmp_path / "cut.nc").write_bytes(report.read_bytes()[:5000])
     netCDF4.Dataset(tmp_path / "other.nc", "w").close()
     with netCDF4.Dataset(tmp_path / "newer.nc", "w") as newer:
-        newer.title, newer.schema = "contactverif", "99"
+        newer.title, newer.schema = schema.TITLE, "99"
     with netCDF4.Dataset(tmp_path / "empty.nc", "w") as empty:
-        empty.title, empty.schema = "contactverif", "1"
+        empty.title, empty.schema = schema.TITLE, "1"
     for name, words in {
         "missing.nc": "does not exist",
         ".": "is a folder",
