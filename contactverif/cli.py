@@ -181,7 +181,9 @@ def compare(
     \bExit status, of two reports
       0  nothing got worse; being slower is not worse
       1  something passed and does not any more, kept a promise and does not,
-         or its error grew by more than roundoff can explain
+         its error beyond the tolerance more than doubled, or more cases are
+         not judged or do not converge than roundoff can explain; what is only
+         worth a look is told, and is no 1
     \bOf either
       2  something was asked that cannot be
 

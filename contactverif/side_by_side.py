@@ -297,12 +297,13 @@ def _moved(old: str, new: str) -> str:
 
 
 def outcome_of(changes: Changes) -> Text:
-    """What got worse, a line each; one line if nothing did."""
+    """What is worth a look, then what got worse, a line for each row; one line if nothing did."""
+    looks = [f"worth a look: {words}\n" for words in changes.noteworthy]
     if not changes.regressions:
-        return Text("nothing got worse", style="green")
+        return Text.assemble(("".join(looks), "yellow"), ("nothing got worse", "green"))
     n = len(changes.regressions)
     lines = [f"{n} regression{'s' * (n > 1)}", *(f"  {words}" for words in changes.regressions)]
-    return Text("\n".join(lines), style="red")
+    return Text.assemble(("".join(looks), "yellow"), ("\n".join(lines), "red"))
 
 
 def conclusion(found: Comparison) -> Text:

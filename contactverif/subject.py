@@ -77,9 +77,26 @@ class Guarded:
         self._plugin = plugin
         self._traits = traits
         self.provides = provides
+        self._counts: dict[int, tuple[Interface, int]] = {}  # the interface too, lest another gets its place
 
     def n_multipliers(self, interface: Interface) -> int:
-        """How many multipliers stand behind the positions in z; 0 where the plugin does not mention any."""
+        """How many multipliers stand behind the positions in z; 0 where the plugin does not mention any.
+
+        Asked once an interface: a plugin that counts anew later breaks its own shapes.
+        """
+        if id(interface) not in self._counts:
+            self._counts[id(interface)] = interface, self._counted(interface)
+        return self._counts[id(interface)][1]
+
+    def _counted(self, interface: Interface) -> int:
+        count = self._count(interface)
+        if (count > 0) is not (self._traits.enforcement == "multiplier"):
+            needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"
+            found = f"{count} of them, with the trait enforcement {self._traits.enforcement!r}"
+            raise ContractError(f"n_multipliers: {found}; needed {needed}")
+        return count
+
+    def _count(self, interface: Interface) -> int:
         count = _asked("n_multipliers", getattr, self._plugin, "n_multipliers", None)
         if count is None:
             return 0

@@ -39,8 +39,9 @@ def no_barrier(traits: Traits) -> str:
 
 def posed(case: Case, subject: Subject) -> tuple[Guarded, Case]:
     """The formulation with the penalty of the case, and the case with multipliers if it has any."""
-    if subject.traits.enforcement != "multiplier":
-        return subject.on(case), case
+    formulation = subject.on(case)
+    if not formulation.n_multipliers(case.interface):
+        return formulation, case
     low, high = (share * case.shortest_segment for share in PRESS)
     formulation = subject.with_penalty(1.0)
     random = np.random.default_rng([case.seed, 1])  # not the numbers that the property draws for itself

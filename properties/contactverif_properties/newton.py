@@ -39,6 +39,13 @@ ORDER = Quantity(
     "|u1 − u*| falls like |u0 − u*|² from states of the same pairing; 2 less what is left of the third power",
     "at least",
 )
+MOVED = Quantity(
+    "moved by another scale c",
+    "1",
+    "max(1e3 u/cond, 30 u X)/ℓ",
+    "the scale of the decision λ − c g ≥ 0 has no part in the solution; the rest is what a linear system is solved to",
+)
+SCALE = 8.0  # times smaller, the other one
 TAIL = Quantity(
     "iterations at the end",
     "1",
@@ -54,8 +61,9 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     -------
     Measurement
         Slope of log |u1 − u*| over log |u0 − u*|, at the nearest distances at which |u1 − u*| is not yet roundoff, the
-        lower one of two random directions; missing where the step meets the solution exactly. Details: the rate where
-        the slope is 1 (and beside it the spectral radius of I − K⁻¹ ∂R/∂u, with the derivative taken by differences),
+        lower one of two random directions; missing where the step meets the solution exactly. Of multipliers also how
+        far the solution moves with another scale c, over ℓ. Details: the rate where the slope is 1 (and beside it the
+        spectral radius of I − K⁻¹ ∂R/∂u, with the derivative taken by differences),
         and how many steps were looked at.
 
     Source: verification 16. Triples of residuals, which this replaces, are wrong in up to one of five scenes.
@@ -77,25 +85,29 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     least, details["rate"], details["steps"] = _steps(system, case, solution, pairing, condition)
     if np.isnan(least):
         return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
-    undecided = ""
+    undecided, values, tolerances = "", {}, {}
+    if system.n_multipliers:
+        moved = _moved(system, subject, case, solution)
+        if moved is not None:
+            values[MOVED.name] = moved / case.shortest_segment
+            tolerances[MOVED.name] = _floor(system, solution, pairing, condition) / case.shortest_segment
     if least < QUADRATIC:
         details["spectral radius"] = spectral_radius(system, solution, pairing)
         smooth, _, _ = _steps(replace(system, own_tangent=False), case, solution, pairing, condition)
         if not smooth >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     idle = untouched(system, trace)
-    if least == inf:  # a linear problem
-        return Measurement({}, {}, details=details, idle=idle)
-    return Measurement({ORDER.name: least}, {ORDER.name: QUADRATIC}, details=details, undecided=undecided, idle=idle)
+    if least < inf:  # else it is a linear problem
+        values[ORDER.name], tolerances[ORDER.name] = least, QUADRATIC
+    return Measurement(values, tolerances, details=details, undecided=undecided, idle=idle)
 
 
 def _steps(
     system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float
 ) -> tuple[float, float, float]:
     """The lower order of the directions (NaN if none decides), the higher rate, and how many steps were looked at."""
-    scene, length, units = system.scene, case.shortest_segment, _units(system, solution, pairing)
-    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution / units).max() + np.abs(scene.moved).max())
-    floor = max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max()))
+    length, units = case.shortest_segment, _units(system, solution, pairing)
+    floor = _floor(system, solution, pairing, condition)
     found, looked = [], 0
     for direction in _directions(case.seed, system.size):
         before, after = [], []
@@ -111,6 +123,22 @@ def _steps(
         found.append(order(np.array(before), np.array(after), floor))
     told = [(slope, rate) for slope, rate in found if not np.isnan(slope)] or [(np.nan, np.nan)]
     return min(slope for slope, _ in told), max(rate for _, rate in told), float(looked)
+
+
+def _floor(system: System, solution: FloatArray, pairing: Pairing | None, condition: float) -> float:
+    """A length: what a linear system at the solution is solved to, and positions are rounded to."""
+    scene, units = system.scene, _units(system, solution, pairing)
+    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution / units).max() + np.abs(scene.moved).max())
+    return max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max()))
+
+
+def _moved(system: System, subject: Subject, case: Case, solution: FloatArray) -> float | None:
+    """How far, a length, the solution moves if contact is decided with another scale; None if it is not found again."""
+    other = subject.with_penalty(subject.penalty(case) / SCALE)
+    trace = solve(system.scene, other, start=solution)
+    if not trace.converged:
+        return None
+    return float(np.abs(trace.solution - solution[: system.scene.n_free]).max(initial=0.0))
 
 
 def _units(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
@@ -245,7 +273,7 @@ NEWTON_ORDER = Property(
     id="newton.order",
     family="newton",
     summary="one Newton step from near a solution ends at a distance of second order",
-    quantities=(ORDER,),
+    quantities=(ORDER, MOVED),
     cases=solid_cases,
     measure=one_step,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",

@@ -80,11 +80,13 @@ def _by_multipliers(case: Case, subject: Subject, formulation: Guarded, exact: F
 def force_columns(case: Case, formulation: Guarded, pairing: Pairing | None) -> FloatArray:
     """(n_unknowns, n_multipliers): the position rows of the residual for each multiplier being 1 and the others 0.
 
-    The residual is linear in the multipliers on a frozen pairing.
+    The residual is affine in the multipliers on a frozen pairing; what it holds without any, as one that is augmented
+    by a penalty does, is taken off.
     """
     n, count = case.interface.n_unknowns, case.n_multipliers
-    states = np.hstack([np.broadcast_to(case.z[:n], (count, n)), np.eye(count)])
-    columns: FloatArray = formulation.residual(case.interface, pairing, states)[:, :n].T
+    states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), np.vstack([np.eye(count), np.zeros(count)])])
+    forces = formulation.residual(case.interface, pairing, states)[:, :n]
+    columns: FloatArray = (forces[:-1] - forces[-1]).T
     return columns
 
 
@@ -104,10 +106,14 @@ def resultant(case: Case, subject: Subject) -> Measurement:
     stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
     interface = case.interface.at(case.interface.nodes * stretch)
     formulation = subject.on(case)
-    uniform = np.full(formulation.n_multipliers(interface), case.penalty * case.parameter("penetration"))
-    case = with_multipliers(case, uniform)
-    forces = -formulation.residual(interface, formulation.pair(interface, case.z), case.z)[: interface.n_unknowns]
-    forces = forces.reshape(-1, 2)
+    count = formulation.n_multipliers(interface)
+    case = with_multipliers(case, np.full(count, case.penalty * case.parameter("penetration")))
+    pairing = formulation.pair(interface, case.z)
+    if count:
+        columns = force_columns(replace(case, interface=interface), formulation, pairing)
+        forces = -(columns @ case.z[interface.n_unknowns :]).reshape(-1, 2)
+    else:
+        forces = -formulation.residual(interface, pairing, case.z).reshape(-1, 2)
     exact = exact_forces(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.area == "reference":
         exact = exact * stretch

@@ -135,6 +135,17 @@ def margin_of(verdict: Verdict, furthest: float) -> float:
     return furthest if furthest > 1 and verdict is Verdict.FAIL else inf
 
 
+def statistics(old: Cell, new: Cell) -> list[tuple[str, float, float]]:
+    """Name, before and after, of the median and the worst margin of the same cases that both decided, if any."""
+    n_cases = min(len(old.verdicts), len(new.verdicts))
+    before, after = old.standing[:n_cases], new.standing[:n_cases]
+    both = ~(np.isnan(before) | np.isnan(after))
+    if not both.any():
+        return []
+    of = (("median", np.median), ("worst", np.max))
+    return [(name, float(statistic(before[both])), float(statistic(after[both]))) for name, statistic in of]
+
+
 def _kind(outcome: Outcome) -> tuple[float, ...]:
     case, interface = outcome.case, outcome.case.interface
     sizes = len(interface.slave), len(interface.master)

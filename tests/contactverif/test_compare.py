@@ -13,16 +13,18 @@ import pytest
 from contactverif.case import Case
 from contactverif.errors import MisuseError
 from contactverif.interface import Interface
+from contactverif.newton import End
 from contactverif.property import Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.registry import load_formulation, load_properties
 from contactverif.result import NotLoaded, Row, Run
+from contactverif.side_by_side import outcome_of
 from contactverif.studies.compare import compared, differing
 from contactverif.studies.cost import measured, state
 from contactverif.subject import Subject
 from contactverif_reports.cells import Cell, Paired
 from contactverif_reports.compare_page import changes_page, comparison_page
 from contactverif_reports.comparison import Comparison
-from contactverif_reports.regression import ALPHA, Changes, change, shift
+from contactverif_reports.regression import ALPHA, Changes, change, few, shift, wandering
 from contactverif_reports.stored_cells import StoredCells, read_cells
 from contactverif_reports.write import write
 
@@ -309,24 +311,150 @@ def test_a_promise_that_is_not_kept_any_more() -> None:
     ("old", "new", "grew"),
     [
         ((0.01,), (0.99,), False),  # within the tolerance, whatever the factor
-        ((100.0,), (102.0,), False),  # two tolerances, one for each report
-        ((100.0,), (102.0 + 2**-40,), True),
-        ((100.0, 100.0, 100.0), (100.0, 100.0, 103.0), True),  # the worst alone
-        ((2.0, 2.0, 900.0), (5.0, 5.0, 900.0), True),  # the median alone
+        ((0.0,), (2.0,), False),  # two tolerances, one for each report
+        ((0.0,), (2.0 + 2**-40,), True),
+        ((100.0,), (202.0,), False),  # and a factor of two
+        ((100.0,), (202.0 + 2**-40,), True),
+        ((1.22e11,), (1.29e11,), False),  # as seen where one residual was ±1 ulp off the other
+        ((100.0, 100.0, 100.0), (100.0, 100.0, 203.0), True),  # the worst alone
+        ((2.0, 2.0, 900.0), (7.0, 7.0, 900.0), True),  # the median alone
         ((100.0,), (Verdict.CRASHED,), True),
         ((Verdict.CRASHED,), (100.0,), False),
     ],
 )
-def test_an_error_grows_by_more_than_two_tolerances(old: tuple[Any, ...], new: tuple[Any, ...], grew: bool) -> None:
+def test_an_error_more_than_doubles_and_two_tolerances(old: tuple[Any, ...], new: tuple[Any, ...], grew: bool) -> None:
     before, after = (cell(*margins, verdict=Verdict.FAIL, unexpected="") for margins in (old, new))
     found = change(before, after, same_seed=True).regressions
-    assert bool(found) is grew
-    assert all(words.startswith("error grew, in tolerances, on the same") for words in found)
+    said = [words for words in found if "passed and fail now" not in words]
+    assert bool(said) is grew
+    assert all(words.startswith("error grew, in tolerances, on the same") for words in said)
 
 
 def test_a_case_that_passed_and_fails_is_named_in_a_row_that_failed_already() -> None:
     found = change(cell(0.5, 0.5, 64.0), cell(0.5, 2.0, 64.0), same_seed=True)
     assert found.regressions == ("1 of 3 cases passed and fail now, the first is case 1",)
+
+
+@pytest.mark.parametrize("n", [60, 500])
+def test_cases_that_were_judged_and_are_undecided_now(n: int) -> None:
+    old, some = cell(*[0.5] * n), int(few(n))
+    assert some == {60: 1, 500: 5}[n]
+    for lost, regressed in ((some, False), (some + 1, True)):
+        new = cell(*[Verdict.UNDECIDED] * lost, *[0.5] * (n - lost))
+        said = (f"{lost} of the same {n} cases were judged and are undecided now",) * regressed
+        assert change(old, new, same_seed=True).regressions == said
+        assert change(new, old, same_seed=True).regressions == ()
+    back = cell(*[Verdict.UNDECIDED] * 2, *[0.5] * (n - 2))
+    gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 2), *[0.5] * (n - some - 4))
+    assert change(back, gone, same_seed=True).regressions == ()  # noise goes both ways
+    gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 3), *[0.5] * (n - some - 5))
+    (said_so,) = change(back, gone, same_seed=True).regressions
+    assert said_so.endswith("undecided now, 2 the other way round")
+
+
+@pytest.mark.parametrize(("left", "regressed"), [(60, False), (59, False), (58, True), (3, True), (0, True)])
+def test_fewer_cases_at_the_same_seed_and_number_of_examples(left: int, regressed: bool) -> None:
+    old, new = cell(*[0.5] * 60), cell(*[0.5] * left)
+    said = (f"{left} cases, 60 before, at the same seed and number of examples",) * regressed
+    assert change(old, new, same_seed=True).regressions == said
+    assert change(new, old, same_seed=True).regressions == ()
+    assert change(old, new, same_seed=True, same_examples=False).regressions == ()
+    assert change(old, new, same_seed=False).regressions == ()
+
+
+def test_fewer_examples_are_no_fewer_cases() -> None:
+    key = ("vts-me", "patch.flat.transmission")
+    old, new = stored({key: cell(*[0.5] * 60)}), stored({key: cell(0.5, 0.5, 0.5)})
+    assert len(Changes.of(old, new).regressions) == 1  # neither says how many were asked
+    asked = [replace(one, provenance={"seed": "1", "examples": n}) for one, n in ((old, "60"), (new, "3"))]
+    assert Changes.of(*asked).regressions == ()
+
+
+def solved(ends: list[End], taken: float = 3.0, what: str = "") -> Cell:
+    numbers = {"end": np.array([float(end) for end in ends]), "iterations": np.full(len(ends), taken)}
+    return cell(*[0.5] * len(ends), details={f"{name}{what}": values for name, values in numbers.items()})
+
+
+@pytest.mark.parametrize("end", [end for end in End if end is not End.CONVERGED])
+@pytest.mark.parametrize("what", ["", ", high penalty"])
+def test_solutions_that_converged_and_do_not_any_more(end: End, what: str) -> None:
+    n, some = 60, int(wandering(60))
+    assert some == 5
+    old = solved([End.CONVERGED] * n, what=what)
+    for lost, regressed in ((some, False), (some + 1, True)):
+        new = solved([end] * lost + [End.CONVERGED] * (n - lost), what=what)
+        kind = f"{n} solutions{' (high penalty)' if what else ''}"
+        said = (f"{lost} of the same {kind} converged and do not any more",) * regressed
+        assert change(old, new, same_seed=True).regressions == said
+        assert change(new, old, same_seed=True).regressions == ()
+
+
+def test_roundoff_takes_solutions_both_ways_and_one_that_was_not_kept_says_nothing() -> None:
+    good, bad = End.CONVERGED, End.CYCLE
+    old = solved([bad] * 20 + [good] * 40)
+    assert change(old, solved([good] * 20 + [bad] * 25 + [good] * 15), same_seed=True).regressions == ()
+    (said,) = change(old, solved([good] * 20 + [bad] * 26 + [good] * 14), same_seed=True).regressions
+    assert said == "26 of the same 60 solutions converged and do not any more, 20 the other way round"
+    untold = replace(old, details={"end": np.full(60, np.nan)})
+    assert change(old, untold, same_seed=True).regressions == ()
+    assert change(old, replace(old, details={}), same_seed=True).regressions == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ((1e-6,), (0.5,), ["median", "worst"]),
+        ((0.5, 1e-4, 1e-4), (0.5, 0.02, 0.02), ["median"]),
+        ((1e-6,), (0.01,), []),  # not above 1/100
+        ((2.0**-8,), (0.39,), []),  # not more than 100-fold
+        ((2.0**-8,), (0.3907,), ["median", "worst"]),
+        ((0.5,), (1e-6,), []),
+        ((1e-6,), (64.0,), []),  # that is no look but a regression
+    ],
+)
+def test_an_error_that_leaps_within_its_tolerance_is_worth_a_look(
+    old: tuple[float, ...], new: tuple[float, ...], said: list[str]
+) -> None:
+    found = change(cell(*old), cell(*new), same_seed=True)
+    assert [words.partition(" ")[0] for words in found.noteworthy] == said
+    assert bool(found.regressions) is (new == (64.0,))
+
+
+@pytest.mark.parametrize(("taken", "said"), [(8.0, False), (8.5, True), (15.0, True)])
+def test_iterations_that_more_than_double_are_worth_a_look(taken: float, said: bool) -> None:
+    ends = [End.CONVERGED] * 4
+    for what in ("", ", high penalty"):
+        found = change(solved(ends, what=what), solved(ends, taken, what), same_seed=True)
+        words = f"Newton iterations{' (high penalty)' if what else ''}, median 3 → {taken:g}"
+        assert (found.regressions, found.noteworthy) == ((), (words,) * said)
+
+
+def test_a_row_is_one_regression_however_much_of_it_got_worse() -> None:
+    key = ("vts-me", "patch.flat.transmission")
+    old, new = cell(0.5, 0.5), cell(64.0, 64.0, details={"x": np.zeros(2)})
+    bad = Changes.of(stored({key: old}), stored({key: replace(new, verdict=Verdict.FAIL)}))
+    assert len(bad.changes[0].regressions) == 2
+    (line,) = bad.regressions
+    assert line == f"vts-me, patch.flat.transmission: {'; '.join(bad.changes[0].regressions)}"
+    assert outcome_of(bad).plain.splitlines() == ["1 regression", f"  {line}"]
+    assert "1 regression." in changes_page(bad, {})
+
+
+def test_what_is_worth_a_look_is_told_and_no_regression() -> None:
+    key = ("vts-me", "patch.flat.transmission")
+    one = Changes.of(stored({key: cell(1e-6)}), stored({key: cell(0.5)}))
+    line = "vts-me, patch.flat.transmission: median error grew within its tolerance, 1e-06 → 0.5 of it; worst"
+    assert one.regressions == ()
+    told, last = outcome_of(one).plain.splitlines()
+    assert told.startswith(f"worth a look: {line}")
+    assert last == "nothing got worse"
+    page = changes_page(one, {})
+    assert "<h2>Worth a look</h2>" in page
+    assert f"<li>{line}" in page
+    assert "What got worse" not in page
+    same = Changes.of(stored({key: cell(0.5)}), stored({key: cell(0.5)}))
+    assert outcome_of(same).plain == "nothing got worse"
+    assert "Worth a look" not in changes_page(same, {})
 
 
 def test_speed_is_told_and_never_a_regression() -> None:
@@ -347,6 +475,21 @@ def test_other_cases_are_compared_as_distributions() -> None:
         assert change(new, old, same_seed=False).regressions == ()  # it got better
     within = change(cell(*[0.01] * n), cell(*[0.99] * n), same_seed=False)
     assert within.regressions == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "regressed"),
+    [
+        (1e12, 1.05e12, False),  # every rank moves, by nothing
+        (100.0, 202.0, False),
+        (100.0, 202.5, True),
+        (0.5, 1.5, True),  # all passed, and all fail
+        (inf, inf, False),
+    ],
+)
+def test_distributions_on_other_cases_know_the_same_factor(before: float, after: float, regressed: bool) -> None:
+    old, new = cell(*[before] * 40), cell(*[after] * 40, verdict=cell(before).verdict)
+    assert bool(change(old, new, same_seed=False).regressions) is regressed
 
 
 def test_cases_are_the_same_only_if_the_meshes_are() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -242,3 +243,45 @@ def test_a_factory_that_fails_for_the_penalty_of_the_case() -> None:
     assert isinstance(Subject("soft", make).with_penalty(1.0), Guarded)
     with pytest.raises(PluginError, match="make: ValueError: too stiff"):
         Subject("soft", make).on(CASE)
+
+
+@pytest.mark.parametrize(
+    ("enforcement", "count", "message"),
+    [
+        ("penalty", 3, "3 of them, with the trait enforcement 'penalty'; needed \"multiplier\""),
+        ("multiplier", 0, "0 of them, with the trait enforcement 'multiplier'; needed n_multipliers"),
+        ("multiplier", -1, "returned -1; needed an integer ≥ 0"),
+        ("multiplier", 1.0, "returned 1.0; needed an integer ≥ 0"),
+        ("multiplier", True, "returned True; needed an integer ≥ 0"),
+    ],
+)
+def test_multipliers_and_the_trait_go_together(enforcement: Any, count: Any, message: str) -> None:
+    class Counting:
+        traits = Traits(enforcement=enforcement)
+
+        def n_multipliers(self, interface: Interface) -> Any:
+            return count
+
+        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+            return z
+
+    guarded = Subject("counting", lambda *, penalty: Counting()).with_penalty(1.0)
+    with pytest.raises(ContractError, match=re.escape(message)):
+        guarded.n_multipliers(PAIR)
+
+
+def test_multipliers_are_counted_once_an_interface() -> None:
+    class Restless:
+        traits = Traits(enforcement="multiplier")
+        count = 0
+
+        def n_multipliers(self, interface: Interface) -> int:
+            self.count += 1
+            return self.count
+
+        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+            return z
+
+    guarded = Subject("restless", lambda *, penalty: Restless()).with_penalty(1.0)
+    assert [guarded.n_multipliers(PAIR) for _ in range(3)] == [1, 1, 1]
+    assert guarded.n_multipliers(PAIR.swapped()) == 2

@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 from mutate import Mutant, Wrapped, changed_line
 
+import contactverif_mortar
 import contactverif_nts
 from contactverif import Pairing
+from contactverif_mortar.cells import Quadrature
 
 PATCH, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT = "balance.force", "balance.moment"
 SOLVE, VARIANTS, DEAD_ZONE = "patch.flat.solve", "patch.variants", "patch.dead-zone"
 RANK = "multipliers.rank"
 ORDER, HISTORY = "newton.order", "newton.history"
+UNILATERAL = "unilateral"
 TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
 BALANCED = "vts_ppt_balanced"
 
@@ -177,6 +180,13 @@ def _pushes_what_a_roller_takes(penalty: float) -> Any:
 
 
 MUTANTS = (
+    line("pulls where the gap is open", UNILATERAL, "eq6",
+         "pressed(dot(minus(x_v, x1), n), multipliers, point, penalty) and on_surface", "on_surface", factory="vts_me"),
+    line("a multiplier that pulls is kept", UNILATERAL, "eq6",
+         "multipliers[point] - penalty * g >= 0", "multipliers[point] - penalty * g >= 0 or multipliers[point] < 0",
+         factory="nts_lm"),
+    line("with multipliers, contact begins by itself only", UNILATERAL, "eq6",
+         "multipliers[point] - penalty * g >= 0", "multipliers[point] > 0", factory="nts_lm"),
     # Force and moment still balance, and where nothing overhangs there is no difference.
     line("free end of the master goes on for ever", DEAD_ZONE, "ppt", '"cover": walk.COVER', '"cover": walk.EXTEND'),
     line("the first multiplier twice", RANK, "points",
@@ -313,6 +323,7 @@ MUTANTS = (
 
 # Wrong too, and no property asks after it yet: what is missing is named, and a property that catches one tells so.
 SURVIVORS = (
-    line("pulls where the gap is open", "unilateral", "eq6",
-         "pressed(dot(minus(x_v, x1), n), multipliers, point, penalty) and on_surface", "on_surface", factory="vts_me"),
+    # Exact for a uniform gap, and so on flat interfaces; action equals reaction at each point.
+    Mutant("one Gauss point a cell", "accuracy.linear",
+           lambda *, penalty: replace(contactverif_mortar.sts(penalty=penalty), quadrature=Quadrature.gauss(1, True))),
 )  # fmt: skip

@@ -1,0 +1,62 @@
+"""No force across an open gap, none of a multiplier that pulls; and contact begins where surfaces penetrate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.case import Case
+from contactverif.formulation import Traits
+from contactverif.interface import Interface
+from contactverif.property import Verdict
+from contactverif.registry import load_formulation
+from contactverif.runner import judge_case
+from contactverif.strategies import named_case
+from contactverif.subject import Subject
+from contactverif_properties.unilateral import UNILATERAL, lifted
+
+
+class Springs:
+    """A spring at each slave node of a horizontal interface, across to the node of the master below it."""
+
+    traits = Traits(penalty="distributed")
+
+    def __init__(self, *, penalty: float, at: float = 0.0, closed: bool = True) -> None:
+        self.penalty, self.at, self.closed = penalty, at, closed
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        forces = np.zeros_like(z)
+        gap = z[1] - z[2 * interface.n_slave_nodes + 1]
+        if gap < self.at and self.closed:
+            forces[1] = self.penalty * (gap - self.at)
+        return forces
+
+
+def verdict(case: Case, **options: Any) -> tuple[Verdict, str]:
+    outcome = judge_case(UNILATERAL, case, Subject("springs", lambda *, penalty: Springs(penalty=penalty, **options)))
+    return outcome.verdict, outcome.reason
+
+
+def test_springs_that_push_and_never_pull() -> None:
+    case = named_case("a1")
+    assert lifted(case, 0.25).positions[0, 1] == case.positions[0, 1] + 0.25
+    assert verdict(case)[0] is Verdict.PASS
+    depth = case.parameter("penetration")
+    assert verdict(case, at=1.01 * depth)[0] is Verdict.FAIL
+    assert verdict(case, at=0.99 * depth)[0] is Verdict.PASS
+    found, reason = verdict(case, closed=False)
+    assert found is Verdict.FAIL
+    assert "nothing begins" in reason
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm", "sts"])
+@pytest.mark.parametrize("case", ["a1", "b", "c"])
+def test_who_is_right_passes(name: str, case: str) -> None:
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject)
+    outcome = judge_case(UNILATERAL, named_case(case), subject)
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+    assert outcome.measurement is not None
+    assert ("force of multipliers that pull" in outcome.measurement.values) is name.endswith("-lm")
