@@ -1,8 +1,8 @@
 """What is worth a look from an old report to a new one on the same cases, though nothing got worse by it.
 
 - Newton needs more than 2 n_old + 2 iterations in the median: an active set may take a few more or fewer.
-- A median or worst margin m = value/tolerance within its tolerance is more than 100 times what it was and above 1/100,
-  so that the same step once more would break the tolerance. Margins below that are a few roundoffs, which come and go.
+- A median or worst margin m = value/tolerance within its tolerance is more than 100 times what it was and above 1/10.
+  Margins below that may be one roundoff (0.05 where a tolerance is 20 of them), which comes and goes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contactverif_reports.cells import Cell, statistics
 from contactverif_reports.comparison import Iterations, iterations
 
 FACTOR, MORE = 2.0, 2.0  # of iterations, and iterations beside it, that are no news
-LEAP = 100.0  # of a margin within the tolerance
+LEAP, LEAST = 100.0, 0.1  # of a margin within the tolerance, and how large it then is
 
 
 def noteworthy(old: Cell, new: Cell) -> Sequence[str]:
@@ -21,7 +21,7 @@ def noteworthy(old: Cell, new: Cell) -> Sequence[str]:
     found = [
         f"{name} error grew within its tolerance, {m_old:.2g} → {m_new:.2g} of it"
         for name, m_old, m_new in statistics(old, new)
-        if 1 / LEAP < m_new <= 1 and m_new > LEAP * m_old
+        if LEAST < m_new <= 1 and m_new > LEAP * m_old
     ]
     for before, after in solves(old, new):
         if after.median > FACTOR * before.median + MORE:
