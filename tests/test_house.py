@@ -65,9 +65,7 @@ ROOMS = {
     "properties": Room(
         (), ("contracts", "oracle", "scene", "newton", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
-    "reports": Room(
-        (), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib", "meshio", "jinja2", "markupsafe")
-    ),
+    "reports": Room((), ("contracts",), ("numpy", "xarray", "netCDF4", "matplotlib", "meshio", "jinja2", "markupsafe")),
     "run": Room(
         ("registry", "runner", "generate", "profile", "provenance"),
         ("contracts", "scene", "strategies", "run"),

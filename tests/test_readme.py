@@ -95,6 +95,7 @@ def test_the_comparison_is_what_the_command_prints(
     title = "## Compare with VTS-PPT"
     command, _ = blocks("sh", section(title))
     (shown,) = blocks("text", section(title))
+    monkeypatch.setenv("COLUMNS", "140")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [*shlex.split(command), "--examples", "5", "--html", "c.html"])
     with pytest.raises(SystemExit) as ended:
