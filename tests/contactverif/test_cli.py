@@ -11,13 +11,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import meshio
 import pytest
+from asking import Answer, Ask, asking
 
 from contactverif import cli, registry, runner
 from contactverif_reports.read import case_ids, read_case, same_data
@@ -29,36 +30,9 @@ SVG = b"<?xml"
 PNG = b"\x89PNG"
 
 
-class Answer(NamedTuple):
-    """What the command left: its exit status, and what it wrote."""
-
-    status: int
-    out: str
-    err: str
-
-
-Ask = Callable[..., Answer]
-
-
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    """The command `contactverif` in this process, with 140 columns unless told otherwise."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-
-    def asked(*arguments: str | Path, columns: int | None = None) -> Answer:
-        if columns is None:
-            monkeypatch.delenv("COLUMNS", raising=False)
-        else:
-            monkeypatch.setenv("COLUMNS", str(columns))
-        monkeypatch.setattr(sys, "argv", ["contactverif", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert isinstance(exit_.value.code, int)
-        return Answer(exit_.value.code, out, err)
-
-    return asked
+    return asking(monkeypatch, capsys)
 
 
 def environment(**more: str) -> dict[str, str]:

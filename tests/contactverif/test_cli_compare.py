@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 import shutil
-import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import netCDF4
 import pytest
+from asking import Ask, asking
 
-from contactverif import cli, runner
+from contactverif import runner
 from contactverif.property import Verdict
 from contactverif.registry import load_formulation, load_properties
 from contactverif.result import Run
@@ -26,34 +27,9 @@ PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
 QUICK = ("--examples", "12", "--seed", "1", "-p", "patch.flat.transmission", "-p", "balance.force")
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What came back from the command."""
-
-    status: int
-    out: str
-    err: str
-
-
-Ask = Callable[..., Answer]
-
-
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    """The command `contactverif compare` in this process."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-    monkeypatch.delenv("COLUMNS", raising=False)
-
-    def asked(*arguments: str | Path) -> Answer:
-        monkeypatch.setattr(sys, "argv", ["contactverif", "compare", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert isinstance(exit_.value.code, int)
-        return Answer(exit_.value.code, out, err)
-
-    return asked
+    return partial(asking(monkeypatch, capsys), "compare")
 
 
 def found(names: Sequence[str], *globs: str, examples: int = 12, seed: int = 1) -> Run:
@@ -192,13 +168,12 @@ def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: P
     assert ask(reports / "worse.nc", reports / "old.nc").status == 0
 
 
-def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    tables = ask(reports / "old.nc", reports / "worse.nc").out.partition("\nvts-ppt, patch")[0]
+def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
+    tables = ask(reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
     assert "…" not in tables
     assert re.search(r"better +equal +worse +time", tables)
     asked = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
-    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *asked).out.partition("\npatch.flat.")[0]
+    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *asked, columns=80).out.partition("\npatch.flat.")[0]
     assert "…" not in tables
     assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)
     assert re.search(r"converged +median +most +fewer +same +more +order *\n", tables)

@@ -3,42 +3,15 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
-
-from contactverif import cli
-
-
-class Answer(NamedTuple):
-    """Exit status, and what was written."""
-
-    status: int
-    out: str
-    err: str
-
-
-Ask = Callable[..., Answer]
+from asking import Answer, Ask, asking
 
 
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    monkeypatch.setenv("NO_COLOR", "1")
-    for name in ("FORCE_COLOR", "COLUMNS"):
-        monkeypatch.delenv(name, raising=False)
-
-    def asked(*arguments: str | Path) -> Answer:
-        monkeypatch.setattr(sys, "argv", ["contactverif", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert isinstance(exit_.value.code, int)
-        return Answer(exit_.value.code, out, err)
-
-    return asked
+    return asking(monkeypatch, capsys)
 
 
 @pytest.fixture

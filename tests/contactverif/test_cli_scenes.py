@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import meshio
 import pytest
+from asking import Ask, asking
 from handmade_run import run_with
 
-from contactverif import cli, drawing, pictures, runner
+from contactverif import drawing, pictures, runner
 from contactverif.catalogue import OPTIONS, SCENES, NamedBlocks, scene_named
 from contactverif.gallery import MEANINGS
 from contactverif.result import NotLoaded
@@ -23,33 +23,9 @@ FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
 SVG, PNG = b"<?xml", b"\x89PNG"
 
 
-class Answer(NamedTuple):
-    """What the command left: its exit status, and what it wrote."""
-
-    status: int
-    out: str
-    err: str
-
-
-Ask = Callable[..., Answer]
-
-
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    """The command `contactverif` in this process."""
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.delenv("FORCE_COLOR", raising=False)
-
-    def asked(*arguments: str | Path, columns: int = 140) -> Answer:
-        monkeypatch.setenv("COLUMNS", str(columns))
-        monkeypatch.setattr(sys, "argv", ["contactverif", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert isinstance(exit_.value.code, int)
-        return Answer(exit_.value.code, out, err)
-
-    return asked
+    return asking(monkeypatch, capsys)
 
 
 def ends(out: str) -> dict[str, list[str]]:
