@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from fractions import Fraction
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 import pytest
+from surfaces import DEPTH, flat, pushed
 
 import contactverif_nts
 from contactverif import Interface, MisuseError
 
-GAP = 1 / 8
 PENALTY = 8.0  # p = ε̂ |g| = 1
 
 TABLE = {  # case: slave lengths, master lengths, {formulation: forces on the master}
@@ -44,23 +43,6 @@ TABLE = {  # case: slave lengths, master lengths, {formulation: forces on the ma
 }
 ON_THE_SLAVE = {"A1": "1 2 1", "B": "1 2 3 4 2", "C": "1 2 3 4 2"}
 EVERY = ("nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_basic", "vts_ppt_balanced")
-
-
-def flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.0) -> tuple[Interface, Any]:
-    """A flat interface with uniform penetration GAP; the master begins at `shift`."""
-    upper = np.array([0.0, *accumulate(slave)])
-    lower = np.array([0.0, *accumulate(master)])[::-1] + shift
-    interface = Interface.from_chains(
-        np.column_stack([upper, np.zeros_like(upper)]), np.column_stack([lower, np.zeros_like(lower)])
-    )
-    x = interface.nodes.copy()
-    x[: len(upper), 1] -= GAP
-    return interface, x.ravel()
-
-
-def pushed(formulation: Any, interface: Interface, z: Any) -> Any:
-    """Forces (n_nodes, 2) by which contact pushes the nodes."""
-    return -formulation.residual(interface, formulation.pair(interface, z), z).reshape(-1, 2)
 
 
 def exactly(text: str) -> list[Fraction]:
@@ -124,7 +106,7 @@ def test_a_slave_wholly_past_the_master_feels_nothing() -> None:
 @pytest.mark.parametrize("name", EVERY)
 def test_an_open_gap_gives_no_force_and_exactly_closed_neither(name: str) -> None:
     interface, z = flat([2, 2], [3, 1])
-    for lift in (GAP, 2 * GAP):
+    for lift in (DEPTH, 2 * DEPTH):
         x = z.reshape(-1, 2).copy()
         x[: interface.n_slave_nodes, 1] += lift
         assert not pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, x.ravel()).any()

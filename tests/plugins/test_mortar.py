@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bent import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, bent, flat, pushed
 
 from contactverif import Interface
 from contactverif.catalogue import scene_named

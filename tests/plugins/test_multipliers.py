@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_forces import GAP, TABLE, exactly, flat
-from test_tangents import scene
+from surfaces import DEPTH, bent, flat
+from test_forces import TABLE, exactly
 
 import contactverif_nts
 from contactverif import Interface, MisuseError, projection
@@ -44,7 +44,7 @@ def made_of(name: str, **options: Any) -> Any:
 
 def with_random_multipliers(formulation: Any, seed: int) -> tuple[Interface, Any]:
     """A bent scene, half of its multipliers negative, so that some points let go."""
-    interface, z = scene(seed)
+    interface, z = bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)
 
@@ -102,7 +102,7 @@ def test_a_multiplier_that_is_the_pressure_of_the_spring_does_what_the_spring_do
     spring = made_of(SPRINGS[name] + balanced, **({"free_end": "truncate"} if balanced else {}) | others)
     in_contact = 0
     for seed in range(50):
-        interface, z = scene(seed)
+        interface, z = bent(seed)
         points = spring.contact_points(interface, spring.pair(interface, z), z)
         state = np.append(z, -C * points.gap)
         pairing = formulation.pair(interface, state)
@@ -137,13 +137,13 @@ def test_a_point_that_lets_go_has_its_multiplier_for_a_row(name: str, options: d
 @pytest.mark.parametrize(
     ("penetration", "multiplier", "active"),
     [
-        (GAP, 0.0, True),
+        (DEPTH, 0.0, True),
         (0.0, 0.0, True),  # bodies that touch exactly begin in contact
-        (-GAP, 0.0, False),
-        (-GAP, C * GAP, True),
-        (-GAP, C * GAP * (1 - 2.0**-50), False),
-        (GAP, -C * GAP, True),
-        (GAP, -C * GAP * (1 + 2.0**-50), False),
+        (-DEPTH, 0.0, False),
+        (-DEPTH, C * DEPTH, True),
+        (-DEPTH, C * DEPTH * (1 - 2.0**-50), False),
+        (DEPTH, -C * DEPTH, True),
+        (DEPTH, -C * DEPTH * (1 + 2.0**-50), False),
     ],
 )
 @pytest.mark.parametrize("name", SPRINGS)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bent import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, bent, flat, pushed
 
 import contactverif_mortar
 from contactverif import Interface, MisuseError, projection

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from surfaces import bent
 
 import contactverif_nts
-from contactverif import Interface, projection
+from contactverif import projection
 from contactverif.compiled import uncompiled
 from contactverif_nts import box3, eq6, walk
 
@@ -31,28 +32,12 @@ METHODS = [
 IDS = [f"{name}{options or ''}" for name, options in METHODS]
 
 
-def scene(seed: int) -> tuple[Interface, Any]:
-    """A bent, tilted slave pressed into a bent master, with overhang on either side."""
-    random = np.random.default_rng(seed)
-    chains = []
-    for _ in range(2):
-        along = np.cumsum(random.uniform(0.2, 2, random.integers(2, 7)))
-        chains.append(np.column_stack([along, np.zeros_like(along)]))
-    slave, master = chains[0], chains[1][::-1] + [random.uniform(-1, 1), 0]
-    interface = Interface.from_chains(slave, master)
-    x = interface.nodes + random.normal(scale=0.08, size=interface.nodes.shape)
-    angle = random.uniform(-0.4, 0.4)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    x[: len(slave)] = x[: len(slave)] @ turn.T - [0, 0.3]
-    return interface, x.ravel()
-
-
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
 def test_the_tangent_is_the_complex_step(name: str, options: dict[str, Any]) -> None:
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
     in_contact = cuts = 0
     for seed in range(100):
-        interface, z = scene(seed)
+        interface, z = bent(seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         h = 2.0**-100
@@ -70,7 +55,7 @@ def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
     worst = {"symmetric": 0.0, "force": 0.0, "moment": 0.0}
     for seed in range(50):
-        interface, z = scene(seed)
+        interface, z = bent(seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         forces = formulation.residual(interface, pairing, z).reshape(-1, 2)
@@ -91,7 +76,7 @@ def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
 def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
-    scenes = [scene(seed) for seed in range(4)]
+    scenes = [bent(seed) for seed in range(4)]
 
     def answers() -> list[Any]:
         found = []
@@ -112,7 +97,7 @@ def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatc
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
 def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
-    interface, z = scene(3)
+    interface, z = bent(3)
     pairing = formulation.pair(interface, z)
     states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
     batch = formulation.residual(interface, pairing, states)
@@ -125,7 +110,7 @@ def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
 def test_basic_has_the_residual_of_the_printed_one_and_the_tangent_of_vts_me() -> None:
     differs = 0
     for seed in range(50):
-        interface, z = scene(seed)
+        interface, z = bent(seed)
         printed, basic, me = (
             make(penalty=8.0)
             for make in (contactverif_nts.vts_ppt, contactverif_nts.vts_ppt_basic, contactverif_nts.vts_me)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_forces import GAP, PENALTY, flat, pushed
-from test_tangents import scene
+from surfaces import DEPTH, bent, flat, pushed
+from test_forces import PENALTY
 
 import contactverif_nts
 from contactverif import Interface, Pairing, Traits
@@ -33,7 +33,7 @@ def both(name: str, **options: Any) -> Any:
 
 def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
     """A bent scene, with random multipliers where there are any."""
-    interface, z = scene(seed)
+    interface, z = bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)
 
@@ -221,7 +221,7 @@ def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
     forces = pushed(both("nts_ar"), interface, z)
     assert forces[:4, 1].tolist() == [2, 3, 5, 4]
     assert forces[4:, 1].tolist() == [-4, -5, -3, -2]
-    assert GAP * PENALTY == 1
+    assert DEPTH * PENALTY == 1
 
 
 # Solved
