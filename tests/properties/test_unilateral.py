@@ -12,7 +12,7 @@ from contactverif.formulation import Traits
 from contactverif.interface import Interface
 from contactverif.property import Verdict
 from contactverif.registry import load_formulation
-from contactverif.runner import judge_case
+from contactverif.runner import judge_case, run
 from contactverif.strategies import named_case
 from contactverif.subject import Subject
 from contactverif_properties.unilateral import UNILATERAL, lifted
@@ -60,3 +60,12 @@ def test_who_is_right_passes(name: str, case: str) -> None:
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
     assert ("force of multipliers that pull" in outcome.measurement.values) is name.endswith("-lm")
+
+
+def test_nodes_that_face_free_ends_exactly_are_undecided() -> None:
+    """Both nodes of a segment on one of its own length: without τ roundoff decides whether they are over it."""
+    without_tau = load_formulation("nts:tau=0")
+    assert isinstance(without_tau, Subject)
+    found = run([without_tau], [UNILATERAL], examples=300, seed=0)
+    assert found.rows[0].verdict is Verdict.PASS, found.rows[0].reason
+    assert any(outcome.verdict is Verdict.UNDECIDED for outcome in found.rows[0].outcomes)
