@@ -48,9 +48,11 @@ def judged(question: Property, case: Case, subject: Subject) -> Outcome:
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
-    """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none."""
+    """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none, or has multipliers: no case holds any."""
     try:
         formulation = subject.on(case)
+        if formulation.n_multipliers(case.interface):
+            return None
         forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
     except ContractError:
         return None

@@ -46,7 +46,10 @@ class Case:
             raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
         z = frozen(raw, np.float64)
         if z.shape != (self.interface.n_unknowns + self.n_multipliers,):
-            raise MisuseError("z", f"shape {z.shape}", f"({self.interface.n_unknowns},): n_nodes × dim, flat")
+            needed = (
+                f"({self.interface.n_unknowns + self.n_multipliers},): n_nodes × dim, flat, then multipliers if any"
+            )
+            raise MisuseError("z", f"shape {z.shape}", needed)
         if not np.isfinite(z).all():
             raise MisuseError("z", "NaN or infinity", "finite positions")
         penalty = np.asarray(self.penalty)

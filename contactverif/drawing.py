@@ -88,8 +88,9 @@ def draw_case(subject: Subject, question: Property, outcome: Outcome, path: Path
     """
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
     try:
-        exact = question.exact(outcome.case) if question.exact is not None else None
-        figure(outcome.case, path, title=title, forces=forces_on(outcome.case, subject), exact=exact)
+        forces = forces_on(outcome.case, subject)
+        exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
+        figure(outcome.case, path, title=title, forces=forces, exact=exact)
     except MisuseError as error:
         raise MisuseError(argument, error.found, error.needed) from None
 

@@ -268,7 +268,8 @@ def solve(
     system, record = System(scene, formulation, own_tangent=own_tangent), _Record()
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
-        raise MisuseError("start", f"shape {u.shape}", f"shape ({system.size},)")
+        behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""
+        raise MisuseError("start", f"shape {u.shape}", f"shape ({scene.n_free},){behind}")
     if not np.isfinite(u).all():
         raise MisuseError("start", "NaN or infinity", "finite numbers")
     u = np.append(u, np.zeros(system.size - len(u)))

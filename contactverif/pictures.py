@@ -42,8 +42,7 @@ def solved(case: Case, subjects: Sequence[Subject | NotLoaded]) -> Solved:
             solutions.append(_solution(scene, case, subject))
         except ContractError as error:
             failures[subject.name] = str(error)
-    pressure = pressure_of(case, case.penalty) if is_uniform(case) else np.nan
-    return Solved(case, scene.bodies, _on_interface(scene), tuple(solutions), pressure, failures)
+    return Solved(case, scene.bodies, _on_interface(scene), tuple(solutions), failures)
 
 
 def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
@@ -63,6 +62,7 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
     z = scene.positions(q, factor)
     state = np.concatenate([z, trace.u[shown, scene.n_free :]])
     forces, points, remark = _contact(scene, subject, formulation, state)
+    pressure = _exact_pressure(case, subject)
     if trace.deficiency:
         rank = f"{trace.deficiency} of {len(trace.multipliers)} multipliers are not unique"
         remark = f"{remark}{'; ' if remark else ''}{rank}"
@@ -81,7 +81,8 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
         floors=trace.floors,
         factors=trace.factors,
         points=points,
-        stress_error=_stress_error(scene, case, at_gauss_points),
+        pressure=pressure,
+        stress_error=_stress_error(scene, pressure, at_gauss_points),
         remark=remark,
     )
 
@@ -124,11 +125,15 @@ def _in_global_axes(body: Body, stresses: FloatArray) -> FloatArray:
     return np.column_stack([turned[:, 0, 0], turned[:, 1, 1], turned[:, 0, 1]])
 
 
-def _stress_error(scene: Scene, case: Case, stresses: Sequence[FloatArray]) -> float:
-    """Largest |σ − σ_exact| / p of the bodies within reach; NaN where nothing is known exactly."""
+def _exact_pressure(case: Case, subject: Subject) -> float:
+    """NaN where it is not known; under an imposed approach more with multipliers, which do not give way."""
     if not is_uniform(case):
         return np.nan
-    pressure = pressure_of(case, case.penalty)
+    return pressure_of(case, np.inf if subject.traits.enforcement == "multiplier" else case.penalty)
+
+
+def _stress_error(scene: Scene, pressure: float, stresses: Sequence[FloatArray]) -> float:
+    """Largest |σ − σ_exact| / p of the bodies within reach; NaN where nothing is known exactly."""
     errors = [0.0]
     for index in scene.reached:
         body = scene.bodies[index]

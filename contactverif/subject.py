@@ -14,7 +14,7 @@ from scipy import sparse
 
 from contactverif.arrays import Array, FloatArray, frozen
 from contactverif.case import Case
-from contactverif.errors import ContractError, NonFiniteError, PluginError
+from contactverif.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.formulation import ContactPoints, Pairing, Traits
 from contactverif.interface import Interface
 
@@ -71,10 +71,11 @@ class Guarded:
     PluginError : from any verb, if the plugin raises.
     ContractError : if an answer is of the wrong kind, shape or dtype, or a pairing holds what it must not.
     NonFiniteError : if an answer holds NaN or infinity.
+    MisuseError : if z has not as many numbers as there are positions and multipliers.
     """
 
     def __init__(self, plugin: Any, traits: Traits, provides: frozenset[str]) -> None:
-        self._plugin = plugin
+        self.plugin = plugin  # itself, for who times it: nothing that it answers is checked
         self._traits = traits
         self.provides = provides
         self._counts: dict[int, tuple[Interface, int]] = {}  # the interface too, lest another gets its place
@@ -97,7 +98,7 @@ class Guarded:
         return count
 
     def _count(self, interface: Interface) -> int:
-        count = _asked("n_multipliers", getattr, self._plugin, "n_multipliers", None)
+        count = _asked("n_multipliers", getattr, self.plugin, "n_multipliers", None)
         if count is None:
             return 0
         number = _asked("n_multipliers", count, interface)
@@ -109,13 +110,15 @@ class Guarded:
         """The pairing at z (n_unknowns,), None where the plugin has none."""
         if "pair" not in self.provides:
             return None
-        answer = _asked("pair", self._plugin.pair, interface, frozen(z, np.float64))
+        self._check_size(interface, z)
+        answer = _asked("pair", self.plugin.pair, interface, frozen(z, np.float64))
         pairing = answer if isinstance(answer, Pairing) else _asked("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Forces (..., n_unknowns) at z (..., n_unknowns); a loop where the plugin does one state at a time."""
+        self._check_size(interface, z)
         if z.ndim == 1 or self._traits.batched:
             return self._residual(interface, pairing, z)
         forces = np.empty_like(z)
@@ -124,7 +127,7 @@ class Guarded:
         return forces
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
-        forces = _asked("residual", self._plugin.residual, interface, pairing, frozen(z, z.dtype.type))
+        forces = _asked("residual", self.plugin.residual, interface, pairing, frozen(z, z.dtype.type))
         if not isinstance(forces, np.ndarray):
             raise ContractError(f"residual: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
         forces = np.array(forces)  # a copy, since the plugin may use its own again; and no subclass with its own rules
@@ -138,7 +141,8 @@ class Guarded:
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse coo array."""
-        tangent = _asked("tangent", self._plugin.tangent, interface, pairing, frozen(z, np.float64))
+        self._check_size(interface, z)
+        tangent = _asked("tangent", self.plugin.tangent, interface, pairing, frozen(z, np.float64))
         if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
             raise ContractError(f"tangent: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
         if tangent.shape != (z.size, z.size):
@@ -153,7 +157,8 @@ class Guarded:
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """The points of contact at z (n_unknowns,)."""
-        points = _asked("contact_points", self._plugin.contact_points, interface, pairing, frozen(z, np.float64))
+        self._check_size(interface, z)
+        points = _asked("contact_points", self.plugin.contact_points, interface, pairing, frozen(z, np.float64))
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
         for name, surface in (("slave_segment", interface.slave), ("master_segment", interface.master)):
@@ -162,6 +167,13 @@ class Guarded:
                 outlier = numbers.min() if numbers.min() < -1 else numbers.max()
                 raise ContractError(f"contact_points: {name} {outlier}; needed −1 to {len(surface) - 1}")
         return points
+
+    def _check_size(self, interface: Interface, z: Array) -> None:
+        """A plugin that has multipliers is never asked about a state without them, nor any other with too many."""
+        count = self.n_multipliers(interface)
+        if z.shape[-1:] != (interface.n_unknowns + count,):
+            needed = f"{interface.n_unknowns} positions and {count} multipliers"
+            raise MisuseError("z", f"shape {z.shape}", f"(..., {interface.n_unknowns + count}), {needed}")
 
 
 def _asked(verb: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

@@ -17,6 +17,7 @@ BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"
 
 FLAT = "patch.flat.transmission"
 RESULTANT, RANK, DEAD_ZONE = "patch.flat.resultant", "multipliers.rank", "patch.dead-zone"
+COMPLEMENTARITY = "complementarity"
 FORCE, MOMENT, TANGENT = "balance.force", "balance.moment", "tangent.directional"
 SOLVED = frozenset({"patch.flat.solve", "patch.variants"})
 PATCHES = frozenset({FLAT, DEAD_ZONE}) | SOLVED
@@ -64,7 +65,9 @@ def expected(name: str, property_id: str) -> Verdict:
         return Verdict.NOT_APPLICABLE
     if property_id == RANK and name not in WITH_MULTIPLIERS:
         return Verdict.NOT_APPLICABLE
-    if property_id.startswith("newton.") and name in NOT_UNIQUE:
+    if property_id == COMPLEMENTARITY and name not in WITH_MULTIPLIERS:
+        return Verdict.NOT_APPLICABLE
+    if (property_id.startswith("newton.") or property_id == COMPLEMENTARITY) and name in NOT_UNIQUE:
         return Verdict.NOT_APPLICABLE
     return Verdict.FAIL if property_id in FAILS[name] else Verdict.PASS
 

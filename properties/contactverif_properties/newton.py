@@ -39,13 +39,6 @@ ORDER = Quantity(
     "|u1 − u*| falls like |u0 − u*|² from states of the same pairing; 2 less what is left of the third power",
     "at least",
 )
-MOVED = Quantity(
-    "moved by another scale c",
-    "1",
-    "max(1e3 u/cond, 30 u X)/ℓ",
-    "the scale of the decision λ − c g ≥ 0 has no part in the solution; the rest is what a linear system is solved to",
-)
-SCALE = 8.0  # times smaller, the other one
 TAIL = Quantity(
     "iterations at the end",
     "1",
@@ -61,9 +54,8 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     -------
     Measurement
         Slope of log |u1 − u*| over log |u0 − u*|, at the nearest distances at which |u1 − u*| is not yet roundoff, the
-        lower one of two random directions; missing where the step meets the solution exactly. Of multipliers also how
-        far the solution moves with another scale c, over ℓ. Details: the rate where the slope is 1 (and beside it the
-        spectral radius of I − K⁻¹ ∂R/∂u, with the derivative taken by differences),
+        lower one of two random directions; missing where the step meets the solution exactly. Details: the rate where
+        the slope is 1 (and beside it the spectral radius of I − K⁻¹ ∂R/∂u, with the derivative taken by differences),
         and how many steps were looked at.
 
     Source: verification 16. Triples of residuals, which this replaces, are wrong in up to one of five scenes.
@@ -86,11 +78,6 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     if np.isnan(least):
         return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
     undecided, values, tolerances = "", {}, {}
-    if system.n_multipliers:
-        moved = _moved(system, subject, case, solution)
-        if moved is not None:
-            values[MOVED.name] = moved / case.shortest_segment
-            tolerances[MOVED.name] = _floor(system, solution, pairing, condition) / case.shortest_segment
     if least < QUADRATIC:
         details["spectral radius"] = spectral_radius(system, solution, pairing)
         smooth, _, _ = _steps(replace(system, own_tangent=False), case, solution, pairing, condition)
@@ -106,8 +93,8 @@ def _steps(
     system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float
 ) -> tuple[float, float, float]:
     """The lower order of the directions (NaN if none decides), the higher rate, and how many steps were looked at."""
-    length, units = case.shortest_segment, _units(system, solution, pairing)
-    floor = _floor(system, solution, pairing, condition)
+    length, units = case.shortest_segment, units_of(system, solution, pairing)
+    floor = floor_of(system, solution, pairing, condition)
     found, looked = [], 0
     for direction in _directions(case.seed, system.size):
         before, after = [], []
@@ -125,23 +112,14 @@ def _steps(
     return min(slope for slope, _ in told), max(rate for _, rate in told), float(looked)
 
 
-def _floor(system: System, solution: FloatArray, pairing: Pairing | None, condition: float) -> float:
+def floor_of(system: System, solution: FloatArray, pairing: Pairing | None, condition: float) -> float:
     """A length: what a linear system at the solution is solved to, and positions are rounded to."""
-    scene, units = system.scene, _units(system, solution, pairing)
+    scene, units = system.scene, units_of(system, solution, pairing)
     floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution / units).max() + np.abs(scene.moved).max())
     return max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max()))
 
 
-def _moved(system: System, subject: Subject, case: Case, solution: FloatArray) -> float | None:
-    """How far, a length, the solution moves if contact is decided with another scale; None if it is not found again."""
-    other = subject.with_penalty(subject.penalty(case) / SCALE)
-    trace = solve(system.scene, other, start=solution)
-    if not trace.converged:
-        return None
-    return float(np.abs(trace.solution - solution[: system.scene.n_free]).max(initial=0.0))
-
-
-def _units(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+def units_of(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
     """(n,) what a unit of distance is: 1 of a position, of a multiplier what does as much to the forces."""
     return scales(system.matrix(u, pairing)[0], system.scene.n_free)[1]
 
@@ -262,7 +240,7 @@ def _same(system: System, case: Case, pairing: Pairing | None, u: FloatArray, re
     return not kink_within(here, system.formulation, None, reach, direction)
 
 
-def _solutions_are_unique(traits: Traits) -> str:
+def solutions_are_unique(traits: Traits) -> str:
     """Empty, or why there is nothing to converge to: constraints that depend on one another contradict when bent."""
     if traits.independent_multipliers is False:
         return "the multipliers are not independent, so there need be no solution, nor one alone"
@@ -273,12 +251,12 @@ NEWTON_ORDER = Property(
     id="newton.order",
     family="newton",
     summary="one Newton step from near a solution ends at a distance of second order",
-    quantities=(ORDER, MOVED),
+    quantities=(ORDER,),
     cases=solid_cases,
     measure=one_step,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=_solutions_are_unique,
+    applicable=solutions_are_unique,
     bodies=True,
 )
 NEWTON_HISTORY = Property(
@@ -291,6 +269,6 @@ NEWTON_HISTORY = Property(
     series=SERIES,
     promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
     needs=frozenset({"tangent"}),
-    applicable=_solutions_are_unique,
+    applicable=solutions_are_unique,
     bodies=True,
 )

@@ -78,15 +78,19 @@ def _by_multipliers(case: Case, subject: Subject, formulation: Guarded, exact: F
 
 
 def force_columns(case: Case, formulation: Guarded, pairing: Pairing | None) -> FloatArray:
-    """(n_unknowns, n_multipliers): the position rows of the residual for each multiplier being 1 and the others 0.
+    """(n_unknowns, n_multipliers): what a unit of each multiplier adds to the position rows of the residual.
 
     The residual is affine in the multipliers on a frozen pairing; what it holds without any, as one that is augmented
-    by a penalty does, is taken off.
+    by a penalty does, is taken off. It is asked with a multiplier as large as those of the case, a power of two: a
+    unit beside a large penalty force would be lost in roundoff.
     """
     n, count = case.interface.n_unknowns, case.n_multipliers
-    states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), np.vstack([np.eye(count), np.zeros(count)])])
+    largest = float(np.abs(case.z[n:]).max(initial=0.0))
+    size = 2.0 ** round(np.log2(largest)) if largest > 0 else 1.0
+    multipliers = np.vstack([size * np.eye(count), np.zeros(count)])
+    states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), multipliers])
     forces = formulation.residual(case.interface, pairing, states)[:, :n]
-    columns: FloatArray = (forces[:-1] - forces[-1]).T
+    columns: FloatArray = (forces[:-1] - forces[-1]).T / size
     return columns
 
 

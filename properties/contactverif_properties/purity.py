@@ -11,6 +11,8 @@ from contactverif.subject import Subject
 from contactverif_properties import roundoff
 from contactverif_properties.anywhere import any_cases, no_barrier, posed
 
+NEAR = 2.0**-12  # of the way to another state; and twelve binary digits of a batch's answers are their own
+
 BITWISE = "the same operations on the same numbers give the same bits"
 AGAIN = Quantity("entries that change when asked again", "1", "0", BITWISE)
 REORDERED = Quantity("entries that change with the order of calls", "1", "0", BITWISE)
@@ -20,7 +22,11 @@ BATCHED = Quantity(
 
 
 def pure(case: Case, subject: Subject) -> Measurement:
-    """R(x1), R(x2), R(x1) gives the first again, also after a tangent and in a batch; inputs stay as they are."""
+    """R(x1), R(x2), R(x1) gives the first again, also after a tangent and in a batch; inputs stay as they are.
+
+    Every state is asked with its own pairing: with another's, far from it, a right formulation may have no answer (a
+    quadratic without a root). The batch is of the state and of one so near that the pairing is nearly its own.
+    """
     original = case
     formulation, case = posed(original, subject)
     interface, z = case.interface, case.z
@@ -41,8 +47,9 @@ def pure(case: Case, subject: Subject) -> Measurement:
         fresh.tangent(interface, pairing, z)
     changed = (fresh.residual(interface, pairing_first, elsewhere) != second).sum()
     changed += (fresh.residual(interface, pairing, z) != first).sum()
-    batch = formulation.residual(interface, pairing, np.array([[elsewhere, z], [z, z], [z, elsewhere]]))
-    alone = formulation.residual(interface, pairing, elsewhere)
+    near = z + NEAR * (elsewhere - z)
+    batch = formulation.residual(interface, pairing, np.array([[near, z], [z, z], [z, near]]))
+    alone = formulation.residual(interface, pairing, near)
 
     broken = []
     if pairing != pairing_again:

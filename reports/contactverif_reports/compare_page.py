@@ -161,7 +161,8 @@ def _drawn(case: Case, forces: FloatArray | None, exact: FloatArray | None, labe
     if has_outline(case):
         return svg_inline(outline(case, _INCHES), label)
     with matplotlib.rc_context({"legend.fontsize": _LEGEND}):
-        figure = drawn(case, title="", forces=forces, exact=exact, width=_INCHES)
+        beside = exact if forces is not None else None  # of multipliers nobody knows what it should be
+        figure = drawn(case, title="", forces=forces, exact=beside, width=_INCHES)
     return svg_inline(figure, label)
 
 

@@ -26,6 +26,11 @@ class Said(IntEnum):
         """One word for a table."""
         return {0: "agrees", 1: "differs", 2: "silent", 3: "defect"}[self]
 
+    @classmethod
+    def of(cls, agrees: bool) -> Said:
+        """Of a statement that can be checked."""
+        return cls.AGREES if agrees else cls.DIFFERS
+
 
 @dataclass(frozen=True, slots=True)
 class Member:
@@ -78,7 +83,6 @@ class Curve:
     x : (n_points,) reference coordinates, a length.
     pressure : (n_points,) over the exact pressure.
     at_points : at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
-    error : largest error of a stress at a Gauss point, over the exact pressure.
     """
 
     member: Member
@@ -86,7 +90,11 @@ class Curve:
     pressure: FloatArray
     at_points: bool
     solution: Solution
-    error: float
+
+    @property
+    def departure(self) -> float:
+        """The largest |p/p_exact − 1|."""
+        return float(abs(self.pressure - 1).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +107,7 @@ class Patch:
     pressures, meshes : numbers of the paper's figures.
     printed : lower and upper end of the pressure axis that the paper prints.
     close_up : the same of its close-up, None where there is none.
+    stiffness : ε̂ over E, per unit of length.
     exact : the exact pressure, force per length.
     """
 
@@ -108,6 +117,7 @@ class Patch:
     meshes: str
     printed: tuple[float, float]
     close_up: tuple[float, float] | None
+    stiffness: float
     exact: float
     solved: Solved
     curves: tuple[Curve, ...]
@@ -123,6 +133,7 @@ class PassTable:
     tolerances : (n_scenes,) of roundoff.
     fails : errors above this are failures; nothing should lie between.
     said : (n_members, n_scenes) 1 where the paper says that it passes, 0 where it says that it fails, −1 silent.
+    unequal : error and tolerance of VTS-PPT on Example 1bis with a foundation UNEQUAL times as stiff as the punch.
     """
 
     members: tuple[Member, ...]
@@ -131,6 +142,11 @@ class PassTable:
     tolerances: FloatArray
     fails: float
     said: IntArray
+    unequal: tuple[float, float]
+
+    def of(self, member: Member, scene: str) -> float:
+        """The error of one of them on one scene."""
+        return float(self.errors[self.members.index(member), self.scenes.index(scene)])
 
     def word(self, member: int, scene: int) -> str:
         """pass, fail, or what else it is."""
@@ -177,6 +193,30 @@ class Convergence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Tangents:
+    """What tangents are, each (n_members,), in the solution of one scene.
+
+    Attributes
+    ----------
+    error : largest difference of K d from a complex step along d, over the largest entry of K d, over random d.
+    asymmetry : largest entry of K − Kᵀ over that of K.
+    order : of one Newton step towards the solution; infinite where one step is exact, NaN where nothing decides.
+    iterations : linear systems solved from the slave just touching to roundoff.
+    """
+
+    scene: str
+    members: tuple[Member, ...]
+    error: FloatArray
+    asymmetry: FloatArray
+    order: FloatArray
+    iterations: IntArray
+
+    def row(self, formulation: str) -> int:
+        """Where in the arrays it stands."""
+        return [member.formulation for member in self.members].index(formulation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Series:
     """A number of each member, over something; values (n_members, n_places)."""
 
@@ -195,7 +235,7 @@ class Defects:
     shift, sliding : over the position of the end of an area of competence past a master node (over the slave's
         length), at a tilt of `sliding_tilt`: the force on the master over that on the slave.
     jump : over the tilt (rad): largest jump of a nodal force there, over the slave's force.
-    jump_known : (n_tilts,) the same by formula, of the printed algorithm.
+    jump_known : (n_tilts,) the same by formula, of the printed algorithm in that configuration.
     free_end : over the part of a slave segment that overhangs: largest error of a stress over the pressure.
     """
 
@@ -244,7 +284,13 @@ class MultiplierRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiskCurve:
-    """The pressure (n_points,) of one formulation under the disk, a force per length, at x (n_points,)."""
+    """The pressure (n_points,) of one formulation under the disk, a force per length, at x (n_points,).
+
+    Attributes
+    ----------
+    iterations : linear systems solved from a disk that is lowered about as far as it ends; −1 without a solution.
+    from_touching : the same from one that has hardly been lowered.
+    """
 
     member: Member
     x: FloatArray
@@ -252,6 +298,7 @@ class DiskCurve:
     largest: float
     half_width: float
     iterations: int
+    from_touching: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,6 +311,7 @@ class DiskStudy:
     largest, half_width, iterations : (n_members, n_meshes).
     slopes : over a/R, over that of the paper: largest pressure over that of Hertz on springs, less 1.
     sizes : over the size of the foundation, over the one chosen: the same.
+    difference_x, difference : (n_points,) VTS-PPT minus VTS-ME on the second mesh.
     """
 
     members: tuple[Member, ...]
@@ -273,6 +321,8 @@ class DiskStudy:
     iterations: IntArray
     slopes: Series
     sizes: Series
+    difference_x: FloatArray
+    difference: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -316,15 +366,15 @@ class Statement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Paper:
-    """All of it. `missing` are formulations that are not installed; parts that need them are absent."""
+    """All of it; `disk` and `disk.study` may be left out, since they take longest."""
 
     forces: tuple[ForceTable, ...]
     patches: tuple[Patch, ...]
     passes: PassTable
     convergence: Convergence
+    tangents: Tangents
     defects: Defects
     multipliers: tuple[MultiplierRow, ...]
     disk: Disk | None
     statements: tuple[Statement, ...]
-    missing: tuple[str, ...]
     provenance: dict[str, str]

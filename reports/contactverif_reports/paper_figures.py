@@ -6,8 +6,9 @@ in grey. A formulation has the same pen in every figure.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import matplotlib
@@ -127,7 +128,9 @@ def _of_patches(patches: Sequence[Patch]) -> tuple[Drawing, Drawing]:
 def _of_disk(disk: Disk) -> tuple[Drawing, ...]:
     drawn = [
         Drawing("fig38", "Fig. 38", _CAPTIONS["fig38"], lambda: _disk_pressures(disk)),
-        Drawing("fig39", "Fig. 39", "Example 2: VTS-PPT minus VTS-ME.", lambda: _disk_difference(disk)),
+        Drawing(
+            "fig39", "Fig. 39", "Example 2: pressure of VTS-PPT minus that of VTS-ME.", lambda: _disk_difference(disk)
+        ),
     ]
     study = disk.study
     if study is not None:
@@ -159,8 +162,16 @@ def _look(member: Member, n_points: int, **more: Any) -> dict[str, Any]:
     return pen(member.pen).look(n_points) | {"markersize": 3.6, "markeredgewidth": 0.8, "zorder": 3} | more
 
 
-def _legend(figure: Figure, members: Sequence[Member], *, exact: str = "", columns: int = 3) -> None:
-    handles = [Line2D([], [], label=member.legend, **_look(member, 1)) for member in members]
+def _legend(
+    figure: Figure,
+    members: Sequence[Member],
+    *,
+    exact: str = "",
+    columns: int = 3,
+    ends: Mapping[Member, str] = MappingProxyType({}),
+) -> None:
+    """Below all panels; `ends` is what did not end at a solution."""
+    handles = [Line2D([], [], label=f"{member.legend}{ends.get(member, '')}", **_look(member, 1)) for member in members]
     if exact:
         handles.append(Line2D([], [], label=exact, **_EXACT))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(columns, len(handles)))
@@ -192,7 +203,8 @@ def _pressures(patches: Sequence[Patch]) -> Figure:
             axes.label_outer()
         if view is not None:
             axes.set_ylim(_close(patch, *view))
-    _legend(figure, _members(patches), exact="exact", columns=3 if len(views) == 1 else 6)
+    ends = {curve.member: _end(curve) for patch in patches for curve in patch.curves if _end(curve)}
+    _legend(figure, _members(patches), exact="exact", columns=3 if len(views) == 1 else 6, ends=ends)
     return figure
 
 
@@ -364,9 +376,17 @@ def _disk_difference(disk: Disk) -> Figure:
     right = disk.difference_x >= 0
     axes.axhline(0.0, **_EXACT)
     axes.plot(disk.difference_x[right], disk.difference[right], color="black", linewidth=0.9, zorder=3)
-    axes.set_xlim(0, 0.4)
+    if (study := disk.study) is not None:
+        right = study.difference_x >= 0
+        axes.plot(study.difference_x[right], study.difference[right], color="0.45", linewidth=0.9, ls="--", zorder=2)
+        handles = [
+            Line2D([], [], color="black", linewidth=0.9, label="base meshes"),
+            Line2D([], [], color="0.45", linewidth=0.9, linestyle="--", label="meshes twice as fine"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    axes.set_xlim(0, None)
     axes.set_xlabel("x along the interface (length)")
-    axes.set_ylabel("difference of pressure (force / length)")
+    axes.set_ylabel("VTS-PPT − VTS-ME\n(force / length)")
     return figure
 
 

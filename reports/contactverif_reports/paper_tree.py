@@ -29,6 +29,7 @@ from contactverif_reports.paper_data import (
     Patch,
     Said,
     Statement,
+    Tangents,
 )
 from contactverif_reports.variables import codes, numbers, words
 
@@ -47,6 +48,7 @@ def tree_of(paper: Paper) -> xr.DataTree:
         "/patch": _patches(paper.patches),
         "/passes": _passes(paper.passes),
         "/convergence": _convergence(paper.convergence),
+        "/tangents": _tangents(paper.tangents),
     }
     if paper.multipliers:
         groups["/multipliers"] = _multipliers(paper.multipliers)
@@ -71,7 +73,6 @@ def _root(paper: Paper) -> dict[str, str]:
         "title": TITLE,
         "references": REFERENCE,
         "schema": schema.SCHEMA,
-        "missing": ", ".join(paper.missing) or schema.NONE,
         "comment": schema.UNITS_NOTE,
     }
 
@@ -153,6 +154,7 @@ def _patches(patches: Sequence[Patch]) -> xr.Dataset:
     table = _names(members) | {
         "scene": words(scene, [patch.scene for patch in patches], "scene, as on the command line"),
         "figure": words(scene, [f"{patch.meshes}, {patch.pressures}" for patch in patches], "meshes, pressures"),
+        "stiffness": numbers(scene, [patch.stiffness for patch in patches], "penalty over E", _PER_LENGTH),
         "exact_pressure": numbers(scene, [patch.exact for patch in patches], "exact contact pressure", schema.STRESS),
         "penalty": numbers(scene, [patch.solved.case.penalty for patch in patches], "penalty", schema.PENALTY),
         "x": _numbers_at([*dims, "point"], spread["x"], "reference coordinate", schema.LENGTH),
@@ -179,7 +181,7 @@ def _of_curve(curve: Curve | None, name: str) -> FloatArray:
     if curve is None:
         return np.full(3 if name == "one" else 0, np.nan)
     if name == "one":
-        return np.array([curve.error, len(curve.solution.residuals) - 1, float(curve.at_points)])
+        return np.array([curve.solution.stress_error, len(curve.solution.residuals) - 1, float(curve.at_points)])
     if name in ("ux", "uy"):
         moved: FloatArray = np.vstack(curve.solution.displacements)[:, "xy".index(name[1])]
         return moved
@@ -214,6 +216,12 @@ def _passes(table: PassTable) -> xr.Dataset:
         ),
         "said": codes(dims, table.said, meanings, "what the paper says", "missing: nothing", fill=-1),
     }
+    found["unequal"] = numbers(
+        ["bound"],
+        np.array(table.unequal),
+        "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance",
+        "1",
+    )
     comment = f"elastic patch tests at the penalty 10 E/h; an error above {table.fails:g} fails"
     return xr.Dataset(found, attrs={"comment": comment})
 
@@ -245,6 +253,18 @@ def _convergence(found: Convergence) -> xr.Dataset:
     return xr.Dataset(table, attrs={"figure": "Fig. 30", "scene": found.scene})
 
 
+def _tangents(found: Tangents) -> xr.Dataset:
+    one = ["formulation"]
+    table = _names(found.members) | {
+        "error": numbers(one, found.error, "difference of K d from a complex step, over K d", "1"),
+        "asymmetry": numbers(one, found.asymmetry, "largest entry of K − Kᵀ over that of K", "1"),
+        "order": numbers(one, found.order, "order of one Newton step", "1", "NaN: not decided", fill=np.nan),
+        "iterations": numbers(one, found.iterations.astype(np.int32), "linear systems solved", "1"),
+    }
+    comment = "in the solution, free sides, a master half as stiff as the slave"
+    return xr.Dataset(table, attrs={"scene": found.scene, "comment": comment})
+
+
 def _multipliers(rows: Sequence[MultiplierRow]) -> xr.Dataset:
     one, yes = ["row"], {"fails": 0, "passes": 1}
     table = {
@@ -272,6 +292,12 @@ def _disk(disk: Disk) -> dict[str, xr.Dataset]:
         "largest": numbers(each, [c.largest for c in curves], "largest contact pressure", schema.STRESS),
         "half_width": numbers(each, [c.half_width for c in curves], "half-width of the contact", schema.LENGTH),
         "iterations": numbers(each, np.array([c.iterations for c in curves], np.int32), "linear systems solved", "1"),
+        "from_touching": numbers(
+            each,
+            np.array([c.from_touching for c in curves], np.int32),
+            "linear systems solved from a disk that just touches",
+            "1",
+        ),
         "difference_x": numbers(["place"], disk.difference_x, "x along the interface", schema.LENGTH),
         "difference": numbers(["place"], disk.difference, "VTS-PPT minus VTS-ME in contact pressure", schema.STRESS),
         "winkler_x": numbers(["exact_place"], disk.winkler_x, "x along the interface", schema.LENGTH),
@@ -307,6 +333,10 @@ def _disk_study(study: DiskStudy) -> xr.Dataset:
         "excess_over_slopes": numbers(["formulation", "slope"], slopes, what, "1", "NaN: not computed", fill=np.nan),
         "foundation": numbers(["foundation"], study.sizes.at, "size of the foundation over the chosen one", "1"),
         "excess_over_sizes": numbers(["foundation"], study.sizes.values[0], f"{what}; VTS-ME", "1"),
+        "difference_x": numbers(["place"], study.difference_x, "x along the interface, second mesh", schema.LENGTH),
+        "difference": numbers(
+            ["place"], study.difference, "VTS-PPT minus VTS-ME in contact pressure, second mesh", schema.STRESS
+        ),
     }
     return xr.Dataset(table)
 

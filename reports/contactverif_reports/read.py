@@ -18,6 +18,8 @@ from contactverif.property import Verdict
 from contactverif_reports import schema
 
 _ARGUMENT = "REPORT"
+# What netCDF4 and we meet in a file that is not whole: a missing name, a number that means nothing, an HDF error.
+_DAMAGE = (AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError, OverflowError)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +102,8 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
 
     Raises
     ------
-    MisuseError : if the file is not there, no netCDF file, or no report of this schema.
+    MisuseError : if the file is not there, no netCDF file, or no report of this schema; and if something is missing or
+        damaged in what is read of it within the block.
     """
     import netCDF4
 
@@ -112,39 +115,42 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
         report = netCDF4.Dataset(Path(path).resolve())
     except (OSError, RuntimeError) as error:
         raise MisuseError(_ARGUMENT, f"{found}, which is no netCDF file ({error})", "a report (netCDF-4)") from error
-    with report:
-        if str(getattr(report, "title", "")) != schema.TITLE or not hasattr(report, "schema"):
-            raise MisuseError(
-                _ARGUMENT,
-                f"{found}, a netCDF file of something else",
-                "a report that `contactverif verify --report` wrote",
-            )
-        if str(report.schema) != schema.SCHEMA:
-            raise MisuseError(_ARGUMENT, f"{found} of schema {report.schema}", f"schema {schema.SCHEMA}")
-        report.set_auto_maskandscale(False)
-        yield report
+    try:
+        with report:
+            _check_schema(report, found)
+            report.set_auto_maskandscale(False)
+            yield report
+    except MisuseError:
+        raise
+    except _DAMAGE as error:
+        what = " ".join(str(error).split())
+        raise MisuseError(_ARGUMENT, f"{found}, which cannot be read ({what})", "an undamaged report") from error
+
+
+def _check_schema(report: Any, path: str) -> None:
+    if str(getattr(report, "title", "")) != schema.TITLE or not hasattr(report, "schema"):
+        needed = "a report that `contactverif verify --report` wrote"
+        raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", needed)
+    if str(report.schema) != schema.SCHEMA:
+        raise MisuseError(_ARGUMENT, f"{path} of schema {report.schema}", f"schema {schema.SCHEMA}")
 
 
 def _stored(group: Any, path: str | os.PathLike[str]) -> StoredCase:
     from contactverif_reports.counterexamples import ORIGIN
 
     variables = _group(group, schema.CASE, path).variables
-    try:
-        arrays = {variable.getncattr(ORIGIN): variable[...] for variable in variables.values()}
-        case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
-        values, tolerances = _measured(group)
-        return StoredCase(
-            case,
-            str(group.formulation),
-            str(group.property_id),
-            Verdict(int(group["verdict"][...])),
-            "" if group.reason == schema.NONE else str(group.reason),
-            values,
-            tolerances,
-        )
-    except (AttributeError, LookupError) as error:
-        found = f"{os.fspath(path)}, where {error} is missing"
-        raise MisuseError(_ARGUMENT, found, "an undamaged report") from error
+    arrays = {variable.getncattr(ORIGIN): variable[...] for variable in variables.values()}
+    case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
+    values, tolerances = _measured(group)
+    return StoredCase(
+        case,
+        str(group.formulation),
+        str(group.property_id),
+        Verdict(int(group["verdict"][...])),
+        "" if group.reason == schema.NONE else str(group.reason),
+        values,
+        tolerances,
+    )
 
 
 def _group(parent: Any, name: str, path: str | os.PathLike[str]) -> Any:

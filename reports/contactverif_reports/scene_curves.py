@@ -59,8 +59,8 @@ def draw_pressures(axes: Axes, solved: Solved, side: Literal["slave", "master"])
             axes.plot(along[on], pressures[on], zorder=3, **look.look(len(on)))
         if side == "slave" and solution.points is not None:
             _draw_points(axes, solved, solution, look.color)
-    if np.isfinite(solved.pressure):
-        axes.axhline(solved.pressure, color="0.6", linewidth=2.2, zorder=1)
+    for pressure in solved.pressures:
+        axes.axhline(pressure, color="0.6", linewidth=2.2, zorder=1)
     axes.set_ylabel(f"{side}: nodal force\nover its share\n(force / length)")
     _roomy(axes)
 

@@ -114,8 +114,9 @@ def _draw_curves(figure: SubFigure, solved: Solved) -> None:
         handles.append(
             Line2D([], [], color="0.3", linewidth=0.8, marker=".", label="at contact points, over their areas")
         )
-    if np.isfinite(solved.pressure):
-        handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {short(solved.pressure)}"))
+    if solved.pressures:
+        exact = " and ".join(map(short, solved.pressures))  # by penalty and by multipliers
+        handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {exact}"))
     handles.append(Patch(color="0.92", label="roundoff of the residual"))
     figure.legend(
         handles=handles, loc="outside lower center", ncols=2 if len(handles) > 3 else len(handles), frameon=False

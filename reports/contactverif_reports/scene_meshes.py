@@ -67,7 +67,7 @@ def magnifications(solved: Solved) -> dict[str, Magnification]:
 
 
 def colour_scale(solved: Solved) -> ScalarMappable:
-    """From the least to the largest pressure of all cells of all solutions."""
+    """From the least to the largest pressure of all cells of all solutions; the exact one, if one, in the middle."""
     values = [
         pressures_across(body, s)
         for one in solved.solutions
@@ -76,6 +76,9 @@ def colour_scale(solved: Solved) -> ScalarMappable:
     found = np.concatenate(values)
     found = found[np.isfinite(found)]
     low, high = (float(found.min()), float(found.max())) if len(found) else (0.0, 1.0)
+    if len(solved.pressures) == 1:
+        reach = max(high - solved.pressures[0], solved.pressures[0] - low)
+        low, high = solved.pressures[0] - reach, solved.pressures[0] + reach
     if high - low <= _FLAT * max(abs(low), abs(high)):
         half = 0.1 * max(abs(low), abs(high)) or 1.0
         low, high = (low + high) / 2 - half, (low + high) / 2 + half

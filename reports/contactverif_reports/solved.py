@@ -53,6 +53,7 @@ class Solution:
     residuals, energies, floors, factors : (n_iterates,) as in a trace: the largest force that is not in balance, the
         energy of the step from there (NaN at the last), the residual's own roundoff, and the share of the loads.
     points : None where the plugin does not provide them or gives forces instead of pressures.
+    pressure : the exact contact pressure p; NaN where it is not known or not the same everywhere.
     stress_error : largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
     remark : what did not come out as it should, empty if all did.
     """
@@ -69,6 +70,7 @@ class Solution:
     floors: FloatArray
     factors: FloatArray
     points: PointPressures | None = None
+    pressure: float = np.nan
     stress_error: float = np.nan
     remark: str = ""
 
@@ -89,7 +91,6 @@ class Solved:
     on_interface : for each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can
         touch nothing.
     solutions : at least one.
-    pressure : the exact contact pressure, NaN where it is not known or not the same everywhere.
     failures : {formulation: why there is no solution}, a line each.
     """
 
@@ -97,7 +98,6 @@ class Solved:
     bodies: tuple[Body, ...]
     on_interface: tuple[IntArray, ...]
     solutions: tuple[Solution, ...]
-    pressure: float = np.nan
     failures: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -105,6 +105,11 @@ class Solved:
         """ "slave" or "master" for each body, "" for one that can touch nothing."""
         first_master = self.case.interface.n_slave_nodes
         return ["" if not len(on) else "slave" if on[0] < first_master else "master" for on in self.on_interface]
+
+    @property
+    def pressures(self) -> list[float]:
+        """The exact pressures that are known, each once: a penalty gives way where multipliers do not."""
+        return list(dict.fromkeys(one.pressure for one in self.solutions if np.isfinite(one.pressure)))
 
     @property
     def size(self) -> float:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.errors import MisuseError
 from contactverif.property import Quantity, Verdict, excess
 from contactverif_reports import schema
 from contactverif_reports.cells import Cell
@@ -157,22 +156,17 @@ def read_report(path: str | os.PathLike[str]) -> StoredReport:
     MisuseError : if the file is not there, no netCDF file, no report of this schema, or damaged.
     """
     found = os.fspath(path)
-    try:
-        cells = read_cells(path)
-        with opened(path) as report:
-            groups = {
-                str(group.property_id): _Group(group)
-                for name, family in report.groups.items()
-                if name not in schema.RESERVED
-                for group in family.groups.values()
-            }
-            rows = _rows(report, groups, cells)
-            provided = _provided(report[schema.SUMMARY], cells.formulations)
-        examples = read_cases(path)
-    except MisuseError:
-        raise
-    except (AttributeError, LookupError, ValueError, RuntimeError, OSError) as error:
-        raise MisuseError("REPORT", f"{found}, which cannot be read ({error})", "an undamaged report") from error
+    cells = read_cells(path)
+    with opened(path) as report:
+        groups = {
+            str(group.property_id): _Group(group)
+            for name, family in report.groups.items()
+            if name not in schema.RESERVED
+            for group in family.groups.values()
+        }
+        rows = _rows(report, groups, cells)
+        provided = _provided(report[schema.SUMMARY], cells.formulations)
+    examples = read_cases(path)
     return StoredReport(
         path=found,
         passed=cells.provenance.get("passed") == "true",

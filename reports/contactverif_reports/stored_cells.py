@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from contactverif.arrays import FloatArray, IntArray, frozen
-from contactverif.errors import MisuseError
 from contactverif.property import Quantity, Verdict, excess
 from contactverif_reports import schema
 from contactverif_reports.cells import ORDER, Cell, margin_of
@@ -59,11 +58,7 @@ def read_cells(path: str | os.PathLike[str]) -> StoredCells:
     """
     found = os.fspath(path)
     with opened(path) as report:
-        try:
-            return _report(report, found)
-        except (AttributeError, LookupError, ValueError) as error:
-            what = f"{found}, where {error} is missing"
-            raise MisuseError("REPORT", what, "an undamaged report") from error
+        return _report(report, found)
 
 
 def _report(report: Any, path: str) -> StoredCells:

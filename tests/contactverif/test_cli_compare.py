@@ -251,7 +251,11 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
         ("old.nc", ["--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
         ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
         ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0; needed schema 1"),
-        ("damaged.nc", [], r"(OLD|NEW).nc: found .*damaged.nc, where .* is missing; needed an undamaged report"),
+        (
+            "damaged.nc",
+            [],
+            r"(OLD|NEW).nc: found .*damaged.nc, which cannot be read \(.*\); needed an undamaged report",
+        ),
     ],
 )
 def test_a_mistake_in_a_report_is_one_line(

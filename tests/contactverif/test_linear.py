@@ -85,3 +85,14 @@ def test_without_multipliers_a_singular_matrix_has_no_step(kind: Any) -> None:
     step = linear.solved(kind(np.array([[1.0, 1], [1, 1]])), np.ones(2), 2)
     assert step.change is None
     assert step.deficiency == 0
+
+
+@pytest.mark.parametrize("nothing", [[1.0, -1.0, 0.0, 0.0], [1.0, -1.0, 1.0, -1.0], [3.0, -1.0, -1.0, -1.0]])
+def test_a_nearly_singular_matrix_is_told_also_where_its_null_vector_is_orthogonal_to_equal_entries(
+    nothing: list[float],
+) -> None:
+    """The usual estimate begins with equal entries, and sees nothing of it."""
+    vector = np.array(nothing) / np.linalg.norm(nothing)
+    matrix = np.eye(4) - (1 - 1e-14) * np.outer(vector, vector)
+    found = linear.solved(sparse.csr_array(matrix), vector, 4)
+    assert found.condition < 1e-13

@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contactverif.asked import forces_on
 from contactverif.blocks import two_blocks
 from contactverif.case import Case
 from contactverif.catalogue import scene_named
 from contactverif.errors import MisuseError
+from contactverif.generate import draw_cases
 from contactverif.newton import solve
 from contactverif.pictures import solved
 from contactverif.registry import load_formulation
 from contactverif.result import NotLoaded
 from contactverif.scene import Scene
+from contactverif.strategies import block_cases, named_case
 from contactverif.subject import Subject
 
 FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
@@ -70,17 +73,35 @@ def test_a_formulation_that_is_right_shows_the_exact_pressure_everywhere(text: s
     found = solved(scene.case(), [installed("vts-ppt")])
     (one,) = found.solutions
     assert not found.failures
-    assert found.pressure == scene.case().parameter("pressure")
+    assert one.pressure == scene.case().parameter("pressure")
     pressures = found.node_pressures(one)
     assert np.isfinite(pressures).sum() >= len(scene.interface.slave) + 3
-    np.testing.assert_allclose(pressures[np.isfinite(pressures)], found.pressure, rtol=1e-9)
+    np.testing.assert_allclose(pressures[np.isfinite(pressures)], one.pressure, rtol=1e-9)
     assert one.points is not None
-    np.testing.assert_allclose(one.points.pressure, found.pressure, rtol=1e-9)
+    np.testing.assert_allclose(one.points.pressure, one.pressure, rtol=1e-9)
     assert one.stress_error < 1e-9
     for body, stresses in zip(scene.bodies, one.stresses, strict=True):
         normal = body.frame[:, 1]
         tensors = stresses[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
-        np.testing.assert_allclose(tensors @ normal, np.tile(-found.pressure * normal, (len(tensors), 1)), atol=1e-6)
+        np.testing.assert_allclose(tensors @ normal, np.tile(-one.pressure * normal, (len(tensors), 1)), atol=1e-6)
+
+
+def test_under_an_imposed_approach_multipliers_carry_more_than_a_penalty() -> None:
+    """Each is held against its own exact pressure: a penalty gives way."""
+    names = ["sts", "mortar", "mortar-lm", "two-pass/nts-lm"]
+    (case, *_) = draw_cases(block_cases(), seed="pictures", examples=3).cases[1:]
+    found = solved(case, [installed(name) for name in names])
+    assert [one.formulation for one in found.solutions] == names
+    assert max(one.stress_error for one in found.solutions) < 1e-9
+    soft, rigid = found.pressures
+    assert soft < rigid
+    assert [one.pressure for one in found.solutions] == [soft, soft, rigid, rigid]
+
+
+@pytest.mark.parametrize("name", ["nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm"])
+def test_forces_of_multipliers_that_no_case_holds_are_not_drawn(name: str) -> None:
+    assert forces_on(named_case("c"), installed(name)) is None
+    assert forces_on(named_case("c"), installed("nts")) is not None
 
 
 def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
@@ -96,7 +117,7 @@ def test_it_is_the_trace_that_is_drawn() -> None:
     names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
     found = solved(scene.case(), [installed(name) for name in names])
     assert [one.formulation for one in found.solutions] == names
-    assert np.isnan(found.pressure)
+    assert np.isnan(found.solutions[0].pressure)
     for one in found.solutions:
         trace = solve(scene, installed(one.formulation).on(scene.case()))
         assert (one.end, one.n_iterations, one.converged) == ("converged", trace.n_iterations, True)

@@ -115,7 +115,7 @@ def loaded(text: str) -> Any:
     subject = load_formulation(text)
     assert isinstance(subject, Subject)
     assert subject.name == text
-    return subject.with_penalty(3.0)._plugin
+    return subject.with_penalty(3.0).plugin
 
 
 def test_names_are_sorted_and_nothing_is_loaded(entries: dict[str, list[Entry]]) -> None:

@@ -14,6 +14,8 @@ from contactverif.case import Case
 from contactverif.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.formulation import ContactPoints, Pairing, Traits
 from contactverif.interface import Interface
+from contactverif.registry import load_formulation
+from contactverif.strategies import named_case
 from contactverif.subject import Guarded, Subject
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
@@ -285,3 +287,20 @@ def test_multipliers_are_counted_once_an_interface() -> None:
     guarded = Subject("restless", lambda *, penalty: Restless()).with_penalty(1.0)
     assert [guarded.n_multipliers(PAIR) for _ in range(3)] == [1, 1, 1]
     assert guarded.n_multipliers(PAIR.swapped()) == 2
+
+
+def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:
+    """With multipliers left out, nts-lm would answer as nts does."""
+    case, formulation = named_case("c"), load_formulation("nts-lm")
+    assert isinstance(formulation, Subject)
+    guarded = formulation.on(case)
+    for ask in (
+        lambda: guarded.pair(case.interface, case.z),
+        lambda: guarded.residual(case.interface, None, case.z),
+        lambda: guarded.tangent(case.interface, None, case.z),
+        lambda: guarded.contact_points(case.interface, None, case.z),
+    ):
+        with pytest.raises(
+            MisuseError, match=r"z: found shape \(20,\); needed \(\.\.\., 25\), 20 positions and 5 mult"
+        ):
+            ask()

@@ -59,10 +59,17 @@ def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0,
 
 
 class Wrapped:
-    """The balanced VTS-PPT with one verb replaced by a subclass-free wrapper: verbs are looked up in `verbs` first."""
+    """A formulation (the balanced VTS-PPT) with some verbs replaced: they are looked up in `verbs` first."""
 
-    def __init__(self, penalty: float, **verbs: Callable[..., Any]) -> None:
-        self._inner = contactverif_nts.vts_ppt_balanced(penalty=penalty)
+    def __init__(
+        self,
+        penalty: float,
+        make: Callable[..., Any] = contactverif_nts.vts_ppt_balanced,
+        **verbs: Callable[..., Any],
+    ) -> None:
+        self._inner = make(penalty=penalty)
+        if hasattr(self._inner, "n_multipliers"):
+            self.n_multipliers = self._inner.n_multipliers
         self._verbs = verbs
         self.traits = self._inner.traits
 

@@ -18,7 +18,7 @@ FORCE, MOMENT = "balance.force", "balance.moment"
 SOLVE, VARIANTS, DEAD_ZONE = "patch.flat.solve", "patch.variants", "patch.dead-zone"
 RANK = "multipliers.rank"
 ORDER, HISTORY = "newton.order", "newton.history"
-UNILATERAL = "unilateral"
+UNILATERAL, COMPLEMENTARITY = "unilateral", "complementarity"
 TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
 BALANCED = "vts_ppt_balanced"
 
@@ -48,6 +48,50 @@ def _restless(penalty: float) -> Any:
         return Pairing({**answer(interface, z), "call": np.array([len(calls) % 2])})
 
     return Wrapped(penalty, pair=pair)
+
+
+def _all_or_none(make: Any) -> Any:
+    """Where anything touches, all does, and what is open is held: adhesion."""
+
+    def pair(answer: Any, interface: Any, z: Any) -> Any:
+        found = answer(interface, z)
+        return Pairing({**found, "active": np.full_like(found["active"], found["active"].any())})
+
+    return lambda *, penalty: Wrapped(penalty, make, pair=pair)
+
+
+def _held_between(make: Any) -> Any:
+    """A node is let go only at the end of what touches."""
+
+    def pair(answer: Any, interface: Any, z: Any) -> Any:
+        found = answer(interface, z)
+        active = np.flatnonzero(found["active"])
+        held = found["active"].copy()
+        if len(active):
+            held[active[0] : active[-1] + 1] = True
+        return Pairing({**found, "active": held})
+
+    return lambda *, penalty: Wrapped(penalty, make, pair=pair)
+
+
+def _soft_multipliers(penalty: float) -> Any:
+    """A constraint that gives way by λ/c: the solution depends on the scale of the decision."""
+
+    def with_rows(answer: Any, interface: Any, z: Any, pairing: Any) -> Any:
+        n = interface.n_unknowns
+        rows = np.where(pairing["active"], z[..., n:] / penalty, 0.0)
+        return np.concatenate([answer[..., :n], answer[..., n:] - rows], axis=-1)
+
+    def residual(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        return with_rows(answer(interface, pairing, z), interface, z, pairing)
+
+    def tangent(answer: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        matrix = np.array(answer(interface, pairing, z).toarray())
+        n = interface.n_unknowns
+        matrix[range(n, len(z)), range(n, len(z))] -= np.where(pairing["active"], 1 / penalty, 0.0)
+        return matrix
+
+    return Wrapped(penalty, contactverif_nts.nts_lm, residual=residual, tangent=tangent)
 
 
 def _moves_the_mesh(penalty: float) -> Any:
@@ -182,7 +226,7 @@ def _pushes_what_a_roller_takes(penalty: float) -> Any:
 MUTANTS = (
     line("pulls where the gap is open", UNILATERAL, "eq6",
          "pressed(dot(minus(x_v, x1), n), multipliers, point, penalty) and on_surface", "on_surface", factory="vts_me"),
-    line("a multiplier that pulls is kept", UNILATERAL, "eq6",
+    line("a multiplier that pulls is kept", COMPLEMENTARITY, "eq6",
          "multipliers[point] - penalty * g >= 0", "multipliers[point] - penalty * g >= 0 or multipliers[point] < 0",
          factory="nts_lm"),
     line("with multipliers, contact begins by itself only", UNILATERAL, "eq6",
@@ -298,6 +342,11 @@ MUTANTS = (
          nth=0, factory="vts_ppt", free_end="extend"),
     line("a batch of one state many times", PURITY, "box3",
          "now, r = x[state], forces[state]", "now, r = x[0], forces[state]"),
+    Mutant("open cells adhere", UNILATERAL, _all_or_none(contactverif_mortar.sts)),
+    Mutant("open nodes adhere", UNILATERAL, _all_or_none(contactverif_mortar.mortar)),
+    Mutant("multipliers of open nodes adhere", COMPLEMENTARITY, _all_or_none(contactverif_mortar.mortar_lm)),
+    Mutant("nodes between others are not let go", COMPLEMENTARITY, _held_between(contactverif_mortar.mortar_lm)),
+    Mutant("multipliers that give way", COMPLEMENTARITY, lambda *, penalty: _soft_multipliers(penalty)),
     Mutant("numbers encoded in the pairing", TANGENT, lambda *, penalty: _numbers_in_the_pairing(penalty)),
     Mutant("pairing kept from the first call", PURITY, lambda *, penalty: _remembers(penalty)),
     Mutant("pairing that changes at every call", PURITY, lambda *, penalty: _restless(penalty)),

@@ -59,7 +59,6 @@ def test_who_is_right_passes(name: str, case: str) -> None:
     outcome = judge_case(UNILATERAL, named_case(case), subject)
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
-    assert ("force of multipliers that pull" in outcome.measurement.values) is name.endswith("-lm")
 
 
 def test_nodes_that_face_free_ends_exactly_are_undecided() -> None:

@@ -46,7 +46,7 @@ def solved(
     moves = tuple(np.broadcast_to(down * (index == 0), body.nodes.shape) for index, body in enumerate(pair))
     z = nodes.copy()
     z[:first] += down
-    empty = Solved(case, pair, numbers, (), PRESSURE)
+    empty = Solved(case, pair, numbers, ())
     stresses = tuple(_uniform(body) for body in pair)
     solutions = tuple(
         Solution(
@@ -62,10 +62,11 @@ def solved(
             floors=np.full(3, 1e-12),
             factors=np.ones(3),
             points=PointPressures(np.array([0, 1, 2]), np.zeros(3), np.array([[-1.0, 1.0]] * 3), np.full(3, PRESSURE)),
+            pressure=PRESSURE,
         )
         for name, end in zip(names, ends, strict=True)
     )
-    return Solved(case, pair, numbers, solutions, PRESSURE)
+    return Solved(case, pair, numbers, solutions)
 
 
 def _uniform(body: Body) -> FloatArray:

@@ -38,7 +38,7 @@ SCENES = {
     "open": solved(penetration=-0.3),
     "touching": solved(penetration=0.0),
     "deep": solved(penetration=1.0),
-    "unknown pressure": replace(solved(), pressure=np.nan),
+    "unknown pressure": changed(changed(solved(), pressure=np.nan), 1, pressure=np.nan),
     "no forces": changed(solved(), forces=np.full((7, 2), np.nan), points=None),
     "exactly zero": changed(solved(), residuals=np.array([1.0, 0.5, 0.0]), energies=np.array([1.0, 0.0, np.nan])),
     "at once": changed(
@@ -127,6 +127,8 @@ def test_a_difference_of_roundoff_is_drawn_in_one_colour() -> None:
     low, high = colour_scale(changed(found, stresses=(stresses[0] * (1 + 1e-12), stresses[1]))).get_clim()
     assert (low, high) == (pytest.approx(90.0), pytest.approx(110.0))
     low, high = colour_scale(changed(found, stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
+    assert (low, high) == (pytest.approx(50.0), pytest.approx(150.0))  # the exact pressure, 100, in the middle
+    low, high = colour_scale(changed(SCENES["unknown pressure"], stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
     assert (low, high) == (pytest.approx(100.0), pytest.approx(150.0))
 
 

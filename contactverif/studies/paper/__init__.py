@@ -1,27 +1,23 @@
-"""The reference paper, computed again: every table and figure of it as numbers, one file a part."""
+"""The reference paper, computed again: every table and figure of it as numbers, one file a part.
+
+Each part also says what the paper says of it, in our words, beside what was found.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from contactverif.provenance import provenance
-from contactverif.studies.paper import cast
-from contactverif.studies.paper.convergence import convergence
-from contactverif.studies.paper.defects import defects
-from contactverif.studies.paper.disk import disk, disk_steps
-from contactverif.studies.paper.forces import tables
-from contactverif.studies.paper.multipliers import multipliers
-from contactverif.studies.paper.patch import SHOWN, passes, patches
-from contactverif.studies.paper.statements import statements
-from contactverif_reports.paper_data import Paper
+from contactverif.studies.paper import cast, convergence, defects, disk, forces, multipliers, patch, tangents
+from contactverif_reports.paper_data import Paper, Patch
 
 __all__ = ["compute", "steps"]
 
 
 def steps(*, with_study: bool = True) -> int:
     """How often `compute` tells where it is."""
-    tables = 1 + len(SHOWN) + len(cast.installed(cast.PASSES)) + 1 + 3 + len(cast.installed(cast.MULTIPLIERS))
-    return tables + disk_steps(with_study=with_study)
+    parts = 3 + len(patch.SHOWN) + len(cast.PASSES) + 3 + len(cast.MULTIPLIERS)
+    return parts + disk.disk_steps(with_study=with_study)
 
 
 def compute(told: Callable[[str], None] = lambda _: None, *, with_study: bool = True) -> Paper:
@@ -33,24 +29,39 @@ def compute(told: Callable[[str], None] = lambda _: None, *, with_study: bool = 
     with_study : of Example 2 on finer meshes, which takes most of the time.
     """
     told("force tables")
-    forces = tables()
-    solved, passing = patches(told), passes(told)
+    tables = forces.tables()
+    patches, passes = patch.patches(told), patch.passes(told)
     told("convergence")
-    histories = convergence()
-    found, saddles = defects(told), multipliers(told)
-    pressed = disk(told, with_study=with_study)
+    histories = convergence.convergence()
+    told("tangents")
+    derivatives = tangents.tangents()
+    wrong, saddles = defects.defects(told), multipliers.multipliers(told)
+    pressed = disk.disk(told, with_study=with_study)
     return Paper(
-        forces=forces,
-        patches=solved,
-        passes=passing,
+        forces=tables,
+        patches=patches,
+        passes=passes,
         convergence=histories,
-        defects=found,
+        tangents=derivatives,
+        defects=wrong,
         multipliers=saddles,
         disk=pressed,
-        statements=statements(forces, solved, passing, histories, found, saddles, pressed),
-        missing=cast.missing(),
+        statements=(
+            *map(forces.statement, tables),
+            *patch.statements(patches, passes),
+            *convergence.statements(histories),
+            *tangents.statements(derivatives),
+            *multipliers.statements(saddles, _titles(patches)),
+            *disk.statements(pressed),
+            *defects.statements(wrong),
+        ),
         provenance=_provenance(),
     )
+
+
+def _titles(patches: tuple[Patch, ...]) -> dict[str, str]:
+    """{scene: what the paper calls it}, within a sentence."""
+    return {"c-prime": "case C′"} | {one.scene: one.title.replace("Case", "case") for one in patches}
 
 
 def _provenance() -> dict[str, str]:

@@ -1,12 +1,10 @@
-"""Who plays in the reproduction of the paper: formulations as data, under the paper's legend names.
+"""Who plays in the reproduction of the paper: formulations as data, under the paper's names.
 
-Another formulation joins a table or a figure by its name in a list here; one that is not installed is left out and
-named as missing.
+Another formulation joins a table or a figure by its name in a list here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
 
 from contactverif.errors import MisuseError
@@ -32,6 +30,7 @@ VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)  # pressures are shown at th
 FORCES = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 PASSES = (NTS, NTS_AR, TWO_PASS, VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED, CHEN_HISADA, STS, MORTAR, DUAL)
 CONVERGENCE = (VTS_ME, BASIC, VTS_PPT)
+TANGENTS = (*CONVERGENCE, STS)
 BALANCE = (VTS_ME, VTS_PPT, BALANCED, STS)
 FREE_ENDS = (NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 DISK = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
@@ -44,32 +43,17 @@ MULTIPLIERS = (
     Member("mortar, multipliers", "mortar-lm"),
     Member("dual mortar, multipliers", "mortar-dual-lm"),
 )
-EVERYBODY = (*FORCES, *PASSES, *CONVERGENCE, *BALANCE, *FREE_ENDS, *DISK, *MULTIPLIERS)
-
-
-def installed(members: Iterable[Member]) -> tuple[Member, ...]:
-    """Those of them that can be asked."""
-    return tuple(member for member in members if subject_of(member.formulation) is not None)
-
-
-def missing() -> tuple[str, ...]:
-    """The names of those that cannot."""
-    names = dict.fromkeys(member.formulation for member in EVERYBODY)
-    return tuple(name for name in names if subject_of(name) is None)
-
-
-def subject(member: Member) -> Subject:
-    """The formulation itself, which must be installed."""
-    found = subject_of(member.formulation)
-    assert found is not None
-    return found
 
 
 @cache
-def subject_of(name: str) -> Subject | None:
-    """The formulation of that name, None where it is not installed or does not load."""
-    try:
-        found = load_formulation(name)
-    except MisuseError:
-        return None
-    return None if isinstance(found, NotLoaded) else found
+def subject(member: Member) -> Subject:
+    """The formulation itself; all of them are of this distribution.
+
+    Raises
+    ------
+    MisuseError : if it does not load.
+    """
+    found = load_formulation(member.formulation)
+    if isinstance(found, NotLoaded):
+        raise MisuseError("formulation", f"{member.formulation}, not loaded: {found.reason}", "one that loads")
+    return found

@@ -19,7 +19,7 @@ from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.strategies.named import named_case
 from contactverif.studies.paper import cast
 from contactverif.subject import Subject
-from contactverif_reports.paper_data import Forces, ForceTable, Member
+from contactverif_reports.paper_data import Forces, ForceTable, Member, Said, Statement
 
 _LARGEST_DENOMINATOR = 60
 _CASES: tuple[
@@ -34,12 +34,29 @@ _CASES: tuple[
         {"nts-ar": "5/3 10/3 7/3 8/3 2", "vts-me": "3/2 3 17/6 10/3 4/3", "vts-ppt": "3/2 3 3 3 3/2"},
     ),
 )
+_SAYS = {
+    "a1": "the right forces on the master are 2p, 2p",
+    "b": "NTS, given the right forces on the slave, hands wrong ones to the master; VTS-ME hands over the right ones",
+    "c": "NTS and VTS-ME hand wrong forces to the master; VTS-PPT hands over the right ones",
+}
 _EXACT = {"a1": "2 2", "b": "3/2 3 7/2 3 1", "c": "3/2 3 3 3 3/2"}  # printed, for the master
 
 
 def tables() -> tuple[ForceTable, ...]:
     """One table a case."""
     return tuple(_table(*case) for case in _CASES)
+
+
+def statement(table: ForceTable) -> Statement:
+    """What the paper says of it, beside it."""
+    ours = [row for row in table.rows if row.printed]
+    wrong = [row.member.legend for row in (table.exact, *ours) if row.printed != row.master]
+    found = "the consistent forces are the printed ones"
+    if ours:
+        found += f", and so are all {sum(len(row.printed) for row in ours)} fractions of the formulations on the master"
+    if wrong:
+        found = f"other fractions: {', '.join(wrong)}"
+    return Statement(table.figure, f"{table.title}: {_SAYS[table.case]}", found, Said.of(not wrong))
 
 
 def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple[Fraction, ...], float]:
@@ -67,7 +84,7 @@ def _table(name: str, title: str, figure: str, printed: dict[str, str]) -> Force
     exact_slave, exact_master = (tuple(weights[node] for node in side.tolist()) for side in from_left)
     exact = Forces(Member("exact", ""), exact_slave, exact_master, printed=_fractions(_EXACT[name]))
     rows = []
-    for member in cast.installed(cast.FORCES):
+    for member in cast.FORCES:
         said = _fractions(printed.get(member.formulation, ""))
         rows.append(_forces(case, member, *from_left, said))
     lengths = [tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:])]

@@ -8,7 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Sections 2, 5.1.3, 6 and 7.1.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from contactverif.oracle import uniform_pressure_weights
 from contactverif.scene import Scene
 from contactverif.studies.paper import cast
 from contactverif.studies.paper.patch import roundoff, stress_error
-from contactverif_reports.paper_data import Member, MultiplierRow
+from contactverif_reports.pages import number
+from contactverif_reports.paper_data import Member, MultiplierRow, Said, Statement
 
 SCENES = ("a1", "b", "example-1", "c", "c-prime", "example-1bis")
 EIGHT_ON_TWO = "eight on two"
@@ -32,11 +33,58 @@ SAID: Mapping[str, Mapping[str, int]] = {
 def multipliers(told: Callable[[str], None]) -> tuple[MultiplierRow, ...]:
     """A row for each formulation and scene; eight slave on two master segments for the rank."""
     rows = []
-    for member in cast.installed(cast.MULTIPLIERS):
+    for member in cast.MULTIPLIERS:
         told(f"patch tests of {member.formulation}")
         rows += [_row(member, name, catalogue.made(name)) for name in SCENES]
         rows.append(_row(member, EIGHT_ON_TWO, eight_on_two()))
     return tuple(rows)
+
+
+def statements(rows: Sequence[MultiplierRow], titles: Mapping[str, str]) -> tuple[Statement, ...]:
+    """What the paper says, beside it; `titles` is {scene: what the paper calls it}."""
+
+    def named(row: MultiplierRow) -> str:
+        return f"{row.member.legend.removesuffix(', multipliers')} on {titles.get(row.scene, row.scene)}"
+
+    def too_many(formulation: str) -> int:
+        return max(row.deficiency for row in rows if row.member.formulation == formulation)
+
+    spoken = [row for row in rows if row.said >= 0]
+    wrong = [named(row) for row in spoken if row.stress != (row.said == 1)]
+    found = f"{len(spoken) - len(wrong)} of {len(spoken)} verdicts on the stress are the same"
+    found += f"; others: {', '.join(wrong)}" if wrong else ""
+    hidden = [row for row in rows if row.stress and not row.uniform and "two-pass" not in row.member.formulation]
+    ranges = "; ".join(f"{named(row)}: {number(row.low)} to {number(row.high)}" for row in hidden)
+    short = [row for row in rows if row.deficiency and row.member.formulation == "vts-ppt-lm"]
+    counts = ", ".join(f"{row.deficiency} on {titles.get(row.scene, row.scene)}" for row in short)
+    return (
+        Statement(
+            "Sections 2, 5.1.3, 6, 7.1",
+            "with Lagrange multipliers one-pass NTS fails the patch test, two-pass NTS passes it, and VTS-PPT does",
+            found,
+            Said.of(not wrong),
+        ),
+        Statement(
+            "–",
+            "it is not said whether multipliers are uniform where the stress is",
+            f"some are not, over the exact pressure: {ranges}" if hidden else "all are",
+            Said.SILENT,
+        ),
+        Statement(
+            "Section 2",
+            "of NTS with multipliers one pass is stable and two passes are not (after El-Abbasi and Bathe)",
+            f"multipliers that are not unique: {too_many('nts-lm')} with one pass, up to {too_many('two-pass/nts-lm')} "
+            "with two",
+            Said.of(too_many("nts-lm") == 0 < too_many("two-pass/nts-lm")),
+        ),
+        Statement(
+            "Section 6.3",
+            "there is no proof of the inf-sup condition, but VTS-PPT might behave as the mortar method does",
+            f"with multipliers it does not: of VTS-PPT's {counts} are not unique, of the mortar method's "
+            f"{too_many('mortar-lm') or 'none'}",
+            Said.of(not too_many("vts-ppt-lm") > too_many("mortar-lm")),
+        ),
+    )
 
 
 def eight_on_two() -> Scene:
