@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import io
+import os
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -96,13 +100,14 @@ def verify(
     from contactverif.runner import run
     from contactverif.subject import Subject
     from contactverif.tables import RunTable, counterexample, show, show_as_it_is, summary
+    from contactverif_reports.files import made_folder
     from contactverif_reports.write import check_writable, write
 
     names = _chosen(names or [], all_)
     if report is not None:
         check_writable(report)
     if pictures is not None:
-        _folder(pictures)
+        made_folder(pictures, "--pictures")
     target, folder = (path and path.absolute() for path in (report, pictures))  # a plugin may change where we are
     chosen = _scene(scene, mesh)
     interface = _interface(mesh, slave, master, flip)
@@ -146,7 +151,9 @@ def compare(
     names: Annotated[
         list[str] | None, typer.Argument(help="Formulations; or two reports, OLD.nc NEW.nc.", metavar="NAME")
     ] = None,
-    against: Annotated[str | None, typer.Option(help="The formulation to compare with.", metavar="NAME")] = None,
+    against: Annotated[
+        list[str] | None, typer.Option(help="The formulation to compare with, one.", metavar="NAME")
+    ] = None,
     properties: Annotated[
         list[str] | None,
         typer.Option("--property", "-p", help="Only properties whose id matches; repeatable.", metavar="GLOB"),
@@ -196,7 +203,7 @@ def compare(
 
     paths = reports_in(names or [])
     asked = Asked(
-        against=against,
+        against=_only("--against", against or []),
         profile=profile,
         examples=examples,
         seed=seed,
@@ -339,15 +346,13 @@ def draw(
 
 @app.command()
 def paper(
-    out: Annotated[Path, typer.Option(help="Folder to write to, made if it is not there.", metavar="FOLDER")] = Path(
-        "paper"
-    ),
+    out: Annotated[str, typer.Option(help="Folder to write to, made if it is not there.", metavar="FOLDER")] = "paper",
 ) -> None:
     """Compute the reference paper's tables and figures again, beside what it says.
 
     Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416.
     Writes paper.html, one page with all of it; paper.nc, the numbers; and
-    each figure as SVG. Takes about a minute.
+    each figure as SVG. Takes a minute or two.
 
     \bExit status
       0  written; whether it agrees is what the page says
@@ -359,8 +364,10 @@ def paper(
     """
     from contactverif_reports.paper_page import N_FIGURES, check_folder, summary, write
 
-    check_folder(out)  # before what computes is imported, which takes its time
-    folder = out.absolute()  # a plugin may change where we are
+    if not out:  # as of a variable of the shell that is not set
+        raise MisuseError("--out", "''", "the name of a folder")
+    folder = Path(out).absolute()  # a plugin may change where we are
+    check_folder(folder)  # before what computes is imported, which takes its time
     from contactverif.progress import Bar
     from contactverif.studies.paper import compute, steps
 
@@ -375,7 +382,7 @@ def paper(
         found = compute(told)
         written = write(found, folder, told)
     typer.echo(summary(found))
-    typer.echo(f"{len(written)} files in {out}, to begin with: {out / written[-1].name}")
+    typer.echo(f"{len(written)} files in {out}, to begin with: {Path(out) / written[-1].name}")
 
 
 @app.command()
@@ -441,11 +448,10 @@ def _reason(text: str) -> tuple[str, str]:
     return property_id, reason
 
 
-def _folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MisuseError("--pictures", f"{path} ({error.strerror})", "a folder that can be written") from None
+def _only(option: str, given: list[str]) -> str | None:
+    if len(given) > 1:
+        raise MisuseError(option, f"{len(given)}: {', '.join(given)}", "one")
+    return given[0] if given else None
 
 
 def _file_name(formulation: str, property_id: str) -> str:
@@ -456,13 +462,25 @@ def _file_name(formulation: str, property_id: str) -> str:
 
 def main() -> None:
     """The command `contactverif`: a user's mistake is one line and exit status 2, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ≤ is shown a question mark
+            stream.reconfigure(errors="replace")
     try:
         status = app(standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:  # `| head` has seen enough
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115, since nothing can be said at the end of the process
+        sys.exit(128 + signal.SIGPIPE)
     except MisuseError as error:
         argument = _OPTIONS.get(error.argument, error.argument)
         _refuse(str(MisuseError(argument, error.found, error.needed)))
     except ContactverifError as error:
         _refuse(str(error))
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EIO, errno.EDQUOT):
+            raise
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        _refuse(f"what was found cannot be written: {error.strerror}")
     except typer.Abort:
         status = 130
     except Exception as error:

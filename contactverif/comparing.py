@@ -26,7 +26,7 @@ from contactverif.subject import Subject
 from contactverif.tables import show, show_as_it_is
 from contactverif_reports.compare_page import Drawing, changes_page, comparison_page
 from contactverif_reports.comparison import Differing
-from contactverif_reports.files import check_writable
+from contactverif_reports.files import check_writable, made_folder
 from contactverif_reports.pages import check_page, write_page
 from contactverif_reports.read import StoredCase, case_ids, read_case
 from contactverif_reports.regression import Changes
@@ -119,7 +119,7 @@ def compare_formulations(names: Sequence[str], globs: Sequence[str], html: Path 
     if html is not None:
         check_page(html)
     if asked.pictures is not None:
-        _make(asked.pictures)
+        made_folder(asked.pictures, "--pictures")
     # a plugin may change where we are
     target, page, folder = (path and path.absolute() for path in (asked.report, html, asked.pictures))
     questions = load_properties(globs or ["*"])
@@ -149,7 +149,7 @@ def compare_formulations(names: Sequence[str], globs: Sequence[str], html: Path 
         drawings = [_drawing(one, by_name, asked.against) for one in study.differing]
         write_page(page, comparison_page(study.comparison, study.differing, drawings, study.costs))
     show(SideBySide(study))
-    _show_meshes(study, by_name, folder, asked.pictures)
+    _show_meshes(study, by_name, folder, asked.pictures, drawn=page is not None)
     for what, path in (("report", asked.report), ("page", html)):
         if path is not None:
             typer.echo(f"{what}: {path}")
@@ -165,8 +165,10 @@ def _smallest_failing(changes: Changes) -> dict[str, StoredCase]:
     return {id_: read_case(changes.new.path, id_) for id_ in ids if id_ in kept}
 
 
-def _show_meshes(study: Study, subjects: dict[str, Subject], folder: Path | None, shown_as: Path | None) -> None:
-    """The meshes that tell most in the terminal, all of them in the folder."""
+def _show_meshes(
+    study: Study, subjects: dict[str, Subject], folder: Path | None, shown_as: Path | None, *, drawn: bool
+) -> None:
+    """The meshes that tell most in the terminal, all of them in the folder; `drawn`: and on a page."""
     reference = study.comparison.reference
     for place, one in enumerate(study.differing):
         if place < DRAWN:
@@ -175,7 +177,7 @@ def _show_meshes(study: Study, subjects: dict[str, Subject], folder: Path | None
             for name in _pictures(one, reference, subjects, folder):
                 typer.echo(f"    picture: {shown_as}/{name}")
     rest = study.differing[DRAWN:]
-    if rest and folder is None:
+    if rest and folder is None and not drawn:
         ids = ", ".join(one.question.id for one in rest)
         show(f"\nthey differ on {ids} too: --html FILE or --pictures FOLDER draws those")
 
@@ -225,10 +227,3 @@ def _read(path: Path, argument: str) -> StoredCells:
         return read_cells(path)
     except MisuseError as error:
         raise MisuseError(argument, error.found, error.needed) from None
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MisuseError("--pictures", f"{folder} ({error.strerror})", "a folder that can be written") from None

@@ -114,12 +114,14 @@ class Traits:
 
     Attributes
     ----------
-    passes_flat_patch : transmits a uniform pressure exactly across any flat interface that it covers.
+    passes_flat_patch : transmits a uniform pressure exactly across any flat interface that it covers; one by penalty
+        the pressure ε̂ |g|, so a law that is not linear promises nothing here.
     covers_overhang : does so too where the slave overhangs the master inside a slave segment.
     tangent : "exact" is the derivative of the residual on a frozen pairing; "approximate" is not.
     symmetric : the tangent is symmetric.
     conserves_force, conserves_moment : slave and master forces balance at any tilt and curvature.
-    continuity : how smooth the forces are while a node slides over master vertices, "C0" or "C1".
+    continuity : how smooth the forces are while a node slides over the vertices of a master that no line along the
+        normal meets twice, "C0" or "C1".
     area : the configuration in which areas of competence are measured; they add up to the slave's length, so that a
         uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
     penalty : "nodal" (force per length) or "distributed" (force per length per length of penetration); of a multiplier,

@@ -1,8 +1,15 @@
-"""The progress bar of a run, on standard error so that a table can be piped; nothing where nobody watches."""
+"""The progress bar of a run, on standard error so that a table can be piped; nothing where nobody watches.
+
+While it is up Ctrl-C ends the run at the next case at the latest: where Python itself drops the interrupt, in a
+callback of the garbage collector or of compiled code, the run would go on to its end otherwise.
+"""
 
 from __future__ import annotations
 
-from types import TracebackType
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
@@ -25,13 +32,23 @@ class Bar:
             disable=not console.is_terminal,
         )
         self._task: TaskID | None = None
+        self._interrupted = False
+        self._before: Any = None
 
     def __enter__(self) -> Bar:
+        if threading.current_thread() is threading.main_thread():  # nobody else may ask for signals
+            self._before = signal.signal(signal.SIGINT, self._interrupt)
         self._progress.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._progress.stop()
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self._interrupted = True
+        raise KeyboardInterrupt
 
     def told(self, step: runner.Progress) -> None:
         """One more case is done."""
@@ -39,6 +56,8 @@ class Bar:
 
     def at(self, description: str, done: int, planned: int) -> None:
         """So many of so many are done, and this comes next."""
+        if self._interrupted:
+            raise KeyboardInterrupt
         if self._progress.disable:
             return
         if self._task is None:

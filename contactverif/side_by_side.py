@@ -26,12 +26,14 @@ from contactverif_reports.regression import Change, Changes
 DIFFERS = "≠"
 REASON = 100  # characters of a reason
 WIDE = 112  # columns in which the table of errors has room for what went furthest
+NARROW = 76  # columns below which tables leave out what can be done without, so that names stay whole
+NAMES = 18  # columns that a name has at least
 DRAWN = 3  # meshes in a terminal; more would bury the tables
 _STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
 
 
 class SideBySide:
-    """All tables of a study, one below the other; each needs 80 columns for a reference and two candidates."""
+    """All tables of a study, one below the other; each has all its columns from 80 on."""
 
     def __init__(self, study: Study) -> None:
         self._study = study
@@ -45,17 +47,18 @@ class SideBySide:
         )
         yield Text("")
         yield verdicts_table(found)
-        yield errors_table(found, with_worst=options.max_width >= WIDE)
+        narrow = options.max_width < NARROW
+        yield errors_table(found, with_worst=options.max_width >= WIDE, with_counts=not narrow)
         if found.iterations:
-            yield iterations_table(found)
-        yield cost_table(self._study)
+            yield iterations_table(found, with_counts=not narrow)
+        yield cost_table(self._study, with_parts=not narrow)
         for name, reason in found.not_loaded.items():
             yield Text(f"{name}: not loaded: {reason}", style="red")
 
 
 def verdicts_table(found: Comparison) -> Table:
     """A line a property, a column a formulation; what differs from the reference is marked."""
-    table = _table(f"verdicts ({DIFFERS}: not that of {found.reference})")
+    table = plain_table(f"verdicts ({DIFFERS}: not that of {found.reference})")
     table.add_column("property", no_wrap=True)
     for name in found.formulations:
         table.add_column(name, overflow="fold")
@@ -74,16 +77,17 @@ def _verdict(cell: Cell | None, reference: Cell | None) -> Text:
     return Text(said, style=_STYLES.get(cell.verdict, "dim"))
 
 
-def errors_table(found: Comparison, *, with_worst: bool = True) -> Table:
+def errors_table(found: Comparison, *, with_worst: bool = True, with_counts: bool = True) -> Table:
     """For each property how far each formulation went towards its tolerance, and beside the reference case by case.
 
     Parameters
     ----------
     with_worst : the number that went furthest too, for which there is no room in 80 columns.
+    with_counts : numbers of cases that are better, equal and worse.
     """
-    table = _table(f"error over tolerance, above 1 fails; ratio and numbers of cases beside {found.reference}")
-    table.add_column("", overflow="fold")
-    for column in ("median", "worst", "ratio", "better", "equal", "worse"):
+    table = plain_table(f"error over tolerance, above 1 fails; ratio and numbers of cases beside {found.reference}")
+    table.add_column("", overflow="fold", min_width=NAMES)
+    for column in ("median", "worst", "ratio", *(("better", "equal", "worse") if with_counts else ())):
         table.add_column(column, justify="right", no_wrap=True)
     if not with_worst:
         table.padding = (0, 1, 0, 0)
@@ -98,20 +102,21 @@ def errors_table(found: Comparison, *, with_worst: bool = True) -> Table:
             if isnan(cell.worst):
                 continue
             paired = found.paired.get((cell.formulation, property_id))
-            beside = [""] * 4
+            beside = [""] * (4 if with_counts else 1)
             if paired is not None:
-                beside = [number(paired.ratio), *map(str, (paired.better, paired.equal, paired.worse))]
+                counts = map(str, (paired.better, paired.equal, paired.worse))
+                beside = [number(paired.ratio), *(counts if with_counts else ())]
             worst = f"{number(cell.worst_value)} {cell.worst_quantity}" if cell.worst_quantity else ""
             errors = (number(cell.median), number(cell.worst))
             table.add_row(f"  {cell.formulation}", *errors, *beside, *([worst] if with_worst else []))
     return table
 
 
-def iterations_table(found: Comparison) -> Table:
+def iterations_table(found: Comparison, *, with_counts: bool = True) -> Table:
     """For each property that solves: how many iterations, and beside the reference where both converged."""
-    table = _table(f"Newton iterations where it converged; numbers of cases beside {found.reference}")
-    table.add_column("", overflow="fold")
-    for column in ("converged", "median", "most", "fewer", "same", "more", "order"):
+    table = plain_table(f"Newton iterations where it converged; numbers of cases beside {found.reference}")
+    table.add_column("", overflow="fold", min_width=NAMES)
+    for column in ("converged", "median", "most", *(("fewer", "same", "more") if with_counts else ()), "order"):
         table.add_column(column, justify="right", no_wrap=True)
     before = None
     for line in found.iterations:
@@ -126,17 +131,18 @@ def iterations_table(found: Comparison) -> Table:
             f"{line.converged}/{line.solved}",
             number(line.median),
             number(line.most),
-            *beside,
+            *(beside if with_counts else ()),
             "" if isnan(line.order) else number(line.order),
         )
     return table
 
 
-def cost_table(study: Study) -> Table:
+def cost_table(study: Study, *, with_parts: bool = True) -> Table:
     """Time of an evaluation on shared states, in turns."""
-    table = _table(f"time of one evaluation, µs, in turns on the same state; ratio to {_of(study)}")
-    table.add_column("", overflow="fold")
-    for column in (*PARTS, "all", "a segment", "ratio"):
+    parts = PARTS if with_parts else ()
+    table = plain_table(f"time of one evaluation, µs, in turns on a flat interface; ratio to {_of(study)}")
+    table.add_column("", overflow="fold", min_width=NAMES)
+    for column in (*parts, "all", "a segment", "ratio"):
         table.add_column(column, justify="right", no_wrap=True)
     reference = {cost.n_segments: cost.total for cost in study.costs if cost.formulation == _of(study)}
     before = 0
@@ -145,15 +151,15 @@ def cost_table(study: Study) -> Table:
             table.add_row(Text(f"{cost.n_segments} slave segments", style="bold"))
         before = cost.n_segments
         if cost.failed:
-            table.add_row(f"  {cost.formulation}", *["–"] * (len(PARTS) + 2), "–")
+            table.add_row(f"  {cost.formulation}", *["–"] * (len(parts) + 3))
             continue
         total = cost.total
         table.add_row(
             f"  {cost.formulation}",
-            *(_micro(cost.seconds[part]) for part in PARTS),
+            *(_micro(cost.seconds[part]) for part in parts),
             _micro(total),
             f"{1e6 * total / cost.n_segments:.2f}",
-            f"{total / reference[cost.n_segments]:.2f}",
+            _ratio(total, reference[cost.n_segments]),
         )
     return table
 
@@ -218,7 +224,7 @@ class ChangesTable:
 def moved_verdicts(found: Changes) -> Table:
     """Verdicts, numbers of cases, time: a line for each row that both have."""
     table = plain_table("verdict, old → new; cases better, equal, worse; time of a case, new/old (decides nothing)")
-    table.add_column("", overflow="fold")
+    table.add_column("", overflow="fold", min_width=NAMES)
     table.add_column("verdict", no_wrap=True)
     for column in ("better", "equal", "worse", "time"):
         table.add_column(column, justify="right", no_wrap=True)
@@ -231,7 +237,7 @@ def moved_verdicts(found: Changes) -> Table:
 def moved_errors(found: Changes) -> Table:
     """Errors where they are not what they were."""
     table = plain_table("error over tolerance, old → new, where it changed")
-    table.add_column("", overflow="fold")
+    table.add_column("", overflow="fold", min_width=NAMES)
     for column in ("median", "worst"):
         table.add_column(column, no_wrap=True)
     moved = [change for change in found.changes if _has_moved(change)]
@@ -262,7 +268,7 @@ def _indented(change: Change) -> str:
 def moved_iterations(found: Changes) -> Table:
     """Newton iterations where they are not what they were."""
     table = plain_table("Newton iterations that changed, old → new, where it converged")
-    table.add_column("", overflow="fold")
+    table.add_column("", overflow="fold", min_width=NAMES)
     for column in ("converged", "median", "most"):
         table.add_column(column, no_wrap=True)
     for column in ("fewer", "same", "more"):
@@ -311,7 +317,11 @@ def conclusion(found: Comparison) -> Text:
     wrong = [f"{cell.formulation} {cell.property_id} ({cell.unexpected})" for cell in found.unexpected]
     wrong += [f"{name} (not loaded)" for name in found.not_loaded]
     if found.kept:
-        return Text(f"every promise of {', '.join(found.formulations[1:])} kept", style="green")
+        fails = any(
+            cell.verdict is Verdict.FAIL for cell in found.cells.values() if cell.formulation != found.reference
+        )
+        announced = "; what fails was announced, or nothing was said of it" if fails else ""
+        return Text(f"every promise of {', '.join(found.formulations[1:])} kept{announced}", style="green")
     return Text(f"{len(wrong)} unexpected: {'; '.join(wrong)}" if wrong else "nothing was asked", style="red")
 
 
@@ -324,9 +334,9 @@ def _of(study: Study) -> str:
     return study.comparison.reference
 
 
+def _ratio(one: float, other: float) -> str:
+    return "–" if isnan(one) or isnan(other) else f"{one / other:.2f}"
+
+
 def _micro(seconds: float) -> str:
     return "–" if isnan(seconds) else f"{1e6 * seconds:.1f}"
-
-
-def _table(title: str) -> Table:
-    return plain_table(title)

@@ -9,8 +9,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -137,7 +136,7 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
     normals : "segment" (default), or "averaged" at slave nodes and interpolated in between, which is smoother and fails
         the patch test on a kinked surface.
     """
-    return Mortar(_traits(area, False), check_penalty(penalty), _weighting(area, normals, False))
+    return Mortar(_traits(area, normals, False), check_penalty(penalty), _weighting(area, normals, False))
 
 
 def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:
@@ -145,7 +144,7 @@ def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segmen
 
     Parameters are those of `mortar`.
     """
-    return Mortar(_traits(area, True), check_penalty(penalty), _weighting(area, normals, True))
+    return Mortar(_traits(area, normals, True), check_penalty(penalty), _weighting(area, normals, True))
 
 
 def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
@@ -156,7 +155,7 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
     penalty : c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length; the solution does not depend on it.
     area, normals : as for `mortar`.
     """
-    traits = _traits(area, False, enforcement="multiplier", independent_multipliers=True)
+    traits = _by_multipliers(_traits(area, normals, False))
     return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, False))
 
 
@@ -165,7 +164,7 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
 
     Parameters are those of `mortar_lm`.
     """
-    traits = _traits(area, True, enforcement="multiplier", independent_multipliers=True)
+    traits = _by_multipliers(_traits(area, normals, True))
     return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, True))
 
 
@@ -175,7 +174,12 @@ def _weighting(area: str, normals: str, dual: bool) -> Weighting:
     return Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, chosen("area", area, AREAS)))
 
 
-def _traits(area: str, dual: bool, **enforcement: Any) -> Traits:
+def _by_multipliers(traits: Traits) -> Traits:
+    """At given multipliers forces jump where a node is let go."""
+    return replace(traits, enforcement="multiplier", independent_multipliers=True, continuity=None)
+
+
+def _traits(area: str, normals: str, dual: bool) -> Traits:
     return Traits(
         passes_flat_patch=True,
         covers_overhang=True,
@@ -183,11 +187,11 @@ def _traits(area: str, dual: bool, **enforcement: Any) -> Traits:
         symmetric=False,  # forces are along the slave's normal, the gradient of the gap is not
         conserves_force=True,
         conserves_moment=True,
-        continuity="C0",
+        # averaged directions of a coarse ring turn away from a segment that is still seen, and its cell is gone at once
+        continuity=None if chosen("normals", normals, NORMALS) else "C0",
         area="current" if chosen("area", area, AREAS) else "reference",
         penalty="distributed",
         batched=True,
         takes_complex=True,
         source=_SOURCES[dual],
-        **enforcement,
     )

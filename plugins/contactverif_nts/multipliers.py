@@ -48,20 +48,22 @@ def vts_me_lm(*, penalty: float, n: int = 2, area: str = "current", tau: float =
 
 
 def vts_ppt_lm(
-    *, penalty: float, n: int = 2, transmission: str = "printed", free_end: str = "truncate", tau: float = 1e-2
+    *, penalty: float, n: int = 2, transmission: str = "printed", free_end: str = "", tau: float = 1e-2
 ) -> PatchTestPassing:
     """VTS-PPT with a multiplier at each virtual slave node, a pressure that both sides are given.
 
-    Its forces are spread by Box 3 and its gaps are those of Eq. 6, so that the saddle point is unsymmetric.
+    Its forces are spread by Box 3 and its gaps are those of Eq. 6, so that the saddle point is unsymmetric. With a fine
+    slave it is singular: multipliers are not unique, and then not always positions either, so that Newton's method
+    finds no solution though the exact one is one (case C with each cell divided by two). n = 1 has none of this.
 
     Parameters
     ----------
     penalty : scale c > 0 of the decision λ − c g ≥ 0, force per length per length.
     transmission : "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
-    n, free_end, tau : as for `vts_ppt`; the balanced one conserves force and moment where free_end is "cover".
+    n, free_end, tau : as for `vts_ppt` or `vts_ppt_balanced`, free_end with the default of the one chosen.
     """
     springs = chosen("transmission", transmission, {"printed": vts_ppt, "balanced": vts_ppt_balanced})
-    held = springs(penalty=penalty, n=n, free_end=free_end, tau=tau)
+    held = springs(penalty=penalty, n=n, tau=tau, **({"free_end": free_end} if free_end else {}))
     return replace(held, traits=_of_virtual_slave_nodes(held.traits, n))
 
 

@@ -162,7 +162,8 @@ class Paired:
     Attributes
     ----------
     n, better, equal, worse : numbers of cases.
-    ratio : median over the cases of the one's margin over the other's; NaN where there is none.
+    ratio : median over the cases of the one's margin over the other's, where one within its tolerance counts as at it:
+        below it all is roundoff. NaN where there is none.
     decades : (n_cases,) how many powers of ten beyond the tolerance the one is further than the other; within it counts
         as at it. Negative where the other is further, NaN where one of them is undecided.
     apart : (n_cases,) one passes and the other does not.
@@ -215,7 +216,8 @@ class Paired:
 
 def _median_ratio(a: FloatArray, b: FloatArray) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs = np.where(a == b, 0.0, np.log(a) - np.log(b))  # equal: both 0 or infinite too
+        beyond = [np.log(np.fmax(margins, 1.0)) for margins in (a, b)]
+        logs = np.where(a == b, 0.0, beyond[0] - beyond[1])  # equal: both infinite too
         return float(np.exp(np.median(logs))) if len(logs) else nan
 
 

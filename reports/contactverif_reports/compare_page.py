@@ -124,7 +124,7 @@ def _costs(costs: Sequence[Cost], reference: str) -> list[tuple[int, list[dict[s
                 "formulation": cost.formulation,
                 "failed": cost.failed,
                 "times": [*map(_micro, seconds), _micro(cost.total / cost.n_segments, digits=2)],
-                "ratio": "–" if isnan(cost.total) else f"{cost.total / of[cost.n_segments]:.2f}",
+                "ratio": "–" if isnan(cost.total / of[cost.n_segments]) else f"{cost.total / of[cost.n_segments]:.2f}",
             }
         )
     return list(lines.items())

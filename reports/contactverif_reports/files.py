@@ -58,6 +58,21 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--report", for
         ) from error
 
 
+def made_folder(folder: Path, argument: str) -> None:
+    """Makes the folder, and those above it, if it is not there.
+
+    Raises
+    ------
+    MisuseError : if it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise MisuseError(argument, f"{folder}, which is no folder", "a folder that can be written") from None
+    except OSError as error:
+        raise MisuseError(argument, f"{folder} ({error.strerror})", "a folder that can be written") from None
+
+
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary file to write to, which takes the place of `path` when the block ends well.

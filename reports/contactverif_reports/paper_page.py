@@ -11,8 +11,7 @@ import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from contactverif.errors import MisuseError
-from contactverif_reports.files import check_writable, whole
+from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.pages import render, svg_inline, write_page
 from contactverif_reports.paper_data import MultiplierRow, Paper, Said
 from contactverif_reports.paper_figures import drawings
@@ -58,12 +57,7 @@ def check_folder(folder: Path, argument: str = "--out") -> None:
     ------
     MisuseError : if it cannot be made or written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise MisuseError(argument, f"{folder}, which is no folder", "a folder that can be written") from None
-    except OSError as error:
-        raise MisuseError(argument, f"{folder} ({error.strerror})", "a folder that can be written") from None
+    made_folder(folder, argument)
     for name in (NUMBERS, PAGE):
         check_writable(folder / name, argument, f"a folder that may hold {name}")
 

@@ -98,7 +98,10 @@ def draw_arrows(
         tip = max((values[node] for values in given), key=lambda force: float(force @ force))
         reach = float(np.linalg.norm(tip))
         if reach > 0:
-            said = f"{sizes[-1]:.3g}" + (f" ≠ {sizes[0]:.3g}" if abs(sizes[0] - sizes[-1]) > 1e-6 * largest else "")
+            said = f"{sizes[-1]:.3g}"
+            if abs(sizes[0] - sizes[-1]) > 1e-6 * largest:
+                digits = next(d for d in range(3, 17) if f"{sizes[-1]:.{d}g}" != f"{sizes[0]:.{d}g}")
+                said = f"{sizes[-1]:.{digits}g} ≠ {sizes[0]:.{digits}g}"
             place = nodes[node] + tip * (longest / largest)
             _write(axes, said, place, 7 * tip / reach, fontsize=7, color="black", zorder=7)
 

@@ -22,7 +22,8 @@ from contactverif_reports.pages import number
 from contactverif_reports.paper_data import Member, MultiplierRow, Said, Statement
 
 SCENES = ("a1", "b", "example-1", "c", "c-prime", "example-1bis")
-EIGHT_ON_TWO = "eight on two"
+PPT = next(member for member in cast.MULTIPLIERS if member.formulation == "vts-ppt-lm")
+EIGHT_ON_TWO, REFINED = "eight on two", "C with halved cells"
 SAID: Mapping[str, Mapping[str, int]] = {
     "nts-lm": {"example-1": 0},
     "two-pass/nts-lm": {"b": 1, "example-1": 1},
@@ -31,11 +32,12 @@ SAID: Mapping[str, Mapping[str, int]] = {
 
 
 def multipliers(told: Callable[[str], None]) -> tuple[MultiplierRow, ...]:
-    """A row for each formulation and scene; eight slave on two master segments for the rank."""
+    """A row for each formulation and scene; eight slave on two master segments, and case C finer, for the rank."""
     rows = []
     for member in cast.MULTIPLIERS:
         told(f"patch tests of {member.formulation}")
         rows += [_row(member, name, catalogue.made(name)) for name in SCENES]
+        rows.append(_row(member, REFINED, catalogue.made("c", refine=2)))
         rows.append(_row(member, EIGHT_ON_TWO, eight_on_two()))
     return tuple(rows)
 
@@ -81,7 +83,8 @@ def statements(rows: Sequence[MultiplierRow], titles: Mapping[str, str]) -> tupl
             "Section 6.3",
             "there is no proof of the inf-sup condition, but VTS-PPT might behave as the mortar method does",
             f"with multipliers it does not: of VTS-PPT's {counts} are not unique, of the mortar method's "
-            f"{too_many('mortar-lm') or 'none'}",
+            f"{too_many('mortar-lm') or 'none'}. On C with halved cells positions are not unique either, and Newton's "
+            f"method ends: {next(row.end for row in rows if row.member == PPT and row.scene == REFINED)}",
             Said.of(not too_many("vts-ppt-lm") > too_many("mortar-lm")),
         ),
     )
