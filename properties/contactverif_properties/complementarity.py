@@ -84,7 +84,7 @@ COMPLEMENTARITY = Property(
     quantities=(PULLING, MOVED),
     cases=solid_cases,
     measure=solved_with_multipliers,
-    promise=lambda traits: True,
+    promise=lambda traits: None if _has_multipliers(traits) else True,
     applicable=_has_multipliers,
     bodies=True,
 )

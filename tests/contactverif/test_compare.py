@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from contactverif.case import Case
+from contactverif.catalogue import scene_named
 from contactverif.errors import MisuseError
 from contactverif.interface import Interface
-from contactverif.newton import End
+from contactverif.newton import End, solve
 from contactverif.property import Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.registry import load_formulation, load_properties
 from contactverif.result import NotLoaded, Row, Run
@@ -21,9 +22,10 @@ from contactverif.side_by_side import outcome_of
 from contactverif.studies.compare import compared, differing
 from contactverif.studies.cost import measured, state
 from contactverif.subject import Subject
-from contactverif_reports.cells import Cell, Paired
+from contactverif_properties.newton import NEWTON_ORDER, ended
+from contactverif_reports.cells import ORDER, Cell, Paired
 from contactverif_reports.compare_page import changes_page, comparison_page
-from contactverif_reports.comparison import Comparison
+from contactverif_reports.comparison import CONVERGED, END, ITERATIONS, Comparison
 from contactverif_reports.regression import ALPHA, Changes, change, few, shift, wandering
 from contactverif_reports.stored_cells import StoredCells, read_cells
 from contactverif_reports.write import write
@@ -130,7 +132,9 @@ def test_pairs_are_counted_case_by_case() -> None:
 def test_the_ratio_is_the_median_of_ratios_on_the_same_cases() -> None:
     assert Paired.of(cell(2.0, 8.0, 64.0), cell(1.0, 2.0, 8.0)).ratio == pytest.approx(4.0)
     assert Paired.of(cell(0.0, 0.0), cell(0.0, 0.0)).ratio == 1.0
-    assert Paired.of(cell(0.5), cell(0.0)).ratio == inf
+    assert Paired.of(cell(0.5), cell(0.0)).ratio == 1.0  # within the tolerance all is roundoff
+    assert Paired.of(cell(40.0), cell(1e-6)).ratio == pytest.approx(40.0)
+    assert Paired.of(cell(Verdict.FAIL), cell(0.5)).ratio == inf
     assert isnan(Paired.of(cell(Verdict.UNDECIDED), cell(1.0)).ratio)
 
 
@@ -173,7 +177,7 @@ def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     assert found.not_loaded == {"mine": "no module"}
     paired = found.paired["vts-me", "patch.flat.transmission"]
     assert (paired.better, paired.equal, paired.worse) == (0, 1, 2)
-    assert paired.ratio == pytest.approx(128.0)
+    assert paired.ratio == pytest.approx(32.0)  # the median of 64, 1 (both within) and 32
 
 
 def test_the_mesh_that_is_drawn_is_the_small_one() -> None:
@@ -570,3 +574,14 @@ def test_a_page_escapes_what_a_plugin_calls_itself() -> None:
     page = comparison_page(comparison, (), (), ())
     assert "<script" not in page
     assert page == comparison_page(comparison, (), (), ())
+
+
+def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -> None:
+    """They share no code, so they must share words: else columns would be empty, and nobody would notice."""
+    assert NEWTON_ORDER.quantities[0].name == ORDER == SLOPE.name
+    scene = scene_named("c")
+    subject = load_formulation("vts-ppt")
+    assert isinstance(subject, Subject)
+    told = ended(solve(scene, subject.on(scene.case())))
+    assert {ITERATIONS, END} <= set(told)
+    assert told[END] == CONVERGED == End.CONVERGED

@@ -78,9 +78,9 @@ def statements(found: Tangents) -> tuple[Statement, ...]:
         Statement(
             "Section 6.3",
             "an exact tangent of a segment-to-segment formulation is practically unfeasible, with up to 392 terms",
-            f"the plugin sts has one: it differs from a complex step by {number(found.error[sts], 2)}, a Newton step is of order "
-            f"{found.order[sts]:.2f}, and {found.iterations[sts]} iterations solve Example 1bis. Each number of a "
-            "point carries its derivatives along, so that no term is written by hand",
+            f"the plugin sts has one: it differs from a complex step by {number(found.error[sts], 2)}, a step of "
+            f"Newton’s method is of order {found.order[sts]:.2f}, and {found.iterations[sts]} iterations solve Example "
+            "1bis. Each number of a point carries its derivatives along, so that no term is written by hand",
             Said.of(not found.error[sts] <= _EXACT),
         ),
     )
