@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -38,17 +38,24 @@ _FEW = 3  # quantities that are written with their formulas
 _NUMBERS = _COLUMNS[3:]  # at the right end of their columns
 
 
+class _Console(Console):
+    """One that does not end the process by itself where nobody reads on; `cli.main` knows what that is worth."""
+
+    def on_broken_pipe(self) -> NoReturn:
+        raise BrokenPipeError
+
+
 def show(what: RenderableType) -> None:
     """Print to standard output, as wide as the terminal, or wide enough where there is none."""
     told = sys.stdout.isatty() or "COLUMNS" in os.environ
     # Words of a plugin may hold square brackets, which are no markup.
-    console = Console(width=None if told else _PIPE_WIDTH, highlight=False, markup=False)
+    console = _Console(width=None if told else _PIPE_WIDTH, highlight=False, markup=False)
     console.print(what)
 
 
 def show_as_it_is(text: Text) -> None:
     """Print without folding a line: a drawing, or a command that is to be copied."""
-    Console(highlight=False, markup=False).print(text, soft_wrap=True)
+    _Console(highlight=False, markup=False).print(text, soft_wrap=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from expected_verdicts import (
+    COMPLEMENTARITY,
     DEAD_ZONE,
     FAILS,
     FORCE,
@@ -287,7 +288,7 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
     assert not found.passed
     judged = {row.question.id: row.verdict for row in found.rows}
     assert {judged.pop(name) for name in (*PATCHES, "unilateral")} == {Verdict.FAIL}
-    assert {judged.pop(name) for name in (RESULTANT, RANK)} == {Verdict.NOT_APPLICABLE}
+    assert {judged.pop(name) for name in (RESULTANT, RANK, COMPLEMENTARITY)} == {Verdict.NOT_APPLICABLE}
     assert set(judged.values()) == {Verdict.NOT_JUDGED}
 
 

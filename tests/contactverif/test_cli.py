@@ -106,7 +106,7 @@ MISTAKES = [
     (["verify", "nts", "--report", ""], r"--report: found .*; needed .*"),
     (["verify", "nts", "--report", "no/such/folder/nts.nc"], r"--report: .* is no folder; needed a folder that exists"),
     (["verify", "nts", "--report", "."], r"--report: found .*, a folder; needed the name of a file, FILE.nc"),
-    (["verify", "nts", "--pictures", str(PUNCH)], r"--pictures: found .*punch.msh .*; needed a folder that can be .*"),
+    (["verify", "nts", "--pictures", str(PUNCH)], r"--pictures: found .*punch.msh, which is no folder; needed .*"),
     (["verify", "nts", "--mesh", "no.msh", "--slave", "a", "--master", "b"], r"--mesh: found 'no.msh', .*; needed .*"),
     (["verify", "nts", "--mesh", str(PUNCH), "--slave", "punch"], r"--master: found nothing; needed --master TAG, .*"),
     (["verify", "nts", "--mesh", str(PUNCH), "--master", "base"], r"--slave: found nothing; needed --slave TAG, .*"),

@@ -88,7 +88,7 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
         }
         assert "barrier" in said["barrier"]
         assert not said["multiplier"]
-        assert bool(said["penalty"]) is (question.id == "multipliers.rank")
+        assert bool(said["penalty"]) is (question.id in ("multipliers.rank", "complementarity"))
 
 
 class Pair(Handmade):

@@ -14,7 +14,7 @@ from contactverif.case import Case
 from contactverif.errors import MisuseError
 from contactverif.property import Verdict
 from contactverif_reports import schema
-from contactverif_reports.read import case_ids, read_case, same_data
+from contactverif_reports.read import case_ids, opened, read_case, same_data
 from contactverif_reports.write import write
 
 
@@ -101,3 +101,13 @@ def test_a_damaged_case_is_said_to_be_one(report: Path) -> None:
         file["counterexamples/vts-me_n_4.objectivity/case/zz"].delncattr("case_array")
     with pytest.raises(MisuseError, match="undamaged"):
         read_case(report, "vts-me_n_4.objectivity")
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("NetCDF: HDF error"), KeyError("gone"), ValueError("99"), OSError(5, "Input/output error")]
+)
+def test_what_is_damaged_in_a_report_is_one_line(report: Path, error: Exception) -> None:
+    said = r"report.nc, which cannot be read \(.*\); needed an undamaged report"
+    with pytest.raises(MisuseError, match=said) as told, opened(report):
+        raise error
+    assert "\n" not in str(told.value)
