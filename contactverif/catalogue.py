@@ -99,7 +99,7 @@ BLOCKS: Mapping[str, NamedBlocks] = {
         [3, 3, 4, 2],
     ),
     "c": NamedBlocks(
-        "non-matching; areas of competence cross master nodes, one virtual slave node sits on one",
+        "non-matching; one area of competence lies over a master node, its virtual slave node on it",
         "case test C, Fig. 20",
         _MATERIAL,
         [2, 2, 4, 4],
@@ -306,7 +306,6 @@ def _refused(name: str, option: str, value: Any) -> str:
     return "" if isfinite(number) else "a finite number"
 
 
-OPTIONS = tuple(dict.fromkeys(option for name in SCENES for option in options_of(name)))
 _ABOVE_ZERO = ("penalty", "young", "ratio", "pressure", "force")
 _FINEST, _FINEST_DISK = 64, 4  # that disk has 65,000 cells
 

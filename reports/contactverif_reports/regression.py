@@ -80,7 +80,6 @@ class Changes:
     Attributes
     ----------
     changes : rows that both have.
-    same_seed : whether both say that they drew the same cases; each row has checked it.
     gone, added : what only the old, only the new report asked: names of formulations, ids of properties, or rows.
     lost : {name: reason} of what the old report asked, and the new one could not load.
     """
@@ -88,7 +87,6 @@ class Changes:
     old: StoredCells
     new: StoredCells
     changes: tuple[Change, ...]
-    same_seed: bool
     gone: tuple[str, ...]
     added: tuple[str, ...]
     lost: Mapping[str, str]
@@ -124,7 +122,6 @@ class Changes:
                 for key, cell in old.cells.items()
                 if key in new.cells
             ),
-            same_seed=same_seed,
             gone=_only(old, new),
             added=_only(new, old),
             lost={

@@ -31,13 +31,11 @@ class StoredProperty:
     id : as typed with --property.
     summary : what is asked.
     quantities : what is measured, with units, formulas and their reasons.
-    needs : parts of the contract without which there is nothing to ask, in words.
     """
 
     id: str
     summary: str
     quantities: tuple[Quantity, ...]
-    needs: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +188,7 @@ class _Group:
     def __init__(self, group: Any) -> None:
         columns = ("quantity", "quantity_units", "tolerance_formula", "tolerance_reason", "sense")
         quantities = (Quantity(*row) for row in zip(*(_words(group, name) for name in columns), strict=True))
-        self.asked = StoredProperty(str(group.property_id), str(group.summary), tuple(quantities), str(group.needs))
+        self.asked = StoredProperty(str(group.property_id), str(group.summary), tuple(quantities))
         names = ("reason", *(f"witness{of}" for of in ("", "_verdict", "_reason", "_value", "_tolerance")))
         self._arrays = {name: group[name][...] for name in names if name in group.variables}
 
