@@ -114,7 +114,9 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
     try:
         report = netCDF4.Dataset(Path(path).resolve())
     except (OSError, RuntimeError) as error:
-        raise MisuseError(_ARGUMENT, f"{found}, which is no netCDF file ({error})", "a report (netCDF-4)") from error
+        raise MisuseError(
+            _ARGUMENT, f"{found}, which is no netCDF file or a damaged one ({error})", "a report (netCDF-4)"
+        ) from error
     try:
         with report:
             _check_schema(report, found)
