@@ -306,6 +306,7 @@ def _refused(name: str, option: str, value: Any) -> str:
     return "" if isfinite(number) else "a finite number"
 
 
+OPTIONS = tuple(dict.fromkeys(option for name in SCENES for option in options_of(name)))
 _ABOVE_ZERO = ("penalty", "young", "ratio", "pressure", "force")
 _FINEST, _FINEST_DISK = 64, 4  # that disk has 65,000 cells
 
