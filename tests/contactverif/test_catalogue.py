@@ -11,7 +11,7 @@ import pytest
 from contactverif import catalogue, newton
 from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
-from contactverif.catalogue import BLOCKS, SCENES, made, options_of, scene_named
+from contactverif.catalogue import BLOCKS, OPTIONS, SCENES, made, options_of, scene_named
 from contactverif.disk import disk_on_foundation
 from contactverif.errors import MisuseError
 from contactverif.names import parsed, unknown
@@ -200,9 +200,7 @@ def test_options_from_text_are_those_of_python() -> None:
         "c": {},
         "example-2:force=2e6,ratio=1": {"force": 2e6, "ratio": 1},
     }
-    assert {option for options in texts.values() for option in options} == {
-        option for name in SCENES for option in options_of(name)
-    }
+    assert {option for options in texts.values() for option in options} == set(OPTIONS)
     for text, options in texts.items():
         one, other = scene_named(text).case().to_arrays(), made(text.partition(":")[0], **options).case().to_arrays()
         assert all(np.array_equal(one[key], other[key]) for key in one), text
