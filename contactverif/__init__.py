@@ -1,24 +1,93 @@
 """contactverif tells whether a contact formulation is right.
 
-The names a plugin author needs, and nothing that takes long to import.
+The names that a plugin, a test or a script needs. Each is imported at its first use, so that importing `contactverif`
+takes no longer than importing Python's own library.
 """
 
-from contactverif.case import Case
-from contactverif.errors import ContactverifError, ContractError, MisuseError
-from contactverif.formulation import ContactPoints, Formulation, Pairing, ResidualOnly, Traits
-from contactverif.interface import Interface, Surface
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contactverif.contract.body import Body
+    from contactverif.contract.case import Case
+    from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
+    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly, Traits
+    from contactverif.contract.interface import Interface, Surface
+    from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
+    from contactverif.contract.result import Row, Run
+    from contactverif.contract.subject import CheckedFormulation, Subject
+    from contactverif.mechanics.bulk import body_from_mesh
+    from contactverif.mechanics.newton import End, Trace, solve
+    from contactverif.mechanics.scene import Scene
+    from contactverif.meshes.mesh_file import read_interface
+    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.run.runner import judge_case, run
+    from contactverif.scenes.catalogue import scene_named
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "contract.body": ("Body",),
+    "contract.case": ("Case",),
+    "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
+    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly", "Traits"),
+    "contract.interface": ("Interface", "Surface"),
+    "contract.property": ("Measurement", "Outcome", "Property", "Quantity", "Verdict"),
+    "contract.result": ("Row", "Run"),
+    "contract.subject": ("CheckedFormulation", "Subject"),
+    "mechanics.bulk": ("body_from_mesh",),
+    "mechanics.newton": ("End", "Trace", "solve"),
+    "mechanics.scene": ("Scene",),
+    "meshes.mesh_file": ("read_interface",),
+    "run.registry": ("load_formulation", "load_properties"),
+    "run.runner": ("judge_case", "run"),
+    "scenes.catalogue": ("scene_named",),
+}
+_MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Body",
     "Case",
+    "CheckedFormulation",
     "ContactPoints",
     "ContactverifError",
     "ContractError",
+    "End",
     "Formulation",
     "Interface",
+    "Measurement",
     "MisuseError",
+    "Outcome",
     "Pairing",
+    "Property",
+    "Quantity",
     "ResidualOnly",
+    "Row",
+    "Run",
+    "Scene",
+    "Subject",
     "Surface",
+    "Trace",
     "Traits",
+    "Verdict",
+    "body_from_mesh",
+    "judge_case",
+    "load_formulation",
+    "load_properties",
+    "read_interface",
+    "run",
+    "scene_named",
+    "solve",
 ]
-__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULE_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

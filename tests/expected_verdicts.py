@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from contactverif.property import Verdict
-from contactverif.registry import property_ids
+from contactverif.contract.property import Verdict
+from contactverif.run.registry import property_ids
 
 README = Path(__file__).parents[1] / "properties" / "README.md"
 BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"

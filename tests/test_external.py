@@ -18,7 +18,7 @@ import pytest
 import xarray as xr
 from test_readme import MINE, blocks, classes, rows, section
 
-from contactverif.registry import property_ids
+from contactverif.run.registry import property_ids
 
 QUICK = "12"  # examples; the README's commands ask for a hundred
 COMMANDS = {

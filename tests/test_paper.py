@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from contactverif import MisuseError, cli
-from contactverif.studies.paper import compute, forces, steps
-from contactverif_reports.paper_data import Paper, Said
-from contactverif_reports.paper_figures import drawings
-from contactverif_reports.paper_page import N_FIGURES, check_folder, page, summary, svg, write
-from contactverif_reports.paper_tree import tree_of
+from contactverif import MisuseError
+from contactverif.cli import app as cli
+from contactverif_paper import compute, forces, steps
+from contactverif_paper.paper_data import Paper, Said
+from contactverif_paper.paper_figures import drawings
+from contactverif_paper.paper_page import N_FIGURES, check_folder, page, summary, svg, write
+from contactverif_paper.paper_tree import tree_of
 
 KEPT = Path(__file__).parents[1] / "reports" / "paper"
 SOLVED = 2.0**-53 * 1e2 * 1e6

@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contactverif import catalogue, newton
-from contactverif.arrays import FloatArray
-from contactverif.blocks import two_blocks
-from contactverif.property import Property, Verdict
-from contactverif.registry import load_formulation, load_properties
-from contactverif.runner import judge_case
-from contactverif.subject import Subject
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.mechanics import newton
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import judge_case
+from contactverif.scenes import catalogue
+from contactverif.scenes.blocks import two_blocks
 
 FAILS = 1e-2  # of the pressure
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")

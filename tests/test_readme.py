@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from contactverif import cli
-from contactverif.property import Verdict
-from contactverif.registry import formulation_names, load_formulation, load_properties, property_ids
-from contactverif.runner import run
-from contactverif_reports.write import write
+from contactverif.cli import app as cli
+from contactverif.contract.property import Verdict
+from contactverif.run.registry import formulation_names, load_formulation, load_properties, property_ids
+from contactverif.run.runner import run
+from contactverif_reports.netcdf.write import write
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

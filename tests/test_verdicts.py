@@ -27,16 +27,16 @@ from expected_verdicts import (
 from expected_verdicts import FLAT as PATCH
 
 import contactverif_nts
-from contactverif.case import Case
-from contactverif.formulation import Traits
-from contactverif.interface import Interface
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Outcome, Property, Verdict
+from contactverif.contract.result import Row
+from contactverif.contract.subject import Subject
 from contactverif.oracle import projection_cases
-from contactverif.property import Measurement, Outcome, Property, Verdict
-from contactverif.registry import load_formulation, load_properties, property_ids, standalone_names
-from contactverif.result import Row
-from contactverif.runner import judge_case, run
-from contactverif.strategies import named_case
-from contactverif.subject import Subject
+from contactverif.run.registry import load_formulation, load_properties, property_ids, standalone_names
+from contactverif.run.runner import judge_case, run
+from contactverif.scenes.named_states import named_case
 
 SEED = 3
 

@@ -16,9 +16,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.arrays import FloatArray
-from contactverif.case import Case
-from contactverif.interface import Interface
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assembled, on_lattice, shortest
 from contactverif.strategies.parts import (

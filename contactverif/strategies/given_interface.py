@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.case import Case
-from contactverif.interface import Interface, Surface
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface, Surface
 from contactverif.strategies.parts import OFFSETS, depth_units, depths, penalties, seeds, shifts
 
 _QUARTERS = st.integers(1, 8)

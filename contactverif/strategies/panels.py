@@ -9,8 +9,8 @@ from math import ceil, log2
 
 import numpy as np
 
-from contactverif.arrays import FloatArray, IntArray
-from contactverif.interface import Interface, Surface
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.interface import Interface, Surface
 from contactverif.strategies.parts import Motion
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.arrays import FloatArray
-from contactverif.errors import MisuseError
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.errors import MisuseError
 
 SEVENTHS = st.integers(0, 6)
 # Numerators of offsets from the lattice, dealt out in turn and never 0: over 7 along the slave, over 11 across it,

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.arrays import FloatArray
+from contactverif.contract.arrays import FloatArray
 from contactverif.strategies.panels import Panel, on_lattice, shortest
 from contactverif.strategies.parts import dealt, depth_units, depths, shifts
 

@@ -16,11 +16,11 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.arrays import FloatArray
-from contactverif.blocks import Placing, is_uniform, overhangs, two_blocks
-from contactverif.case import Case
-from contactverif.catalogue import MODERATE, scene_named
-from contactverif.scene import has_bodies
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.mechanics.scene import has_bodies
+from contactverif.scenes.blocks import Placing, is_uniform, overhangs, two_blocks
+from contactverif.scenes.catalogue import MODERATE
 from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
@@ -42,16 +42,6 @@ def _widths() -> SearchStrategy[list[float]]:
     plain = lengths(graded=False)
     wide = st.lists(st.builds(ldexp, st.integers(1, 7).map(float), st.integers(-5, 3)), min_size=1, max_size=6)
     return st.one_of(plain, plain, plain, plain, wide)
-
-
-def named_scene(text: str) -> Case:
-    """The scene of the catalogue that the text names, with its options, as a case.
-
-    Raises
-    ------
-    MisuseError : if there is none.
-    """
-    return scene_named(text, "scene").case()
 
 
 def block_cases(given: Case | None = None) -> SearchStrategy[Case] | None:

@@ -12,8 +12,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.arrays import FloatArray
-from contactverif.case import Case
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
 from contactverif.strategies.panels import Panel, assembled
 from contactverif.strategies.parts import dealt, depth_units, motions, penalties, seeds
 

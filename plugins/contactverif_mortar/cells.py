@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.formulation import Pairing
-from contactverif.interface import Interface
-from contactverif.projection import frame, node, search_tree
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import frame, node, search_tree
 from contactverif_mortar.geometry import (
     D_C,
     D_WEIGHT,

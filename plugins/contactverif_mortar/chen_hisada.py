@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
-from contactverif.projection import dot, foot_on_surface, frame, minus, nearest_segment, node, search_tree
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import dot, foot_on_surface, frame, minus, nearest_segment, node, search_tree
 from contactverif_mortar import transmission
 from contactverif_mortar.cells import C, Cells, Quadrature
 from contactverif_mortar.geometry import D_C

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.projection import Vector, between, dot, frame, minus, node
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 
 A, B, ONE, TWO, BEFORE, BEHIND = range(6)  # local nodes
 D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # the rows of a point

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
+from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
 from contactverif_mortar.cells import Cells, Quadrature
 from contactverif_mortar.options import AREAS, NORMALS, check_penalty, chosen
 from contactverif_mortar.reported import at_nodes

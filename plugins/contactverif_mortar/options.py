@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import TypeVar
 
-from contactverif.errors import MisuseError
+from contactverif.contract.errors import MisuseError
 
 AREAS = {"current": True, "reference": False}  # whether lengths are those of the current configuration
 NORMALS = {"segment": False, "averaged": True}  # whether normals of neighbouring slave segments are averaged

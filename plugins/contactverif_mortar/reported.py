@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import BoolArray, FloatArray
-from contactverif.formulation import ContactPoints
-from contactverif.interface import Interface
+from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Interface
 from contactverif_mortar.cells import GAP, NORMAL_X, WEIGHT, XI, C, Cells, Quadrature
 
 

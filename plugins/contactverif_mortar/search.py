@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.interface import Surface
-from contactverif.projection import Vector, dot, frame, minus, node, segments_in_strip
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.interface import Surface
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, dot, frame, minus, node, segments_in_strip
 from contactverif_mortar.geometry import end_normals, facing_point, seen_from, turned
 
 # An overlap no longer than this, in c ∈ [−1, 1], is none: its points would not be told apart.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, BoolArray, FloatArray
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
+from contactverif.contract.arrays import Array, BoolArray, FloatArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
 from contactverif_mortar import transmission
 from contactverif_mortar.cells import GAP, Cells, Quadrature
 from contactverif_mortar.geometry import D_GAP

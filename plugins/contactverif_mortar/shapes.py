@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray, IntArray
+from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif_mortar.cells import GAP, WEIGHT, C
 from contactverif_mortar.geometry import D_C, D_GAP, D_WEIGHT
 from contactverif_mortar.transmission import gathered, summed

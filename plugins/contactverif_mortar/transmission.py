@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray, IntArray
-from contactverif.compiled import compiled
+from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.geometry.compiled import compiled
 from contactverif_mortar.cells import NORMAL_X, NORMAL_Y, WEIGHT, XI, C
 from contactverif_mortar.geometry import D_C, D_WEIGHT, D_XI, OMEGA
 

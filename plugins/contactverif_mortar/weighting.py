@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import UNIT_ROUNDOFF, Array, FloatArray, IntArray
-from contactverif.formulation import Pairing
-from contactverif.interface import Interface
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, IntArray
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
 from contactverif_mortar import transmission
 from contactverif_mortar.cells import Cells, Quadrature
 from contactverif_mortar.geometry import D_C

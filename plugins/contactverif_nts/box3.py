@@ -23,9 +23,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.projection import Vector, between, dot, frame, minus, node
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 from contactverif_nts.eq6 import push
 from contactverif_nts.walk import NOT_CUT
 

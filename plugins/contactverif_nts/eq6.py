@@ -17,9 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
 
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # where the area of a point comes from
 

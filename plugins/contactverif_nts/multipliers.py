@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from contactverif.formulation import Traits
+from contactverif.contract.formulation import Traits
 from contactverif_nts.options import chosen
 from contactverif_nts.points import PointContact, nts, vts_me
 from contactverif_nts.ppt import PatchTestPassing, vts_ppt, vts_ppt_balanced

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import TypeVar
 
-from contactverif.errors import MisuseError
+from contactverif.contract.errors import MisuseError
 from contactverif_nts.eq6 import CURRENT, REFERENCE
 
 AREAS = {"current": CURRENT, "reference": REFERENCE}

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray, IntArray, frozen
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
-from contactverif.projection import search_tree
+from contactverif.contract.arrays import Array, FloatArray, IntArray, frozen
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.geometry.projection import search_tree
 from contactverif_nts import eq6
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen
 from contactverif_nts.state import joined, one_parted, parted

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
-from contactverif.projection import search_tree
+from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, walk
 from contactverif_nts.eq6 import CURRENT
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import Array, FloatArray
-from contactverif.interface import Interface
+from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.interface import Interface
 
 
 def parted(interface: Interface, z: Array) -> tuple[Array, Array]:

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import Array, FloatArray, IntArray
-from contactverif.formulation import ContactPoints, Pairing, Traits
-from contactverif.interface import Interface
-from contactverif.subject import Subject
+from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import Subject
 
 NAMES = ("pass_1.", "pass_2.")  # before the names of a pairing
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import BoolArray, FloatArray, IntArray
-from contactverif.compiled import compiled
-from contactverif.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
 from contactverif_nts.eq6 import pressed
 
 TRUNCATE, EXTEND, COVER = 0, 1, 2  # what becomes of an area of competence that overhangs a free end

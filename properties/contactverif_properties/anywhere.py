@@ -13,12 +13,12 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.arrays import FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Traits
-from contactverif.interface import Interface
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
-from contactverif.subject import Guarded, Subject
 
 PRESS = (0.125, 0.25)  # random multipliers lie between, × the shortest segment
 
@@ -37,7 +37,7 @@ def no_barrier(traits: Traits) -> str:
     return "the states penetrate, where a barrier is not defined"
 
 
-def posed(case: Case, subject: Subject) -> tuple[Guarded, Case]:
+def posed(case: Case, subject: Subject) -> tuple[CheckedFormulation, Case]:
     """The formulation with the penalty of the case, and the case with multipliers if it has any."""
     formulation = subject.on(case)
     if not formulation.n_multipliers(case.interface):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Traits
-from contactverif.newton import System, Trace, solve
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.scene import scene_of
-from contactverif.strategies import solid_cases
-from contactverif.subject import Subject
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import System, Trace, solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton import ended, floor_of, solutions_are_unique, units_of, untouched
 
 SCALE = 8.0  # times smaller, the other one

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.case import Case
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.strategies import dead_zone_cases
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.solved import MULTIPLIERS, QUANTITIES, exact_picture, solved_once
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg
 
-from contactverif.arrays import UNIT_ROUNDOFF, Array
-from contactverif.case import Case
-from contactverif.formulation import Traits
-from contactverif.property import Measurement, Property, Quantity
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
-from contactverif.subject import Subject
 from contactverif_properties import roundoff
 from contactverif_properties.anywhere import any_cases, no_barrier, posed
 from contactverif_properties.kinks import dense, excuse

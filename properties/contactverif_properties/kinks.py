@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Pairing
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
-from contactverif.subject import Guarded
 
 
-def excuse(case: Case, formulation: Guarded, pairing: Pairing | None, reach: float, errors: dict[str, float]) -> str:
+def excuse(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, errors: dict[str, float]
+) -> str:
     """Empty, or why what failed may be the fault of rounding the positions by `reach`, at a kink.
 
     Parameters
@@ -37,7 +39,7 @@ def excuse(case: Case, formulation: Guarded, pairing: Pairing | None, reach: flo
     return ""
 
 
-def jump(case: Case, formulation: Guarded, reach: float, directions: FloatArray) -> tuple[float, float]:
+def jump(case: Case, formulation: CheckedFormulation, reach: float, directions: FloatArray) -> tuple[float, float]:
     """How much the largest entries of forces and tangent change when the nodes move by `reach`, either way.
 
     Parameters
@@ -56,7 +58,7 @@ def jump(case: Case, formulation: Guarded, reach: float, directions: FloatArray)
     )
 
 
-def _answers(case: Case, formulation: Guarded, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     pairing = formulation.pair(case.interface, z)
     forces = formulation.residual(case.interface, pairing, z)
     if "tangent" not in formulation.provides:
@@ -70,7 +72,9 @@ def dense(tangent: Any) -> FloatArray:
     return array
 
 
-def kink_within(case: Case, formulation: Guarded, pairing: Pairing | None, reach: float, direction: FloatArray) -> str:
+def kink_within(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, direction: FloatArray
+) -> str:
     """Empty, or why moving each coordinate by `reach` (a length) at most may change a decision.
 
     Parameters

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg, optimize
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.blocks import exact_unknowns, pressure_of
-from contactverif.case import Case
-from contactverif.formulation import Traits
-from contactverif.linear import ROUNDING
-from contactverif.newton import System
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.scene import Scene, scene_of
-from contactverif.strategies import block_cases
-from contactverif.subject import Guarded, Subject
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.linear import ROUNDING
+from contactverif.mechanics.newton import System
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.scenes.blocks import exact_unknowns, pressure_of
+from contactverif.strategies.solids import block_cases
 from contactverif_properties.anywhere import with_multipliers
 from contactverif_properties.patch import consistent_forces, force_columns
 
@@ -28,7 +28,7 @@ TOO_MANY = Quantity(
 )
 
 
-def right_multipliers(case: Case, subject: Subject, formulation: Guarded, pressure: float) -> FloatArray:
+def right_multipliers(case: Case, subject: Subject, formulation: CheckedFormulation, pressure: float) -> FloatArray:
     """Multipliers (n_multipliers,) that stand for a uniform pressure in the exact state of the case.
 
     The pressure itself where it transmits the right forces; else those that come nearest to the right forces. 0 of one
@@ -47,7 +47,9 @@ def right_multipliers(case: Case, subject: Subject, formulation: Guarded, pressu
     return nearest
 
 
-def nearest_solution(case: Case, scene: Scene, formulation: Guarded, right: FloatArray) -> tuple[FloatArray, float]:
+def nearest_solution(
+    case: Case, scene: Scene, formulation: CheckedFormulation, right: FloatArray
+) -> tuple[FloatArray, float]:
     """Multipliers as good as those of a solved case, and of all such the nearest to the right ones.
 
     What moves no body, as multipliers do where they are not unique, may be added; with a rigid master that is also what

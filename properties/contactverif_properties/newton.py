@@ -8,15 +8,15 @@ from math import ceil, inf, log, log2
 import numpy as np
 from scipy import linalg
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Pairing, Traits
-from contactverif.linear import scales
-from contactverif.newton import End, System, Trace, solve
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.scene import scene_of
-from contactverif.strategies import solid_cases
-from contactverif.subject import Subject
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.linear import scales
+from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.strategies.solids import solid_cases
 from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.kinks import dense, kink_within
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Pairing, Traits
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.property import Measurement, Property
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.property import Measurement, Property
 from contactverif.strategies import flat_cases
-from contactverif.subject import Guarded, Subject
 from contactverif_properties import roundoff
 from contactverif_properties.anywhere import no_barrier, with_multipliers
 from contactverif_properties.kinks import excuse
@@ -61,7 +61,9 @@ def transmitted(case: Case, subject: Subject) -> Measurement:
     return Measurement({ERROR.name: error / size}, {ERROR.name: tolerance})
 
 
-def _by_multipliers(case: Case, subject: Subject, formulation: Guarded, exact: FloatArray) -> tuple[FloatArray, float]:
+def _by_multipliers(
+    case: Case, subject: Subject, formulation: CheckedFormulation, exact: FloatArray
+) -> tuple[FloatArray, float]:
     """Forces (n_unknowns,) of the multipliers that are asked about, and their largest over the mean of their sizes."""
     uniform = np.full(formulation.n_multipliers(case.interface), case.penalty * case.parameter("penetration"))
     pressed = with_multipliers(case, uniform)
@@ -77,7 +79,7 @@ def _by_multipliers(case: Case, subject: Subject, formulation: Guarded, exact: F
     return forces * (float(wanted @ wanted) / found if found > 0 else 1.0), 1.0
 
 
-def force_columns(case: Case, formulation: Guarded, pairing: Pairing | None) -> FloatArray:
+def force_columns(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
     """(n_unknowns, n_multipliers): what a unit of each multiplier adds to the position rows of the residual.
 
     The residual is affine in the multipliers on a frozen pairing; what it holds without any, as one that is augmented

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.case import Case
-from contactverif.interface import Interface
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
 from contactverif_properties import roundoff
 from contactverif_properties.anywhere import any_cases, no_barrier, posed
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, Array
-from contactverif.case import Case
-from contactverif.property import Quantity
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
+from contactverif.contract.case import Case
+from contactverif.contract.property import Quantity
 
 PATCH = "u(8X/|g| + 4N)"
 PATCH_REASON = "a gap is a difference of coordinates, each rounded to uX; N forces are summed"

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
-from contactverif.blocks import exact_unknowns, overhangs, pressure_of
-from contactverif.case import Case
-from contactverif.formulation import ContactPoints
-from contactverif.newton import NEARLY, Trace, solve
-from contactverif.property import Measurement, Property, Quantity
-from contactverif.scene import Scene, scene_of
-from contactverif.strategies import block_cases, variant_cases
-from contactverif.subject import Guarded, Subject
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.newton import NEARLY, Trace, solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.scenes.blocks import exact_unknowns, overhangs, pressure_of
+from contactverif.strategies.solids import block_cases, variant_cases
 from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.multipliers import nearest_solution, right_multipliers
 from contactverif_properties.patch import consistent_forces
@@ -196,7 +196,9 @@ def beside(case: Case, points: ContactPoints) -> BoolArray:
     return found & (points.slave_segment >= 0)
 
 
-def solution(scene: Scene, formulation: Guarded, exact: FloatArray, penetration: float) -> tuple[Trace, FloatArray]:
+def solution(
+    scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
+) -> tuple[Trace, FloatArray]:
     """Newton's trace from the first guess of the scene, and the unknowns (n,) of the solution that is judged.
 
     The patch test asks about the residual alone, so Newton's method differentiates it, and the formulation's own
@@ -222,7 +224,9 @@ def stress_error(scene: Scene, q: FloatArray, pressure: float) -> float:
     return largest / pressure
 
 
-def force_errors(case: Case, scene: Scene, formulation: Guarded, q: FloatArray, pressure: float) -> tuple[float, float]:
+def force_errors(
+    case: Case, scene: Scene, formulation: CheckedFormulation, q: FloatArray, pressure: float
+) -> tuple[float, float]:
     """Largest error of a nodal force on the slave and on the master, over p L.
 
     Of what the bodies need, and of what the formulation gives: they are not the same where it found no balance, and at

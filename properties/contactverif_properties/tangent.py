@@ -11,12 +11,12 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, Array, FloatArray
-from contactverif.case import Case
-from contactverif.formulation import Pairing
-from contactverif.property import Measurement, Property, Quantity, Verdict, judge
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity, Verdict, judge
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
-from contactverif.subject import Guarded, Subject
 from contactverif_properties.anywhere import no_barrier, posed
 from contactverif_properties.kinks import kink_within
 
@@ -89,7 +89,7 @@ def directional(case: Case, subject: Subject) -> Measurement:
 
 
 def differences(
-    formulation: Guarded,
+    formulation: CheckedFormulation,
     case: Case,
     pairing: Pairing | None,
     directions: FloatArray,
@@ -134,7 +134,9 @@ def differences(
     return values, float(np.sqrt(size / third)) if third > 0 else np.inf
 
 
-def _why_undecided(case: Case, formulation: Guarded, pairing: Pairing | None, direction: FloatArray) -> tuple[str, str]:
+def _why_undecided(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, direction: FloatArray
+) -> tuple[str, str]:
     """Whether the frozen pairing is that of the states around: (why undecided, what is broken), empty if it is.
 
     A pairing that is another at every place, however near, holds numbers and not decisions, and on such a one no
@@ -182,7 +184,7 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
 
 
 def complex_step(
-    formulation: Guarded, case: Case, pairing: Pairing | None, directions: FloatArray, derivative: Array
+    formulation: CheckedFormulation, case: Case, pairing: Pairing | None, directions: FloatArray, derivative: Array
 ) -> float:
     """Largest difference of Im R(x + ihd)/h from the derivative, relative to it; h so small that h² vanishes."""
     h = case.shortest_segment * 2.0**-100
@@ -192,17 +194,17 @@ def complex_step(
     return float(np.abs(exact - derivative).max()) / size if size > 0 else 0.0
 
 
-def _same_around(formulation: Guarded, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
+def _same_around(formulation: CheckedFormulation, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
     return all(formulation.pair(case.interface, case.z + way * shift) == pairing for way in (1, -1))
 
 
-def _steady(formulation: Guarded, case: Case, shift: FloatArray) -> bool:
+def _steady(formulation: CheckedFormulation, case: Case, shift: FloatArray) -> bool:
     """Whether the pairing stays the same from one small shift to the next, as it does beside a kink."""
     beside = [formulation.pair(case.interface, case.z + times * shift) for times in (1, 2, 3)]
     return beside[0] == beside[1] == beside[2]
 
 
-def _restless(formulation: Guarded, case: Case, shift: FloatArray) -> bool:
+def _restless(formulation: CheckedFormulation, case: Case, shift: FloatArray) -> bool:
     """Whether no two of some neighbouring states, on either side, have the same pairing."""
     found = [formulation.pair(case.interface, case.z + times * shift) for times in range(-2, 4)]
     return all(one != other for one, other in combinations(found, 2))

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray
-from contactverif.case import Case
-from contactverif.property import Measurement, Property, Quantity
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases
-from contactverif.subject import Guarded, Subject
 from contactverif_properties.anywhere import no_barrier, with_multipliers
 from contactverif_properties.patch import force_columns
 
@@ -105,7 +105,7 @@ def lifted(case: Case, height: float) -> Case:
     return replace(case, z=positions.reshape(-1))
 
 
-def _forces(formulation: Guarded, case: Case) -> Array:
+def _forces(formulation: CheckedFormulation, case: Case) -> Array:
     return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from contactverif.errors import MisuseError
+from contactverif.contract.errors import MisuseError
 
 
 def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument: str = "path") -> Path:

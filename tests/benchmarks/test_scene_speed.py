@@ -13,15 +13,15 @@ from plain_skfem import TwoBlocks, exact_pressure
 from plain_skfem import solve as plain
 from test_speed import interleaved
 
-from contactverif.blocks import two_blocks
-from contactverif.bulk import condense
-from contactverif.generate import draw_cases
-from contactverif.newton import solve
-from contactverif.registry import load_formulation
-from contactverif.runner import judge_case
-from contactverif.scene import Scene, scene_of
-from contactverif.strategies import block_cases
-from contactverif.subject import Subject
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.bulk import condense
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.run.driver import draw_cases
+from contactverif.run.registry import load_formulation
+from contactverif.run.runner import judge_case
+from contactverif.scenes.blocks import two_blocks
+from contactverif.strategies.solids import block_cases
 from contactverif_properties.solved import FLAT_SOLVE, at_penalty, stress_error
 
 N_MESHES = 40

@@ -15,7 +15,7 @@ import pytest
 
 import contactverif_nts
 from contactverif import Case, Interface
-from contactverif.subject import Subject
+from contactverif.contract.subject import Subject
 from contactverif_properties.tangent import directional
 
 NAMES = ("nts", "vts_me", "vts_ppt", "vts_ppt_balanced")

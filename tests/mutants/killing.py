@@ -6,12 +6,12 @@ from functools import cache
 
 from mutate import Mutant
 
-from contactverif.case import Case
-from contactverif.generate import draw_cases
-from contactverif.property import Property, Verdict
-from contactverif.registry import load_properties
-from contactverif.runner import judge_case
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.registry import load_properties
+from contactverif.run.runner import judge_case
 
 EXAMPLES = 100  # for the property that is meant to catch it
 OTHERS = 25  # for each of the others

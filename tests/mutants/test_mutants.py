@@ -10,10 +10,10 @@ from killing import KEY, as_lines, cases, kills, properties
 from mutate import Mutant, changed_line
 from wrong import MUTANTS, SURVIVORS
 
-from contactverif.property import Property, Verdict
-from contactverif.registry import load_formulation, load_properties, property_ids
-from contactverif.runner import judge_case, run
-from contactverif.subject import Subject
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.registry import load_formulation, load_properties, property_ids
+from contactverif.run.runner import judge_case, run
 
 
 def the_property(property_id: str) -> Property:

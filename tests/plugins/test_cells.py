@@ -10,8 +10,8 @@ import pytest
 from surfaces import DEPTH, bent, flat, pushed
 
 from contactverif import Interface
-from contactverif.interface import Surface
-from contactverif.projection import search_tree, segments_in_strip
+from contactverif.contract.interface import Surface
+from contactverif.geometry.projection import search_tree, segments_in_strip
 from contactverif_mortar import mortar, mortar_dual, sts
 from contactverif_mortar.cells import GAP, WEIGHT, C, Cells, Quadrature
 from contactverif_mortar.search import overlap

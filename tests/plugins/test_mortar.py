@@ -11,10 +11,10 @@ import pytest
 from surfaces import DEPTH, bent, flat, pushed
 
 from contactverif import Interface
-from contactverif.catalogue import scene_named
-from contactverif.newton import solve
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import solve
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.subject import Subject
+from contactverif.scenes.catalogue import scene_named
 from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
 from contactverif_mortar.cells import WEIGHT, C, Cells, Quadrature
 from contactverif_mortar.shapes import Shapes

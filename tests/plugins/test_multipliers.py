@@ -11,13 +11,14 @@ from surfaces import DEPTH, bent, flat
 from test_forces import TABLE, exactly
 
 import contactverif_nts
-from contactverif import Interface, MisuseError, projection
-from contactverif.blocks import two_blocks
-from contactverif.catalogue import made
-from contactverif.compiled import uncompiled
-from contactverif.newton import Trace, solve
-from contactverif.scene import Scene
-from contactverif.subject import Subject
+from contactverif import Interface, MisuseError
+from contactverif.contract.subject import Subject
+from contactverif.geometry import projection
+from contactverif.geometry.compiled import uncompiled
+from contactverif.mechanics.newton import Trace, solve
+from contactverif.mechanics.scene import Scene
+from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.catalogue import made
 from contactverif_nts import box3, eq6, walk
 
 METHODS = [

@@ -11,14 +11,15 @@ import pytest
 from surfaces import DEPTH, bent, flat, pushed
 
 import contactverif_mortar
-from contactverif import Interface, MisuseError, projection
-from contactverif.body import block
-from contactverif.compiled import uncompiled
-from contactverif.newton import solve
+from contactverif import Interface, MisuseError
+from contactverif.contract.body import block
+from contactverif.contract.subject import Subject
+from contactverif.geometry import projection
+from contactverif.geometry.compiled import uncompiled
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.scene import Scene
-from contactverif.strategies import named_case
-from contactverif.subject import Subject
+from contactverif.scenes.named_states import named_case
 from contactverif_mortar import cells, geometry, search, shapes, transmission
 
 PRESSURE_FROM_POSITIONS = [

@@ -9,8 +9,8 @@ import pytest
 from surfaces import bent
 
 import contactverif_nts
-from contactverif import projection
-from contactverif.compiled import uncompiled
+from contactverif.geometry import projection
+from contactverif.geometry.compiled import uncompiled
 from contactverif_nts import box3, eq6, walk
 
 METHODS = [

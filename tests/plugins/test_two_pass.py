@@ -12,13 +12,13 @@ from test_forces import PENALTY
 
 import contactverif_nts
 from contactverif import Interface, Pairing, Traits
-from contactverif.blocks import two_blocks
-from contactverif.catalogue import made
-from contactverif.errors import ContractError
-from contactverif.newton import Trace, solve
-from contactverif.registry import load_formulation
-from contactverif.scene import Scene
-from contactverif.subject import Subject
+from contactverif.contract.errors import ContractError
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import Trace, solve
+from contactverif.mechanics.scene import Scene
+from contactverif.run.registry import load_formulation
+from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.catalogue import made
 from contactverif_nts import two_pass
 
 INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]

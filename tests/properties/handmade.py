@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.case import Case
-from contactverif.formulation import ContactPoints, Traits
-from contactverif.interface import Interface
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import Subject
 
 
 class Handmade:

@@ -11,16 +11,16 @@ import pytest
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
-from contactverif.case import Case
-from contactverif.catalogue import BLOCKS, made
-from contactverif.formulation import ContactPoints
-from contactverif.property import Verdict, judge
-from contactverif.registry import load_formulation
-from contactverif.runner import judge_case, run
-from contactverif.scene import scene_of
-from contactverif.strategies import dead_zone_cases, named_scene
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.property import Verdict, judge
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.scene import scene_of
+from contactverif.run.registry import load_formulation
+from contactverif.run.runner import judge_case, run
+from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
+from contactverif.scenes.catalogue import BLOCKS, made, named_scene
+from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.dead_zone import DEAD_ZONE
 from contactverif_properties.patch import consistent_forces
 from contactverif_properties.solved import FLAT_SOLVE, VARIANTS, gap_error, solved_once, stress_error

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
 
-from contactverif.formulation import Traits
-from contactverif.property import Verdict
-from contactverif.runner import judge_case, run
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Verdict
+from contactverif.run.runner import judge_case, run
 from contactverif_properties.invariants import OBJECTIVITY, SCALED_FORCES, SCALED_TANGENT, SCALING, scaled, turned
 
 SEEDS = range(1, 30)

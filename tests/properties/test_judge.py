@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, subject
 
-from contactverif.formulation import Traits
-from contactverif.property import Property, Verdict
-from contactverif.registry import load_properties
-from contactverif.runner import judge_case
-from contactverif.strategies import named_case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Property, Verdict
+from contactverif.run.registry import load_properties
+from contactverif.run.runner import judge_case
+from contactverif.scenes.named_states import named_case
 from contactverif_properties.balance import FORCE, MOMENT
 from contactverif_properties.patch import ERROR, FLAT_TRANSMISSION
 
@@ -23,16 +23,16 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
     """Neither when imported, nor when it makes cases and judges."""
     script = (
         "import sys\n"
-        "from contactverif.registry import load_properties\n"
-        "from contactverif.runner import run\n"
-        "from contactverif.subject import Subject\n"
+        "from contactverif.run.registry import load_properties\n"
+        "from contactverif.run.runner import run\n"
+        "from contactverif.contract.subject import Subject\n"
         "class Silent:\n"
         "    def residual(self, interface, pairing, z): return 0 * z\n"
         "questions = load_properties()\n"
         "assert len(questions) >= 7\n"
         "run([Subject('silent', lambda *, penalty: Silent())], questions, examples=3, seed=1)\n"
-        "print(sorted(name for name in sys.modules if name.startswith(('contactverif_nts', 'contactverif.projection',\n"
-        "    'contactverif.compiled', 'numba'))))\n"
+        "print(sorted(name for name in sys.modules if name.startswith(('contactverif_nts', 'contactverif.geometry',\n"
+        "    'numba'))))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

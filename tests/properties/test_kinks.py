@@ -9,7 +9,7 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from scipy import sparse
 
-from contactverif.case import Case
+from contactverif.contract.case import Case
 from contactverif_properties.kinks import dense, jump, kink_within
 
 REACH = 1e-6

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import contactverif_nts
-from contactverif.arrays import FloatArray
-from contactverif.blocks import two_blocks
-from contactverif.newton import End, System, solve
-from contactverif.property import Verdict
-from contactverif.registry import load_formulation
-from contactverif.runner import judge_case, run
-from contactverif.scene import scene_of
-from contactverif.strategies import named_scene
-from contactverif.subject import Subject
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import End, System, solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.run.registry import load_formulation
+from contactverif.run.runner import judge_case, run
+from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.catalogue import named_scene
 from contactverif_properties.newton import (
     DISTANCES,
     NEWTON_HISTORY,

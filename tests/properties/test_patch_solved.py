@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 import contactverif_nts
-from contactverif.blocks import pressure_of, two_blocks
-from contactverif.case import Case
-from contactverif.newton import solve
-from contactverif.property import Property, Verdict, judge
-from contactverif.registry import load_formulation
-from contactverif.runner import judge_case, run
-from contactverif.scene import scene_of
-from contactverif.strategies import VARIANTS as NAMES_OF_VARIANTS
-from contactverif.strategies import named_scene, variant_cases
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.property import Property, Verdict, judge
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.run.registry import load_formulation
+from contactverif.run.runner import judge_case, run
+from contactverif.scenes.blocks import pressure_of, two_blocks
+from contactverif.scenes.catalogue import named_scene
+from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
+from contactverif.strategies.solids import variant_cases
 from contactverif_properties.solved import FLAT_SOLVE, SLOPE, VARIANTS, at_penalty, solved
 
 
@@ -132,7 +133,7 @@ def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
 
 
 def test_every_variant_is_drawn() -> None:
-    from contactverif.generate import draw_cases
+    from contactverif.run.driver import draw_cases
 
     strategy = variant_cases()
     assert strategy is not None

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, subject
 
-from contactverif.property import Measurement, Verdict
-from contactverif.runner import judge_case
+from contactverif.contract.property import Measurement, Verdict
+from contactverif.run.runner import judge_case
 from contactverif_properties.purity import AGAIN, BATCHED, PURITY, REORDERED, pure
 
 

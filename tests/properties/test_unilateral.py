@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.case import Case
-from contactverif.formulation import Pairing, Traits
-from contactverif.interface import Interface
-from contactverif.property import Verdict
-from contactverif.registry import load_formulation, load_properties
-from contactverif.runner import judge_case, run
-from contactverif.strategies import named_case
-from contactverif.subject import Subject
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import judge_case, run
+from contactverif.scenes.named_states import named_case
 from contactverif_mortar import mortar, mortar_lm
 from contactverif_properties.unilateral import UNILATERAL, lifted
 

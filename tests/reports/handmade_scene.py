@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.arrays import FloatArray
-from contactverif.body import Body, block, rigid
-from contactverif.case import Case
-from contactverif.interface import Interface, Surface
-from contactverif_reports.solved import PointPressures, Solution, Solved
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.body import Body, block, rigid
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface, Surface
+from contactverif_reports.draw.solved_scene import PointPressures, Solution, Solved
 
 PRESSURE = 100.0
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.case import Case
-from contactverif.interface import Interface
-from contactverif.property import Measurement, Outcome, Property, Quantity, Verdict
-from contactverif.result import NotLoaded, Row, Run
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
+from contactverif.contract.result import NotLoaded, Row, Run
 
 ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding of the gap, and of N sums")
 SLOPE = Quantity("slope", "1", "1.9", "a remainder of second order", "at least")
@@ -48,7 +48,7 @@ def outcome(case: Case, value: float, verdict: Verdict | None = None, reason: st
 
 def awkward() -> Case:
     """Everything that is hard to store: two chains, one closed; −0.0, the smallest number, parameters of all shapes."""
-    from contactverif.interface import Surface
+    from contactverif.contract.interface import Surface
 
     slave = [[0.0, 0.0], [1.0, -0.0], [3.0, 0.1], [4.0, 1 / 3]]
     ring = [[0.0, -1.0], [1.0, -2.0], [-1.0, -3.0]]

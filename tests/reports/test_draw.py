@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from made import awkward, flat
 
-from contactverif.case import Case
-from contactverif.errors import MisuseError
-from contactverif.interface import Interface, Surface
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface, Surface
 from contactverif_reports.draw import as_text, figure
-from contactverif_reports.lengths import short
+from contactverif_reports.draw.lengths import short
 
 
 def kinked() -> Case:
@@ -183,7 +183,7 @@ def test_matplotlib_is_imported_late() -> None:
     import sys
 
     code = (
-        "import sys, contactverif_reports.draw, contactverif_reports.read, contactverif_reports.write;"
+        "import sys, contactverif_reports.draw, contactverif_reports.netcdf.read, contactverif_reports.netcdf.write;"
         "print({'matplotlib', 'xarray', 'netCDF4'} & {*sys.modules})"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -16,14 +16,15 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from page_reader import Page, complaints
 
-from contactverif.errors import MisuseError
-from contactverif_reports import margins, pages
-from contactverif_reports import report_page as report_page_module
-from contactverif_reports.margins import Axis, strip, ticks
-from contactverif_reports.pages import number, render, svg_inline, write_page
-from contactverif_reports.report_page import report_page
-from contactverif_reports.stored import read_report
-from contactverif_reports.write import write
+from contactverif.contract.errors import MisuseError
+from contactverif_reports.html import margin_strips as margins
+from contactverif_reports.html import pages
+from contactverif_reports.html import report_page as report_page_module
+from contactverif_reports.html.margin_strips import Axis, strip, ticks
+from contactverif_reports.html.pages import number, render, svg_inline, write_page
+from contactverif_reports.html.report_page import report_page
+from contactverif_reports.netcdf.stored import read_report
+from contactverif_reports.netcdf.write import write
 
 EVIL = "<script>alert(1)</script> & \"'"
 
@@ -52,7 +53,7 @@ def child(monkeypatch: pytest.MonkeyPatch) -> None:
     environment = pages._environment().overlay()
     loaders = [jinja2.DictLoader({"child.html.j2": text}), environment.loader]
     environment.loader = jinja2.ChoiceLoader(loaders)  # type: ignore[arg-type]
-    monkeypatch.setattr(pages, "_environment", lambda: environment)
+    monkeypatch.setattr(pages, "_environment", lambda package: environment)
 
 
 def test_an_svg_reaches_no_further_than_itself() -> None:
@@ -236,8 +237,8 @@ def test_a_strip_of_nothing_is_nothing() -> None:
 
 
 def test_the_bodies_of_a_scene_are_drawn_without_solving_it() -> None:
-    from contactverif.catalogue import scene_named
-    from contactverif_reports.scene_outline import has_outline, outline
+    from contactverif.scenes.catalogue import scene_named
+    from contactverif_reports.draw.scene_outline import has_outline, outline
 
     assert not has_outline(flat([1], [1]))
     case = scene_named("c").case()

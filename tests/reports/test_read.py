@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from made import ERROR, awkward, small_run
 
-from contactverif.case import Case
-from contactverif.errors import MisuseError
-from contactverif.property import Verdict
-from contactverif_reports import schema
-from contactverif_reports.read import case_ids, opened, read_case, same_data
-from contactverif_reports.write import write
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Verdict
+from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.read import case_ids, opened, read_case, same_data
+from contactverif_reports.netcdf.write import write
 
 
 @pytest.fixture

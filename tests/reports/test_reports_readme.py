@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from made import small_run
 
-from contactverif_reports.write import write
+from contactverif_reports.netcdf.write import write
 
 README = Path(__file__).parents[2] / "reports" / "README.md"
 

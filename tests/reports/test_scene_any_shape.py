@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactverif.body import block
-from contactverif.catalogue import scene_named
-from contactverif.pictures import solved
-from contactverif.registry import load_formulation
-from contactverif.scene import Scene
-from contactverif_reports.scene_figures import draw_solved
-from contactverif_reports.scene_meshes import close_up, magnifications
-from contactverif_reports.scene_text import silhouettes_as_text
-from contactverif_reports.solved import Solved
+from contactverif.contract.body import block
+from contactverif.mechanics.scene import Scene
+from contactverif.run.registry import load_formulation
+from contactverif.scenes.catalogue import scene_named
+from contactverif.studies.solved_scenes import solved
+from contactverif_reports.draw.scene_figures import draw_solved
+from contactverif_reports.draw.scene_meshes import close_up, magnifications
+from contactverif_reports.draw.scene_text import silhouettes_as_text
+from contactverif_reports.draw.solved_scene import Solved
 
 
 @pytest.fixture(scope="module")

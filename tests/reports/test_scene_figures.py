@@ -12,14 +12,14 @@ from handmade_scene import solved
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from contactverif.case import Case
-from contactverif.errors import MisuseError
-from contactverif_reports import figures
-from contactverif_reports.geometry import Gaps
-from contactverif_reports.scene_curves import pen
-from contactverif_reports.scene_figures import draw_solved
-from contactverif_reports.scene_meshes import Magnification, colour_scale, draw_bodies, magnifications
-from contactverif_reports.solved import Solved
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif_reports.draw import case_figure as figures
+from contactverif_reports.draw.case_geometry import Gaps
+from contactverif_reports.draw.scene_curves import pen
+from contactverif_reports.draw.scene_figures import draw_solved
+from contactverif_reports.draw.scene_meshes import Magnification, colour_scale, draw_bodies, magnifications
+from contactverif_reports.draw.solved_scene import Solved
 
 
 def changed(found: Solved, index: int = 0, **what: Any) -> Solved:

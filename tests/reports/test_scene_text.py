@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from handmade_scene import bodies, solved
 
-from contactverif_reports.scene_text import blocks_as_text
+from contactverif_reports.draw.scene_text import blocks_as_text
 
 
 def test_blocks_as_one_would_draw_them() -> None:

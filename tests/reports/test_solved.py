@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from handmade_scene import PRESSURE, bodies, solved
 
-from contactverif_reports.solved import PointPressures, pressures_across
+from contactverif_reports.draw.solved_scene import PointPressures, pressures_across
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, np.pi])

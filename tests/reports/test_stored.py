@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from made import ERROR, small_run
 
-from contactverif.errors import MisuseError
-from contactverif.property import Verdict
-from contactverif.result import NotLoaded, Run
-from contactverif_reports.read import case_ids
-from contactverif_reports.stored import StoredReport, read_report
-from contactverif_reports.write import write
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import NotLoaded, Run
+from contactverif_reports.netcdf.read import case_ids
+from contactverif_reports.netcdf.stored import StoredReport, read_report
+from contactverif_reports.netcdf.write import write
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from handmade_scene import PRESSURE, solved
 
-from contactverif.body import Body
-from contactverif.errors import MisuseError
-from contactverif_reports.solved import Solved
-from contactverif_reports.vtu import write_vtu
+from contactverif.contract.body import Body
+from contactverif.contract.errors import MisuseError
+from contactverif_reports.draw.solved_scene import Solved
+from contactverif_reports.draw.vtu import write_vtu
 
 
 def read_back(found: Solved, folder: Path) -> meshio.Mesh:

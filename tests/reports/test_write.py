@@ -16,13 +16,13 @@ import pytest
 import xarray as xr
 from made import ERROR, flat, outcome, question, small_run
 
-from contactverif.errors import MisuseError
-from contactverif.property import Verdict
-from contactverif.result import Row, Run
-from contactverif_reports.read import same_data
-from contactverif_reports.schema import VERDICTS, case_id, group_of
-from contactverif_reports.summary import worst
-from contactverif_reports.write import check_writable, write
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Row, Run
+from contactverif_reports.netcdf.read import same_data
+from contactverif_reports.netcdf.schema import VERDICTS, case_id, group_of
+from contactverif_reports.netcdf.summary_group import worst
+from contactverif_reports.netcdf.write import check_writable, write
 
 
 @pytest.fixture
@@ -200,7 +200,7 @@ def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None
         import sys, time
         import xarray as xr
         from made import small_run
-        from contactverif_reports import write as writing
+        from contactverif_reports.netcdf import write as writing
         whole = xr.DataTree.to_netcdf
         def slow(self, path, **options):
             whole(self, path, **options)
@@ -232,7 +232,7 @@ def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None
 
 
 def test_reads_while_xarray_has_it_open(report: Path) -> None:
-    from contactverif_reports.read import case_ids, read_case
+    from contactverif_reports.netcdf.read import case_ids, read_case
 
     with xr.open_datatree(report) as tree:
         str(tree)

@@ -1,0 +1,1 @@
+"""Compiled geometry that plugins may use. The judge never imports it: it shares no code with what it judges."""

@@ -1,0 +1,1 @@
+"""Elastic bodies, their condensation onto the interface, scenes, and Newton's method."""

@@ -1,0 +1,173 @@
+"""Exact projections of slave points onto the master, in rationals on the stored floats; lengths as their squares."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.interface import Interface
+from contactverif.oracle.rationals import integers
+
+_Point = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """The exact projection of a point of a slave segment onto the master.
+
+    Attributes
+    ----------
+    segment : the master segment that is nearest.
+    xi : foot on it, 0 at its first node, 1 at its second, unclipped.
+    squared_distance : to the closed segment, a length squared.
+    signed_squared_gap : square of the distance to the segment's line, a length squared, negative in penetration.
+    tied : all segments at that distance.
+    undecided : those of them that the least overshoot does not tell apart either; more than one is a kink.
+    """
+
+    segment: int
+    xi: Fraction
+    squared_distance: Fraction
+    signed_squared_gap: Fraction
+    tied: tuple[int, ...]
+    undecided: tuple[int, ...]
+
+    @property
+    def gap_sign(self) -> int:
+        """−1 in penetration, 0 in touch, +1 open."""
+        return (self.signed_squared_gap > 0) - (self.signed_squared_gap < 0)
+
+
+def nearest(interface: Interface, z: FloatArray, slave_segment: int, c: float | Fraction) -> Projection:
+    """The master segment nearest to the point at c ∈ [−1, 1] of a slave segment, in exact arithmetic.
+
+    The nearest closed segment; where the foot lies at or past an end the distance is taken to the end node itself.
+    Ties: the least length of the unclipped foot past the segment's end, then the lower index.
+    """
+    exact = _Exact(interface, z, [Fraction(c)])
+    return exact.nearest(exact.point(slave_segment, Fraction(c)))
+
+
+class _Exact:
+    """The state on an integer lattice fine enough to hold the nodes and the points at the given c's."""
+
+    def __init__(self, interface: Interface, z: FloatArray, places: Iterable[Fraction]) -> None:
+        values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
+        self.fineness = 2 * lcm(*(place.denominator for place in places))
+        self.scale = scale * self.fineness
+        self.nodes = [(x * self.fineness, y * self.fineness) for x, y in zip(values[::2], values[1::2], strict=True)]
+        self.slave = interface.slave.segments.tolist()
+        self.master = interface.master.segments.tolist()
+        self.neighbours = interface.master.neighbours.tolist()
+
+    def point(self, segment: int, c: Fraction) -> _Point:
+        (ax, ay), (bx, by) = (self.nodes[node] for node in self.slave[segment])
+        towards = int((1 + c) / 2 * self.fineness)
+        away = self.fineness - towards
+        return (away * ax + towards * bx) // self.fineness, (away * ay + towards * by) // self.fineness
+
+    def ends(self, segment: int) -> tuple[_Point, _Point]:
+        return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
+
+    def direction(self, segment: int) -> _Point:
+        return _from(*self.ends(segment))
+
+    def nearest(self, point: _Point) -> Projection:
+        ranked = []
+        for segment in range(len(self.master)):
+            first, second = self.ends(segment)
+            along = self.direction(segment)
+            squared = _dot(along, along)
+            foot = _dot(_from(first, point), along)
+            if 0 < foot < squared:
+                distance = Fraction(_cross(along, _from(first, point)) ** 2, squared)
+                ranked.append((distance, Fraction(0), segment))
+            else:
+                past, end = (-foot, first) if foot <= 0 else (foot - squared, second)
+                distance = Fraction(_dot(_from(end, point), _from(end, point)))
+                ranked.append((distance, Fraction(past * past, squared), segment))
+        best, overshoot, segment = min(ranked)
+        along, from_first = self.direction(segment), _from(self.ends(segment)[0], point)
+        gap = -_cross(along, from_first)  # times the segment's length
+        return Projection(
+            segment=segment,
+            xi=Fraction(_dot(from_first, along), _dot(along, along)),
+            squared_distance=best / self.scale**2,
+            signed_squared_gap=Fraction(gap * abs(gap), _dot(along, along)) / self.scale**2,
+            tied=tuple(index for distance, _, index in ranked if distance == best),
+            undecided=tuple(index for distance, past, index in ranked if (distance, past) == (best, overshoot)),
+        )
+
+
+def _from(a: _Point, b: _Point) -> _Point:
+    return b[0] - a[0], b[1] - a[1]
+
+
+def _dot(a: _Point, b: _Point) -> int:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _cross(a: _Point, b: _Point) -> int:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def projection_cases(interface: Interface, z: FloatArray, n: int = 2) -> Counter[str]:
+    """How the areas of competence of the virtual slave nodes c = −1 + (2k+1)/n fall on the master; small meshes only.
+
+    Keys: "one segment"; the roles "first", "intermediate", "last" of segments where there are several;
+    "node exactly hit" by a foot; "beyond an end"; "convex vertex" and "concave vertex" inside an area; "edge-on",
+    before a segment seen edge-on or from behind, where the walk stops; "turned away", where nothing is covered.
+    """
+    found: Counter[str] = Counter()
+    half = Fraction(1, n)
+    centres = [-1 + (2 * k + 1) * half for k in range(n)]
+    exact = _Exact(interface, z, [*centres, *(c - half for c in centres), *(c + half for c in centres)])
+    for slave_segment in range(len(exact.slave)):
+        for c in centres:
+            found.update(_cases_at(exact, slave_segment, c, half))
+    return found
+
+
+def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) -> Iterator[str]:
+    home = exact.nearest(exact.point(slave_segment, c))
+    along = exact.direction(home.segment)
+    low = _dot(exact.point(slave_segment, c + half), along)  # P, nearer the slave segment's second node
+    high = _dot(exact.point(slave_segment, c - half), along)  # Q
+    if low >= high:
+        yield "turned away"
+        return
+    if home.xi in (0, 1):
+        yield "node exactly hit"
+    elif not 0 < home.xi < 1 and exact.neighbours[home.segment][int(home.xi > 1)] < 0:
+        yield "beyond an end"
+    covered = [home.segment]
+    for side, sign, end in ((0, -1, low), (1, 1, high)):
+        segment = home.segment
+        while True:
+            node = sign * _dot(exact.nodes[exact.master[segment][side]], along)
+            if sign * end == node:
+                yield "node exactly hit"
+            if sign * end <= node:
+                break
+            following = exact.neighbours[segment][side]
+            if following < 0 or following in covered:
+                yield "beyond an end"
+                break
+            if _dot(exact.direction(following), along) <= 0:
+                yield "edge-on"
+                break
+            turn = sign * _cross(exact.direction(segment), exact.direction(following))
+            if turn:
+                yield "convex vertex" if turn > 0 else "concave vertex"
+            covered.append(following)
+            segment = following
+    if len(covered) == 1:
+        yield "one segment"
+    else:
+        yield from ("first", "last", *["intermediate"] * (len(covered) - 2))

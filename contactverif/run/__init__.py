@@ -1,0 +1,1 @@
+"""Finds plugins, draws cases, judges them, and shrinks what failed."""

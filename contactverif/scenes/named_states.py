@@ -1,0 +1,87 @@
+"""Cases with a name: those of the reference paper, and witnesses of what a formulation says it does not do.
+
+Source: Zavarise & De Lorenzis (2009). In a1 to c-prime the penetration is uniform and ε̂ |g| = 1, so that nodal forces
+are the paper's. The paper prints no dimensions of A2; its lengths here are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+
+_PENETRATION = 2.0**-4
+_FLAT: dict[str, tuple[Sequence[float], Sequence[float]]] = {
+    "a1": ([2, 2], [4]),
+    "a2": ([1, 1, 2, 4], [8]),  # graded, on one rigid segment
+    "b": ([2, 2, 4, 4], [3, 3, 4, 2]),
+    "c": ([2, 2, 4, 4], [3, 3, 3, 3]),
+    "c-prime": ([2, 2, 4, 4], [3, 3, 3.2, 2.8]),  # c without the virtual slave node on a master node
+}
+
+
+def named_case(name: str) -> Case:
+    """The case of that name.
+
+    Raises
+    ------
+    MisuseError : if there is none; says which names are near.
+    """
+    if name in _FLAT:
+        return _flat(name, *_FLAT[name])
+    if name in _OTHERS:
+        return _OTHERS[name]()
+    near = get_close_matches(name, NAMED, n=3, cutoff=0.4) or NAMED
+    raise MisuseError("name", repr(name), f"the name of a case, perhaps {' or '.join(map(repr, near))}")
+
+
+def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
+    """Lengths from left to right; master nodes are numbered from right to left."""
+    slave_x, master_x = _places(slave), _places(master)[::-1]
+    interface = Interface.from_chains(_points(slave_x), _points(master_x))
+    z = np.vstack([_points(slave_x, -_PENETRATION), _points(master_x)]).reshape(-1)
+    parameters = {
+        "penetration": np.array(_PENETRATION),
+        "along": np.concatenate([slave_x, master_x]),
+        "direction": np.array([1.0, 0.0]),
+    }
+    return Case(interface, z, 1 / _PENETRATION, parameters, name=name)
+
+
+def _tilted() -> Case:
+    """One slave segment of length 25/8 at cos θ = 24/25; the area of either quarter point covers two master segments.
+
+    What VTS-PPT as printed transmits lacks 1 − cos θ = 0.04 of the slave force.
+    """
+    slave = np.array([[0.0, -1.25], [3.0, -0.375]])
+    master = _points([5.0, 2.5, 0.5, -2.0])
+    interface = Interface.from_chains(np.add(slave, [0.0, 1.25]), master)
+    return Case(interface, np.vstack([slave, master]).reshape(-1), 16.0, {"cosine": np.array(0.96)}, name="tilted")
+
+
+def _offset_c() -> Case:
+    """c-prime off its kinks: moved by 1/14, over a longer master, with a penetration that varies."""
+    slave_x = _places([2, 2, 4, 4]) + 1 / 14
+    heights = -np.array([5, 7, 4, 6, 3]) / 64 - 1 / 448
+    master = _points(_places([3, 3, 3, 3.2, 2.8, 3])[::-1] - 3)
+    slave = np.column_stack([slave_x, heights])
+    interface = Interface.from_chains(_points(slave_x), master)
+    return Case(interface, np.vstack([slave, master]).reshape(-1), 16.0, name="offset-c")
+
+
+def _places(lengths: Sequence[float]) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(lengths)])
+
+
+def _points(x: Sequence[float] | FloatArray, height: float = 0.0) -> FloatArray:
+    return np.column_stack([x, np.full(len(x), height)])
+
+
+_OTHERS: dict[str, Callable[[], Case]] = {"tilted": _tilted, "offset-c": _offset_c}
+NAMED: tuple[str, ...] = (*_FLAT, *_OTHERS)

@@ -1,0 +1,144 @@
+"""Solves a scene with the formulations that are asked for, and hands the arrays over to be drawn.
+
+A solution that did not converge is drawn too, with its end named; what a plugin does wrong is a line.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.body import Body
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContractError
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.bulk import elasticity
+from contactverif.mechanics.newton import End, Trace, solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.scenes.blocks import is_uniform, pressure_of
+from contactverif_reports.draw.solved_scene import PointPressures, Solution, Solved
+
+_FAR = 1e3  # times the scene; iterates that went further are not drawn
+
+
+def solved(case: Case, subjects: Sequence[Subject | NotLoaded]) -> Solved:
+    """The scene of the case, solved by each formulation; one that cannot be asked is a failure with its reason.
+
+    Raises
+    ------
+    MisuseError : if the case holds no scene.
+    """
+    scene = scene_of(case)
+    solutions, failures = [], {}
+    for subject in subjects:
+        if isinstance(subject, NotLoaded):
+            failures[subject.formulation] = f"not loaded: {subject.reason}"
+            continue
+        try:
+            solutions.append(_solution(scene, case, subject))
+        except ContractError as error:
+            failures[subject.name] = str(error)
+    return Solved(case, scene.bodies, _on_interface(scene), tuple(solutions), failures)
+
+
+def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
+    """For each body, the interface's numbers of its contact nodes; empty if it is out of reach."""
+    ends = np.cumsum([0, *(len(scene.bodies[index].contact_nodes) for index in scene.reached)]).tolist()
+    numbers = {index: np.arange(*ends_) for index, ends_ in zip(scene.reached, itertools.pairwise(ends), strict=True)}
+    return tuple(numbers.get(index, np.zeros(0, np.int64)) for index in range(len(scene.bodies)))
+
+
+def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
+    formulation = subject.on(case)
+    with np.errstate(all="ignore"):  # an iteration that diverges overflows; its end says so
+        trace = solve(scene, formulation)
+        shown = _last_to_be_drawn(trace)
+    q, factor = trace.q[shown], float(trace.factors[shown])
+    at_gauss_points = scene.stresses(q, factor)
+    z = scene.positions(q, factor)
+    state = np.concatenate([z, trace.u[shown, scene.n_free :]])
+    forces, points, remark = _contact(scene, subject, formulation, state)
+    pressure = _exact_pressure(case, subject)
+    if trace.deficiency:
+        rank = f"{trace.deficiency} of {len(trace.multipliers)} multipliers are not unique"
+        remark = f"{remark}{'; ' if remark else ''}{rank}"
+    if shown != len(trace.q) - 1:
+        remark = f"drawn: iterate {shown}, the last that is not far away{'; ' if remark else ''}{remark}"
+    return Solution(
+        formulation=subject.name,
+        end=trace.end.words,
+        converged=trace.converged,
+        displacements=tuple(scene.displacements(q, factor)),
+        stresses=tuple(_in_global_axes(body, s) for body, s in zip(scene.bodies, at_gauss_points, strict=True)),
+        z=z,
+        forces=forces,
+        residuals=trace.residuals,
+        energies=trace.energies,
+        floors=trace.floors,
+        factors=trace.factors,
+        points=points,
+        pressure=pressure,
+        stress_error=_stress_error(scene, pressure, at_gauss_points),
+        remark=remark,
+    )
+
+
+def _last_to_be_drawn(trace: Trace) -> int:
+    """The last iterate, or if that left for infinity the last one that is still near."""
+    if trace.end is not End.DIVERGED:
+        return len(trace.q) - 1
+    nodes = trace.scene.interface.nodes
+    size = np.abs(trace.q).max(axis=1, initial=0.0)
+    near = np.flatnonzero(size < _FAR * float(np.ptp(nodes, axis=0).max()))
+    return int(near[-1]) if len(near) else 0
+
+
+def _contact(
+    scene: Scene, subject: Subject, formulation: CheckedFormulation, z: FloatArray
+) -> tuple[FloatArray, PointPressures | None, str]:
+    """Forces (n_nodes, 2) on the nodes, pressures at points if there are any, and what the plugin could not say."""
+    interface = scene.interface
+    forces: FloatArray = np.full(interface.nodes.shape, np.nan)
+    try:
+        pairing = formulation.pair(interface, z)
+        forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
+        if "contact_points" not in formulation.provides or subject.traits.penalty == "nodal":
+            return forces, None, ""
+        found = formulation.contact_points(interface, pairing, z)
+    except ContractError as error:
+        return forces, None, str(error)
+    on = found.slave_segment >= 0
+    area = np.column_stack([found.area_from, found.area_to])
+    return forces, PointPressures(found.slave_segment[on], found.c[on], area[on], found.pressure[on]), ""
+
+
+def _in_global_axes(body: Body, stresses: FloatArray) -> FloatArray:
+    """Means (n_cells, 3) of xx, yy and xy, from stresses (n_cells, n_points, 3) in the body's axes."""
+    means = stresses.mean(axis=1) if len(stresses) else np.zeros((0, 3))
+    along, across, shear = means.T
+    tensors = np.stack([along, shear, shear, across], axis=-1).reshape(-1, 2, 2)
+    turned = body.frame @ tensors @ body.frame.T
+    return np.column_stack([turned[:, 0, 0], turned[:, 1, 1], turned[:, 0, 1]])
+
+
+def _exact_pressure(case: Case, subject: Subject) -> float:
+    """NaN where it is not known; under an imposed approach more with multipliers, which do not give way."""
+    if not is_uniform(case):
+        return np.nan
+    return pressure_of(case, np.inf if subject.traits.enforcement == "multiplier" else case.penalty)
+
+
+def _stress_error(scene: Scene, pressure: float, stresses: Sequence[FloatArray]) -> float:
+    """Largest |σ − σ_exact| / p of the bodies within reach; NaN where nothing is known exactly."""
+    errors = [0.0]
+    for index in scene.reached:
+        body = scene.bodies[index]
+        if not body.rigid:
+            stiffness = elasticity(body)
+            exact = -pressure / stiffness[1, 1] * stiffness[:, 1]  # nothing strains along the interface
+            errors.append(float(np.abs(stresses[index] - exact).max()))
+    return max(errors) / pressure

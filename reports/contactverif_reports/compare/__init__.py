@@ -1,0 +1,1 @@
+"""Numbers of several formulations, or of two reports, side by side."""

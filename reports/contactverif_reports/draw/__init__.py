@@ -1,0 +1,40 @@
+"""Pictures of a case: a few lines of text for a terminal, a PNG or SVG for a paper."""
+
+from __future__ import annotations
+
+import os
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif_reports.draw.case_text import as_text
+
+__all__ = ["as_text", "figure"]
+
+
+def figure(
+    case: Case,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    forces: FloatArray | None = None,
+    exact: FloatArray | None = None,
+) -> None:
+    """Draws the current state of a case to a .png or .svg file.
+
+    Penetrations that are small against the interface are drawn magnified, and the figure says by which factor.
+
+    Parameters
+    ----------
+    case : what to draw.
+    path : file to write, replaced if it is there.
+    title : above the picture, wrapped.
+    forces, exact : nodal forces (n_nodes, 2) or (n_unknowns,) as they act on the nodes (minus the residual), found
+        and right; drawn as arrows of one scale.
+
+    Raises
+    ------
+    MisuseError : if the file cannot be written, or is to be of another kind.
+    """
+    from contactverif_reports.draw.case_figure import draw  # matplotlib takes its time
+
+    draw(case, path, title=title, forces=forces, exact=exact)

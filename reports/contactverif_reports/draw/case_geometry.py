@@ -1,0 +1,123 @@
+"""What a drawing needs to know of a case: which way the interface runs, whether it is flat, and its gaps.
+
+A drawing may be rough where a judge may not: nothing here is used for a verdict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Surface
+
+NEARLY_FLAT = 0.05  # largest rise of a surface, over its length, that is drawn as a straight line
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """The nodes of a case along the mean direction of its slave surface.
+
+    Attributes
+    ----------
+    direction : (2,) unit vector along which the slave runs, with its body on the left.
+    along, above : (n_nodes,) coordinates of the nodes along it and to its left, a length each.
+    rise : largest difference of `above` within a surface, a length.
+    roundoff : below which a length is rounding of the coordinates.
+    straight : whether each slave segment runs along `direction` and each master segment against it.
+    """
+
+    direction: FloatArray
+    along: FloatArray
+    above: FloatArray
+    rise: float
+    roundoff: float
+    straight: bool
+
+    @classmethod
+    def of(cls, case: Case) -> Course:
+        """Measured from the left-most node."""
+        positions, interface = case.positions, case.interface
+        chords = _chords(interface.slave, positions)
+        if not np.linalg.norm(chords.sum(axis=0)) > 1e-6 * np.linalg.norm(chords, axis=1).sum():
+            chords = np.array([[1.0, 0.0]])  # a ring runs nowhere
+        direction = chords.sum(axis=0) / np.linalg.norm(chords.sum(axis=0))
+        left = np.array([-direction[1], direction[0]])
+        moved = positions - positions[np.argmin(positions @ direction)]
+        along, above = moved @ direction, moved @ left
+        n_slave = interface.n_slave_nodes
+        roundoff = 64 * UNIT_ROUNDOFF * case.largest_coordinate
+        forwards = np.diff(along[interface.slave.segments], axis=1)
+        backwards = np.diff(along[interface.master.segments], axis=1)
+        return cls(
+            direction,
+            along,
+            above,
+            float(max(np.ptp(above[:n_slave]), np.ptp(above[n_slave:]))),
+            roundoff,
+            bool((forwards > 0).all() and (backwards < 0).all()),
+        )
+
+    @property
+    def flat(self) -> bool:
+        """Whether both surfaces are straight lines, parallel to each other."""
+        return self.straight and self.rise <= self.roundoff
+
+    @property
+    def nearly_flat(self) -> bool:
+        """Whether both surfaces may be drawn as straight lines."""
+        return self.straight and self.rise <= NEARLY_FLAT * float(np.ptp(self.along))
+
+    @property
+    def turned(self) -> float:
+        """Angle of `direction` to the x axis, in degrees."""
+        return float(np.degrees(np.arctan2(self.direction[1], self.direction[0])))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gaps:
+    """Where the slave nodes lie to the nearest master segment.
+
+    Attributes
+    ----------
+    gap : (n_slave_nodes,) a length, negative in penetration.
+    normal : (n_slave_nodes, 2) of that segment, out of the master.
+    facing : (n_slave_nodes,) False where the node lies beyond an end of the master surface.
+    """
+
+    gap: FloatArray
+    normal: FloatArray
+    facing: BoolArray
+
+    @classmethod
+    def of(cls, case: Case) -> Gaps:
+        """By comparison with every master segment."""
+        positions, master = case.positions, case.interface.master
+        first, chords = positions[master.segments[:, 0]], _chords(master, positions)
+        lengths = np.maximum(np.linalg.norm(chords, axis=1), np.finfo(float).tiny)
+        tangents = chords / lengths[:, None]
+        normals = np.column_stack([tangents[:, 1], -tangents[:, 0]])
+        gaps, nearest_normals, facing = [], [], []
+        for node in positions[: case.interface.n_slave_nodes]:
+            feet = ((node - first) * tangents).sum(axis=1) / lengths
+            outside = np.maximum(np.maximum(-feet, feet - 1), 0) * lengths
+            distances = np.hypot(((node - first) * normals).sum(axis=1), outside)
+            nearest = int(np.argmin(distances))
+            gaps.append(float((node - first[nearest]) @ normals[nearest]))
+            nearest_normals.append(normals[nearest])
+            at_an_end = master.neighbours[nearest, 0 if feet[nearest] < 0 else 1] < 0
+            facing.append(not (at_an_end and outside[nearest] > 1e-9 * lengths[nearest]))
+        return cls(np.array(gaps), np.array(nearest_normals), np.array(facing))
+
+    def uniform(self, roundoff: float) -> bool:
+        """Whether all nodes that face the master have the same gap."""
+        found = self.gap[self.facing]
+        return bool(len(found) and np.ptp(found) <= max(roundoff, 1e-9 * np.abs(found).max()))
+
+
+def _chords(surface: Surface, positions: FloatArray) -> FloatArray:
+    """Vectors (n_segments, 2) from first to second node."""
+    chords: FloatArray = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
+    return chords

@@ -1,0 +1,105 @@
+"""Draws the two meshes of a case in a few lines of text, the slave above the master."""
+
+from __future__ import annotations
+
+import textwrap
+
+import numpy as np
+
+from contactverif.contract.case import Case
+from contactverif_reports.draw.case_geometry import Course, Gaps
+from contactverif_reports.draw.lengths import short, unit_of
+from contactverif_reports.draw.raster import raster
+from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, strips
+
+_LISTED = 8  # nodes a side whose numbers are written down
+
+
+def as_text(case: Case, width: int = 72) -> str:
+    """The case as text of at most `width` columns (at least 60), lines separated by newlines.
+
+    A flat interface is two lines with their nodes to scale and the lengths between them; any other is a small picture
+    and, up to eight nodes a side, a table of current positions.
+    """
+    width = max(width, 60)
+    course, gaps = Course.of(case), Gaps.of(case)
+    lengths = np.concatenate(
+        [surface.lengths(case.positions) for surface in (case.interface.slave, case.interface.master)]
+    )
+    unit, unit_name = unit_of(lengths)
+    lines = [_headline(case, course)]
+    if course.nearly_flat:
+        drawn, note = strips(case, course, unit, width)
+        lines += drawn
+        notes = [note] if note else []
+    else:
+        drawn, note = raster(case, course, gaps, width)
+        lines += drawn
+        notes = [note]
+    if unit_name:
+        notes.append(f"lengths, positions and gaps in units of {unit_name}")
+    table = [] if course.flat else _table(case, gaps, unit, course.roundoff, width)
+    if course.flat or not table:
+        notes.append(_gaps(gaps, course, unit))
+    notes.append(_rest(case))
+    wrapped = [line for note in notes for line in textwrap.wrap(note, width, subsequent_indent="  ")]
+    return "\n".join(line.rstrip() for line in [*lines, *table, *wrapped])
+
+
+def _headline(case: Case, course: Course) -> str:
+    n_slave, n_master = len(case.interface.slave), len(case.interface.master)
+    shape = "flat" if course.flat else "nearly flat" if course.nearly_flat else "not flat"
+    is_turned = course.nearly_flat and abs(course.turned) > 1e-9
+    turned = f", turned by {short(course.turned, 1e-9)}°" if is_turned else ""
+    name = f"{case.name}: " if case.name else ""
+    return f"{name}{n_slave} slave on {n_master} master segment{'s' * (n_master > 1)}, {shape}{turned}"
+
+
+def _gaps(gaps: Gaps, course: Course, unit: float) -> str:
+    """How deep the slave nodes that face the master are in it."""
+    found = gaps.gap[gaps.facing] / unit
+    if not len(found):
+        return "no slave node faces the master"
+    n_beyond = int((~gaps.facing).sum())
+    where = f"where a slave node faces the master; {n_beyond} beyond it" if n_beyond else "at every slave node"
+    if not gaps.uniform(course.roundoff):
+        return f"gap {short(found.min())} to {short(found.max())} {where}"
+    mean = float(np.mean(found))
+    amount = short(abs(mean), course.roundoff / unit)
+    return f"{f'penetration {amount}' if mean < 0 else f'open by {amount}' if mean else 'touching'} {where}"
+
+
+def _table(case: Case, gaps: Gaps, unit: float, roundoff: float, width: int) -> list[str]:
+    """Current positions, slave left and master right if that fits; nothing for more than eight nodes a side."""
+    n_slave = case.interface.n_slave_nodes
+    if max(n_slave, case.interface.n_nodes - n_slave) > _LISTED:
+        return []
+    rows = [
+        [str(node), *(short(value, 0.0, 6) for value in (position / unit).tolist())]
+        for node, position in enumerate(case.positions)
+    ]
+    for row, gap, facing in zip(rows, gaps.gap.tolist(), gaps.facing.tolist(), strict=False):
+        row.append(short(gap / unit, roundoff / unit) if facing else "beyond")
+    left = _aligned([[SLAVE_NODE, "x", "y", "gap"], *rows[:n_slave]])
+    right = _aligned([[MASTER_NODE, "x", "y"], *rows[n_slave:]])
+    if len(left[0]) + len(right[0]) + 8 > width:
+        return [f"  {row}" for row in [*left, *right]]
+    height, indent = max(len(left), len(right)), len(left[0])
+    left += [" " * indent] * (height - len(left))
+    right += [""] * (height - len(right))
+    return [f"  {slave}      {master}" for slave, master in zip(left, right, strict=True)]
+
+
+def _aligned(rows: list[list[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(entry.rjust(width) for entry, width in zip(row, widths, strict=True)) for row in rows]
+
+
+def _rest(case: Case) -> str:
+    numbers = [f"penalty {short(case.penalty)}"]
+    numbers += [
+        f"{name} {short(values.item())}"
+        for name, values in case.parameters.items()
+        if values.size == 1 and name != "penetration"
+    ]
+    return "   ".join([*numbers, f"seed {case.seed}"])

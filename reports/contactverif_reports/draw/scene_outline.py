@@ -1,0 +1,111 @@
+"""Draws the bodies of a stored scene before anything is solved: cells, supports, loads, surfaces. Slow to import.
+
+All of it is in the case (`parameter_bodies_…`, see reports/README.md), in one numbering of nodes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif_reports.draw.strokes import MASTER, SLAVE
+
+_BODIES = "bodies_"
+_SHADES = {True: "0.88", False: "0.96"}  # of slave and master, told apart in grey
+_ARROW = 0.14  # longest load, of the scene
+_SUPPORT = 0.02  # half of the mark of a support, of the scene
+
+
+def has_outline(case: Case) -> bool:
+    """Whether the case holds bodies."""
+    return f"{_BODIES}nodes" in case.parameters
+
+
+def outline(case: Case, width: float) -> Figure:
+    """The reference configuration of the bodies; `width` in inches. Rigid bodies are their surfaces."""
+    packed = {name.removeprefix(_BODIES): found for name, found in case.parameters.items() if name.startswith(_BODIES)}
+    nodes = packed["nodes"]  # (n_nodes, 2) of all bodies
+    of_body = np.repeat(np.arange(len(packed["count"])), packed["count"].astype(np.int64))  # (n_nodes,)
+    is_slave = packed["is_slave"] != 0
+    size = float(np.ptp(nodes, axis=0).max())
+    wide, high = np.ptp(nodes, axis=0) / size + 2 * _ARROW
+    figure = Figure(figsize=(width, float(np.clip(width * high / wide, 1.8, 0.75 * width)) + 0.5), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_aspect("equal", adjustable="datalim")
+    _draw_cells(axes, packed["cells"].astype(np.int64), nodes, is_slave[of_body])
+    first = packed["axis"][of_body]  # (n_nodes, 2)
+    second = np.column_stack([-first[:, 1], first[:, 0]])
+    rigid = ~np.isin(of_body, of_body[_corners(packed["cells"])])  # (n_nodes,)
+    _draw_surfaces(axes, packed["contact"].astype(np.int64), nodes, is_slave[of_body], rigid)
+    fixed = (packed["fixed"] != 0) & ~rigid[:, None]
+    _draw_supports(axes, nodes, fixed, (first, second), _SUPPORT * size)
+    loads = packed["load"][:, :1] * first + packed["load"][:, 1:] * second
+    _draw_loads(axes, nodes, loads, _ARROW * size)
+    axes.set(xlabel="x", ylabel="y")
+    axes.margins(0.06)
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    return figure
+
+
+def _corners(cells: FloatArray) -> IntArray:
+    numbers = cells.astype(np.int64).ravel()
+    found: IntArray = numbers[numbers >= 0]  # a triangle has −1 for its fourth
+    return found
+
+
+def _draw_cells(axes: Axes, cells: IntArray, nodes: FloatArray, is_slave: Any) -> None:
+    for side, shade in _SHADES.items():
+        own = [nodes[cell[cell >= 0]] for cell in cells if bool(is_slave[cell[0]]) == side]
+        axes.add_collection(PolyCollection(own, facecolor=shade, edgecolor="0.55", linewidth=0.5, zorder=1))
+    axes.plot(*nodes.T, linestyle="none")  # so that the axes reach around it
+
+
+def _draw_surfaces(axes: Axes, contact: IntArray, nodes: FloatArray, is_slave: Any, rigid: Any) -> None:
+    for pen, side in ((MASTER, False), (SLAVE, True)):
+        edges = contact[is_slave[contact[:, 0]] == side]
+        few = len(edges) <= 30
+        look: dict[str, Any] = {
+            "color": pen.color,
+            "marker": pen.marker,
+            "markerfacecolor": pen.fill,
+            "markersize": 4.5 if few else 2,
+        }
+        axes.add_collection(
+            LineCollection(list(nodes[edges]), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3)
+        )
+        axes.plot(*nodes[np.unique(edges)].T, linestyle="none", zorder=4, **look)
+        axes.plot([], [], linestyle=pen.style, label=pen.name + " (rigid)" * bool(rigid[edges].all()), **look)
+
+
+def _draw_supports(
+    axes: Axes, nodes: FloatArray, fixed: Any, frame: tuple[FloatArray, FloatArray], half: float
+) -> None:
+    """A short bar across each direction in which a node is held."""
+    first, second = frame
+    bars = []
+    for component, across in ((0, second), (1, first)):
+        held = fixed[:, component]
+        bars += list(np.stack([nodes[held] - half * across[held], nodes[held] + half * across[held]], axis=1))
+    if bars:
+        axes.add_collection(LineCollection(bars, colors="black", linewidths=2.2, zorder=5))
+        axes.plot([], [], color="black", linewidth=2.2, label="support")
+
+
+def _draw_loads(axes: Axes, nodes: FloatArray, loads: FloatArray, longest: float) -> None:
+    """Arrows that end at the nodes."""
+    sizes = np.linalg.norm(loads, axis=1)
+    if not sizes.max(initial=0.0) > 0:
+        return
+    arrows, at = loads[sizes > 0] * (longest / sizes.max()), nodes[sizes > 0]
+    axes.quiver(
+        *(at - arrows).T, *arrows.T, angles="xy", scale_units="xy", scale=1, width=0.004, color="0.25", zorder=6
+    )
+    axes.plot(*(at - arrows).T, linestyle="none")
+    axes.plot([], [], marker=r"$\downarrow$", linestyle="none", color="0.25", label="load")

@@ -1,0 +1,182 @@
+"""HTML pages that need nothing but themselves: templates filled in, figures inlined as SVG, files written whole.
+
+`templates/base.html.j2` has the looks of every page (screen, phone, dark, print); `templates/parts.html.j2` has what
+pages share: verdicts, figures, boxes that scroll.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Verdict
+from contactverif_reports.files import check_writable, checked_name, whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".html", ".htm")
+MARKS = {
+    Verdict.PASS: "✓",
+    Verdict.FAIL: "✗",
+    Verdict.UNDECIDED: "?",
+    Verdict.NOT_APPLICABLE: "–",
+    Verdict.CRASHED: "✗✗",
+    Verdict.NOT_PROVIDED: "○",
+    Verdict.NOT_LOADED: "○",
+    Verdict.NOT_JUDGED: "?",
+}
+_SVG = "{http://www.w3.org/2000/svg}"
+_HREF = "{http://www.w3.org/1999/xlink}href"
+_LEAST_SCALE = 0.6  # a figure is drawn no smaller than this; then its box scrolls, or labels of 9 pt cannot be read
+_PX_PER_PT = 96 / 72
+_INLINED = re.compile(r'<svg data-figure="(\w+)".*?</svg>', re.S)
+
+
+def render(template_name: str, *, package: str = "contactverif_reports.html", **context: Any) -> str:
+    """The template of that name (`report.html.j2`) filled in.
+
+    What is not `Markup` is escaped; a name that the template asks for and the context lacks is an error. A figure that
+    stands in the page several times gets ids of its own each time.
+    """
+    return _with_distinct_ids(_environment(package).get_template(template_name).render(context))
+
+
+def check_page(path: str | os.PathLike[str], argument: str = "--html") -> None:
+    """Says before something takes long what would stop the page from being written after it.
+
+    Raises
+    ------
+    MisuseError : as `write_page`.
+    """
+    checked_name(path, SUFFIXES, argument)
+    check_writable(path, argument, "FILE.html")
+
+
+def write_page(path: str | os.PathLike[str], html: str, argument: str = "--html") -> None:
+    """Writes a page, whole or not at all, as UTF-8.
+
+    Parameters
+    ----------
+    argument : how the caller calls the path.
+
+    Raises
+    ------
+    MisuseError : if the name is no page's, or the file cannot be written.
+    """
+    check_page(path, argument)
+    try:
+        with whole(path) as part:
+            part.write_text(html, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise MisuseError(argument, f"{os.fspath(path)}: {error.strerror}", "a file that can be written") from error
+
+
+def svg_inline(figure: Figure, label: str = "") -> Markup:
+    """A matplotlib figure as an `<svg>` element for a page: no prolog, no background, as wide as there is room.
+
+    The same figure gives the same bytes. Text stays text: it is selected, searched and read aloud, and a page of many
+    figures stays small; widths were computed with a wide font, so that another one fits too.
+
+    Parameters
+    ----------
+    label : what a reader hears who does not see it; without one the figure is decoration beside its caption.
+    """
+    import matplotlib
+
+    buffer = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "contactverif", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    root = ElementTree.fromstring(buffer.getvalue())
+    _remove_strangers(root)
+    _prefix_ids(root, "f" + hashlib.sha256(buffer.getvalue()).hexdigest()[:9])
+    for element in root.iter():
+        element.tag = element.tag.removeprefix(_SVG)
+    root.attrib = _root_attributes(root, label)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number for a reader: few digits, a true minus sign, – for NaN."""
+    if value != value:
+        return "–"
+    plain = re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
+    return plain.replace("-", "−").replace("inf", "∞")
+
+
+@cache
+def _environment(package: str = "contactverif_reports.html") -> Environment:
+    """Templates of a package; those of this one, such as `base.html.j2`, are there for all."""
+    packages = dict.fromkeys([package, "contactverif_reports.html"])
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader(name) for name in packages]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    environment.globals["marks"] = {str(verdict): mark for verdict, mark in MARKS.items()}
+    return environment
+
+
+def _remove_strangers(root: ElementTree.Element) -> None:
+    """Takes out what would reach beyond the figure, in a page: metadata, and a style sheet for every element."""
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
+                parent.remove(child)
+
+
+def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
+    """Keeps the ids that something refers to, each behind the prefix, and drops the others."""
+    references = re.compile(r"url\(#([^)]+)\)")
+    used: set[str] = set()
+    for element in root.iter():
+        if _HREF in element.attrib:
+            element.set("href", element.attrib.pop(_HREF))
+        for name, value in element.attrib.items():
+            if name == "href" and value.startswith("#"):
+                used.add(value[1:])
+                element.set(name, f"#{prefix}-{value[1:]}")
+            elif "url(#" in value:
+                used.update(references.findall(value))
+                element.set(name, references.sub(rf"url(#{prefix}-\1)", value))
+    for element in root.iter():
+        if (own := element.attrib.pop("id", None)) in used:
+            element.set("id", f"{prefix}-{own}")
+    root.set("data-figure", prefix)
+
+
+def _root_attributes(root: ElementTree.Element, label: str) -> dict[str, str]:
+    width = float(root.attrib["width"].removesuffix("pt")) * _PX_PER_PT
+    spoken = {"role": "img", "aria-label": label} if label else {"aria-hidden": "true"}
+    return {
+        "data-figure": root.attrib["data-figure"],
+        "viewBox": root.attrib["viewBox"],
+        "width": "100%",
+        "style": f"max-width:{width:.0f}px;--least:{_LEAST_SCALE * width:.0f}px;"
+        "stroke-linejoin:round;stroke-linecap:butt",
+        **spoken,
+    }
+
+
+def _with_distinct_ids(html: str) -> str:
+    """Figures that are there more than once refer to their own parts, not to those of the first."""
+    seen: dict[str, int] = {}
+
+    def own(match: re.Match[str]) -> str:
+        name = match[1]
+        seen[name] = seen.get(name, 0) + 1
+        return match[0] if seen[name] == 1 else match[0].replace(name, f"{name}-{seen[name]}")
+
+    return _INLINED.sub(own, html)

@@ -1,0 +1,1 @@
+"""The netCDF report: its schema, how it is written, how it is read."""

@@ -1,0 +1,20 @@
+"""A run made by hand, whose only counterexample is a given case."""
+
+from __future__ import annotations
+
+from contactverif.contract.case import Case
+from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.result import Row, Run
+from contactverif.run.registry import load_properties
+
+
+def run_with(case: Case, formulation: str, property_id: str = "patch.flat.transmission") -> Run:
+    """As if the formulation had failed an installed property on the case."""
+    (question,) = load_properties([property_id])
+    assert isinstance(question, Property)
+    failed = Outcome(case, Verdict.FAIL, "made by hand")
+    row = Row(formulation, question, Verdict.FAIL, None, planned=1, outcomes=(failed,), shrunk=failed)
+    parts = {"pair": True, "tangent": True, "contact_points": True}
+    return Run(
+        (row,), (), {formulation: parts}, {"created": "2025-01-01T00:00:00", "command": "", "platform": "", "seed": "0"}
+    )

@@ -1,0 +1,277 @@
+"""The command `compare`: tables, exit statuses, files, and one line for each thing that cannot be asked."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import pytest
+from asking import Ask, asking
+
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Run
+from contactverif.run import runner
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import run
+from contactverif_reports.netcdf.read import same_data
+from contactverif_reports.netcdf.write import write
+
+PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
+QUICK = ("--examples", "12", "--seed", "1", "-p", "patch.flat.transmission", "-p", "balance.force")
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    return partial(asking(monkeypatch, capsys), "compare")
+
+
+def found(names: Sequence[str], *globs: str, examples: int = 12, seed: int = 1) -> Run:
+    subjects = [load_formulation(name) for name in names]
+    return run(subjects, load_properties(globs or ["patch.flat.transmission"]), examples=examples, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Reports: `old`, `same`; `worse`, where VTS-PPT does what VTS-ME does; `other` (seed), `nts`, `purity`."""
+    folder = tmp_path_factory.mktemp("reports")
+    old, other = found(["vts-ppt"]), found(["vts-ppt"], seed=2)
+    (promised,), (worse,) = old.rows, found(["vts-me"]).rows
+    row = replace(worse, formulation=promised.formulation, promise=promised.promise)
+    made = {
+        "old": old,
+        "same": old,
+        "worse": replace(old, rows=(row,)),
+        "other": other,
+        "nts": found(["nts"]),
+        "purity": found(["vts-ppt"], "purity", examples=2),
+    }
+    for name, one in made.items():
+        write(one, folder / f"{name}.nc")
+    return folder
+
+
+class Page(HTMLParser):
+    """What a page holds: its text, its ids, and what it would fetch from elsewhere."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.fetched: list[str] = []
+        self.text = ""
+        self.tags: list[str] = []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value or "")
+            if name in ("src", "href") and not (value or "").startswith("#"):
+                self.fetched.append(value or "")
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Formulations
+
+
+def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
+    answer = ask("vts-me", "--against", "vts-ppt", *QUICK)
+    assert answer.status == 0  # vts-me says itself that it fails the patch test
+    assert answer.err == ""
+    assert re.search(r"vts-me against vts-ppt: profile dev, 12 examples a property, seed 1", answer.out)
+    assert re.search(r"patch.flat.transmission +pass +≠ fail", answer.out)
+    assert re.search(r"balance.force +fail +≠ pass", answer.out)
+    assert re.search(r"256 slave segments *\n +vts-ppt .*1\.00 *\n +vts-me ", answer.out)
+    assert re.search(
+        r"patch.flat.transmission, case \d+\n    vts-me: fail, .* times its tolerance\n    vts-ppt: pass,", answer.out
+    )
+    assert answer.out.rstrip().endswith(
+        "every promise of vts-me kept; what fails was announced, or nothing was said of it"
+    )
+
+
+def test_all_that_is_asked_for_is_written(ask: Ask, tmp_path: Path) -> None:
+    report, html, pictures = tmp_path / "r.nc", tmp_path / "r.html", tmp_path / "new" / "pictures"
+    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--report", report, "--html", html, "--pictures", pictures)
+    assert answer.status == 0
+    write(found(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
+    assert same_data(report, tmp_path / "v.nc") == []  # as verify writes it
+    assert sorted(path.name for path in pictures.iterdir()) == [
+        f"{name}.{id_}.png" for name in ("vts-me", "vts-ppt") for id_ in ("balance.force", "patch.flat.transmission")
+    ]
+    page = Page(html)
+    assert page.fetched == []
+    assert len(page.ids) == len(set(page.ids))
+    assert page.tags.count("svg") == 1 + 4 + 4  # axis and distributions; two meshes, each with the forces of both
+    assert "vts-me against vts-ppt" in page.text
+    assert "every promise of vts-me is kept" in page.text.lower()
+
+
+def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """VTS-PPT under trial says that it fails `balance.force`; a harness where nothing fails breaks that."""
+    judge = runner.judge_case
+    monkeypatch.setattr(runner, "judge_case", lambda *one: replace(judge(*one), verdict=Verdict.PASS, reason=""))
+    options = ("--examples", "3", "--seed", "1", "-p", "balance.force")
+    answer = ask("vts-ppt", "--against", "vts-me", *options)
+    assert answer.status == 1
+    assert answer.out.rstrip().endswith("1 unexpected: vts-ppt balance.force (said to fail, and passes)")
+    answer = ask("vts-me", "--against", "vts-ppt", *options)
+    assert answer.status == 0
+    assert "SAID TO FAIL, AND PASSES" in answer.out
+
+
+def test_scenes_and_meshes_can_be_compared_on(ask: Ask) -> None:
+    answer = ask("vts-me", "--against", "vts-ppt", "--scene", "c", "-p", "patch.flat.*", "--examples", "1")
+    assert answer.status == 0
+    assert re.search(r"patch.flat.solve +pass +≠ fail", answer.out)
+    on_punch = ("--mesh", PUNCH, "--slave", "punch", "--master", "base", "-p", "balance.force", "--examples", "2")
+    assert ask("nts", "--against", "vts-ppt-balanced", *on_punch, "--seed", "1").status == 0
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Reports
+
+
+def test_equal_reports_have_no_regression(ask: Ask, reports: Path) -> None:
+    answer = ask(reports / "old.nc", reports / "same.nc")
+    assert (answer.status, answer.err) == (0, "")
+    assert re.search(r"patch.flat.transmission +pass .* 0 +12 +0 +\d", answer.out)
+    assert answer.out.rstrip().endswith("nothing got worse")
+
+
+def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: Path) -> None:
+    html = tmp_path / "r.html"
+    answer = ask(reports / "old.nc", reports / "worse.nc", "--html", html)
+    assert answer.status == 1
+    assert "pass → fail" in answer.out
+    told = " ".join(answer.out.split())  # it is long, and wrapped
+    assert re.search(
+        r" 1 regression vts-ppt, patch.flat.transmission: pass → fail .*; error grew, in tolerances, on", told
+    )
+    replay = re.search(r"contactverif replay (\S+) --case vts-ppt.patch.flat.transmission", answer.out)
+    assert replay
+    assert replay[1] == str(reports / "worse.nc")
+    page = Page(html)
+    assert page.fetched == []
+    assert "1 regression." in page.text
+    assert page.tags.count("svg") == 1 + 2 + 1  # axis, old and new; the mesh
+    assert ask(reports / "worse.nc", reports / "old.nc").status == 0
+
+
+def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
+    tables = ask(reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
+    assert "…" not in tables
+    assert re.search(r"better +equal +worse +time", tables)
+    asked = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
+    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *asked, columns=80).out.partition("\npatch.flat.")[0]
+    assert "…" not in tables
+    assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)
+    assert re.search(r"converged +median +most +fewer +same +more +order *\n", tables)
+    assert max(map(len, tables.splitlines())) == 80
+
+
+def test_other_seeds_are_compared_as_distributions_and_it_is_said(ask: Ask, reports: Path) -> None:
+    answer = ask(reports / "old.nc", reports / "other.nc")
+    assert answer.status == 0
+    assert "all rows asked other cases: their errors are compared as distributions" in answer.out
+
+
+def test_a_report_needs_no_ending_and_a_formulation_is_none(
+    ask: Ask, reports: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(reports / "old.nc", tmp_path / "old")
+    shutil.copy(reports / "old.nc", tmp_path / "vts-me")
+    assert ask("old", reports / "same.nc").status == 0
+    assert "vts-me against vts-ppt" in ask("vts-me", "--against", "vts-ppt", *QUICK, "-p", "balance.force").out
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Bad input
+
+MISTAKES = [
+    # argument, found, needed
+    ([], r"--against: found nothing; needed the formulation to compare with, or two reports OLD.nc NEW.nc"),
+    (["nts"], r"--against: found nothing; needed .*"),
+    (["--against", "vts-ppt"], r"NAME: found nothing; needed some of .*nts, .*, or two reports OLD.nc NEW.nc"),
+    (["nts", "--against", "vts-pt"], r"--against: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
+    (["vts-pt", "--against", "nts"], r"formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
+    (["nts", "--against", "nts"], r"--against: found nts, which is compared too; needed another formulation .*"),
+    (["nts", "nts", "--against", "vts-ppt"], r"formulation: found nts 2 times; needed each of them once"),
+    (["nts", "--against", "vts-ppt", "-p", "pach.*"], r"property: found 'pach.\*'; needed .*"),
+    (["nts", "--against", "vts-ppt", "--examples", "0"], r"--examples: found 0; needed at least 1"),
+    (["nts", "--against", "vts-ppt", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nightly"),
+    (["nts", "--against", "vts-ppt", "--report", "no/r.nc"], r"--report: .* is no folder; needed a folder that exists"),
+    (["nts", "--against", "vts-ppt", "--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
+    (["nts", "--against", "vts-ppt", "--html", "r.pdf"], r"--html: found 'r.pdf'; needed a name that ends in .html .*"),
+    (["nts", "--against", "vts-ppt", "--pictures", str(PUNCH)], r"--pictures: found .* needed a folder that can be .*"),
+    (["nts", "--against", "vts-ppt", "--flip"], r"--mesh: found none, but --flip; needed --mesh FILE, .*"),
+    (["a.nc"], r"NAME: found 1 report; needed two, OLD.nc NEW.nc"),
+    (["a.nc", "b.nc", "c.nc"], r"NAME: found 3 reports; needed two, OLD.nc NEW.nc"),
+    (["a.nc", "nts"], r"NAME: found nts and the report a.nc; needed formulations alone, or two reports"),
+    ([str(PUNCH), "nts"], r"NAME: found nts and the report .*punch.msh; needed formulations alone, or two reports"),
+    (["a.nc", "b.nc", "--against", "nts"], r"--against: found two reports beside it; needed formulations, which .*"),
+    (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations, which .*"),
+    (["a.nc", "b.nc", "--report", "r.nc"], r"--report: found two reports beside it; needed formulations, which .*"),
+    (["a.nc", "b.nc"], r"OLD.nc: found a.nc, which does not exist; needed a report that .*"),
+    ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file .*; needed a report \(netCDF-4\)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "said"), MISTAKES, ids=[" ".join(one)[-60:] for one, _ in MISTAKES])
+def test_a_mistake_is_one_line_and_nothing_is_judged(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: Sequence[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    judged: list[Any] = []
+    monkeypatch.setattr(runner, "judge_case", lambda *anything: judged.append(anything))
+    answer = ask(*arguments)
+    assert (answer.status, answer.out) == (2, "")
+    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert not judged
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("new", "options", "said"),
+    [
+        ("nts.nc", [], r"NEW.nc: found no formulation that OLD.nc has too \(vts-ppt and nts\); needed two reports .*"),
+        ("purity.nc", [], r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
+        ("old.nc", ["-p", "purity"], r"--property: found 'purity'; needed one of patch.flat.transmission"),
+        ("old.nc", ["--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
+        ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
+        ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0; needed schema 1"),
+        (
+            "damaged.nc",
+            [],
+            r"(OLD|NEW).nc: found .*damaged.nc, which cannot be read \(.*\); needed an undamaged report",
+        ),
+    ],
+)
+def test_a_mistake_in_a_report_is_one_line(
+    ask: Ask, reports: Path, new: str, options: Sequence[str], said: str
+) -> None:
+    if not (reports / new).exists():
+        shutil.copy(reports / "old.nc", reports / new)
+        with netCDF4.Dataset(reports / new, "a") as data:
+            if new == "else.nc":
+                data.title = "weather"
+            elif new == "schema.nc":
+                data.schema = "0"
+            else:
+                data["summary"].renameVariable("row_verdict", "gone")
+    answer = ask(reports / "old.nc", reports / new, *options)
+    assert (answer.status, answer.out) == (2, "")
+    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err

@@ -1,0 +1,95 @@
+"""The command `report`: the table of the run again, a page, and one line for what cannot be."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from asking import Answer, Ask, asking
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    return asking(monkeypatch, capsys)
+
+
+@pytest.fixture
+def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
+    """A report of NTS, which fails the patch test as it says, and what `verify` printed."""
+    path = tmp_path / "nts.nc"
+    asked = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3")
+    return path, ask("verify", "nts", "vts-ppt", *asked, "--report", path)
+
+
+def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
+    path, verified = run
+    shown = ask("report", path)
+    assert (shown.status, shown.err) == (0, "")
+    *table, summary = shown.out.splitlines()
+    assert len(table) > 8
+    assert verified.out.splitlines()[: len(table)] == table
+    assert verified.out.splitlines()[-1] == summary
+
+
+def test_a_page_of_the_report(ask: Ask, run: tuple[Path, Answer], tmp_path: Path) -> None:
+    path, _ = run
+    page = tmp_path / "nts.html"
+    answer = ask("report", path, "--html", page)
+    assert (answer.status, answer.out, answer.err) == (0, f"page: {page}\n", "")
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert "Verification of nts, vts-ppt" in text
+    assert f"contactverif replay {path} --case nts.patch.flat.transmission" in text
+    assert not re.search(r'(?:src|href)="(?!#)', text)
+    first = page.read_bytes()
+    ask("report", path, "--html", page)
+    assert page.read_bytes() == first
+
+
+def test_a_report_with_failures_is_shown_all_the_same(ask: Ask, tmp_path: Path) -> None:
+    from handmade_run import run_with
+
+    from contactverif.scenes.catalogue import scene_named
+    from contactverif_reports.netcdf.write import write
+
+    path = tmp_path / "wrong.nc"
+    write(run_with(scene_named("a1").case(), "nts"), path)
+    answer = ask("report", path)
+    assert answer.status == 0
+    assert "patch.flat.transmission" in answer.out
+    assert ask("report", path, "--html", tmp_path / "wrong.html").status == 0
+
+
+@pytest.mark.parametrize(
+    ("report", "html", "line"),
+    [
+        ("nowhere.nc", None, "contactverif: REPORT: found nowhere.nc, which does not exist; needed a report that"),
+        (".", None, "contactverif: REPORT: found ., which is a folder; needed a report that"),
+        ("words.nc", None, "contactverif: REPORT: found words.nc, which is no netCDF file"),
+        ("words.nc", "page.pdf", "contactverif: --html: found 'page.pdf'; needed a name that ends in .html or .htm"),
+        ("words.nc", "none/page.html", "contactverif: --html: found none/page.html in "),
+        ("words.nc", "page.html", "contactverif: REPORT: found words.nc, which is no netCDF file"),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, report: str, html: str | None, line: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("words.nc").write_text("no report")
+    answer = ask("report", report, *(["--html", html] if html else []))
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith(line)
+    assert answer.err.count("\n") == 1
+    assert not list(tmp_path.glob("*.html"))
+
+
+def test_a_netcdf_file_of_something_else(ask: Ask, tmp_path: Path) -> None:
+    import netCDF4
+
+    path = tmp_path / "other.nc"
+    with netCDF4.Dataset(path, "w") as file:
+        file.title = "temperatures"
+    answer = ask("report", path)
+    assert answer.status == 2
+    assert "a netCDF file of something else" in answer.err

@@ -1,0 +1,69 @@
+"""Where output goes may be full, closed or know no Greek, and whoever watches may press Ctrl-C: no traceback for it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from contactverif.cli.progress import Bar
+
+MAIN = [sys.executable, "-c", "from contactverif.cli import main; main()"]
+
+
+def asked(*arguments: str, **how: object) -> subprocess.CompletedProcess[str]:
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "timeout": 120} | how
+    return subprocess.run([*MAIN, *arguments], check=False, **options)  # type: ignore[call-overload, no-any-return]
+
+
+def test_a_terminal_without_greek_is_shown_question_marks() -> None:
+    answer = asked("scenes", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert "?" in answer.stdout
+    assert answer.stdout.isascii()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_a_full_disk_is_one_line() -> None:
+    with open("/dev/full", "w") as full:
+        answer = asked("list", stdout=full)
+    assert answer.returncode == 2
+    assert answer.stderr == "contactverif: what was found cannot be written: No space left on device\n"
+
+
+def test_who_has_seen_enough_may_close_the_pipe() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        answer = asked("list", stdout=write)
+    finally:
+        os.close(write)
+    assert (answer.returncode, answer.stderr) == (128 + signal.SIGPIPE, "")
+
+
+def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
+    """As in a callback of the garbage collector, where nothing can be raised."""
+    before = signal.getsignal(signal.SIGINT)
+    with Bar() as bar:
+        bar.at("one", 0, 3)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            bar.at("two", 1, 3)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_two_references_are_one_too_many() -> None:
+    answer = asked("compare", "nts", "--against", "vts-ppt", "--against", "vts-me")
+    assert answer.returncode == 2
+    assert answer.stderr == "contactverif: --against: found 2: vts-ppt, vts-me; needed one\n"
+
+
+def test_a_folder_without_a_name_is_none() -> None:
+    answer = asked("paper", "--out", "")
+    assert answer.returncode == 2
+    assert answer.stderr == "contactverif: --out: found ''; needed the name of a folder\n"

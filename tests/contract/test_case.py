@@ -1,0 +1,118 @@
+"""A case outlives its maker bit by bit, and its scales are those of the tolerances."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface, Surface
+
+PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
+Z = PAIR.nodes.reshape(-1) + np.array([0, -0.5] * 3 + [0, 0] * 2)
+
+
+def same(one: Case, other: Case) -> bool:
+    """Whether two cases agree bit by bit."""
+    arrays, others = one.to_arrays(), other.to_arrays()
+    return arrays.keys() == others.keys() and all(
+        arrays[name].dtype == others[name].dtype
+        and arrays[name].shape == others[name].shape
+        and arrays[name].tobytes() == others[name].tobytes()
+        for name in arrays
+    )
+
+
+def odd_case() -> Case:
+    """Numbers that a careless round trip would change."""
+    awkward = Z.copy()
+    awkward[:4] = -0.0, 5e-324, 0.1 + 0.2, np.nextafter(1.0, 2.0)
+    parameters: dict[str, Any] = {"gap": 0.1, "directions": [[1.0, 1e-300], [-0.0, 3]], "empty": [], "nan": np.nan}
+    return Case(PAIR, awkward, 1 / 3, parameters, 2**63 - 1, "C′")
+
+
+def test_round_trip_through_arrays() -> None:
+    case = odd_case()
+    again = Case.from_arrays(case.to_arrays())
+    assert same(case, again)
+    assert (again.name, again.seed, again.penalty) == ("C′", 2**63 - 1, 1 / 3)
+    assert again.parameters["directions"].shape == (2, 2)
+    assert np.signbit(again.z[0])
+
+
+def test_round_trip_through_a_file(tmp_path: Path) -> None:
+    case = odd_case()
+    np.savez(tmp_path / "case.npz", **case.to_arrays())  # type: ignore[arg-type]
+    with np.load(tmp_path / "case.npz") as arrays:
+        assert same(case, Case.from_arrays(arrays))
+
+
+def test_round_trip_of_several_and_closed_chains() -> None:
+    ring = np.array([[0.0, 0], [1, 0], [0, 1]])
+    nodes = np.vstack([ring, ring + 5, 3 * ring])
+    closed = Interface(
+        nodes, Surface(np.array([[4, 5], [0, 1], [1, 2], [2, 0], [3, 4]])), Surface(np.array([[6, 8], [8, 7], [7, 6]]))
+    )
+    case = Case(closed, nodes.reshape(-1))
+    again = Case.from_arrays(case.to_arrays())
+    assert same(case, again)
+    assert np.array_equal(again.interface.slave.chain_order, closed.slave.chain_order)
+
+
+def test_scales() -> None:
+    case = Case(PAIR, Z, parameters={"gap": np.array(-0.5)})
+    assert case.positions.shape == (5, 2)
+    assert case.positions[1].tolist() == [1, -0.5]
+    assert case.largest_coordinate == 4
+    assert case.shortest_segment == 1
+    assert case.slave_length == 4
+    assert case.diameter == np.hypot(6, 0.5)
+    assert case.n_segments == 3
+    assert case.parameter("gap") == -0.5
+
+
+def test_the_largest_coordinate_is_of_state_and_reference() -> None:
+    assert Case(PAIR, Z - 100).largest_coordinate == 102
+    assert Case(PAIR.at(PAIR.nodes - 100), Z).largest_coordinate == 102
+
+
+def test_a_case_is_a_read_only_copy() -> None:
+    z, directions = Z.copy(), np.ones(3)
+    case = Case(PAIR, z, parameters={"directions": directions})
+    z[:], directions[:] = 9, 9
+    assert np.array_equal(case.z, Z)
+    assert case.parameters["directions"].tolist() == [1, 1, 1]
+    for array in (case.z, case.positions, case.parameters["directions"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"z": Z[:-1]}, r"z: found shape \(9,\); needed \(10,\): n_nodes × dim, flat"),
+        ({"z": Z.reshape(5, 2)}, r"z: found shape \(5, 2\); needed \(10,\)"),
+        ({"z": np.where(np.arange(10) == 3, np.nan, Z)}, "z: found NaN or infinity; needed finite positions"),
+        ({"z": np.where(np.arange(10) == 3, np.inf, Z)}, "z: found NaN or infinity"),
+        ({"z": Z * 1j}, "z: found dtype complex128; needed real numbers"),
+        ({"z": ["a"] * 10}, "z: found dtype <U1; needed real numbers"),
+        ({"penalty": 0}, "penalty: found 0; needed a finite number > 0"),
+        ({"penalty": -1.0}, "penalty: found -1.0"),
+        ({"penalty": np.nan}, "penalty: found nan"),
+        ({"penalty": np.inf}, "penalty: found inf"),
+        ({"penalty": "10"}, "penalty: found '10'"),
+        ({"penalty": None}, "penalty: found None"),
+        ({"penalty": [1.0, 2.0]}, r"penalty: found \[1.0, 2.0\]"),
+        ({"seed": -1}, "seed: found -1; needed an integer from 0 to 2"),
+        ({"seed": 0.5}, "seed: found 0.5"),
+        ({"seed": 2**63}, "seed: found 9223372036854775808"),
+        ({"seed": 2**70}, "seed: found 1180591620717411303424"),
+    ],
+)
+def test_wrong_cases(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(MisuseError, match=message):
+        Case(**({"interface": PAIR, "z": Z} | changed))

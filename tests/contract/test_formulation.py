@@ -1,0 +1,138 @@
+"""The contract holds its own rules: a pairing is bounded integers, a promise is data, points of contact are whole."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+
+PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
+
+
+def test_a_pairing_is_a_read_only_mapping() -> None:
+    segments = np.array([0, -1, 3])
+    pairing = Pairing({"segment": segments, "active": np.array([True, False, True])})
+    segments[:] = 7
+    assert list(pairing) == ["segment", "active"]
+    assert len(pairing) == 2
+    assert pairing["segment"].tolist() == [0, -1, 3]
+    assert repr(pairing) == "Pairing(segment(3,), active(3,))"
+    for values in pairing.values():
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 0
+    with pytest.raises(TypeError):
+        pairing["segment"] = segments  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        ([1, 2], "pair: returned a list; needed a mapping from names to arrays"),
+        (None, "pair: returned a NoneType; needed a mapping"),
+        ({"xi": np.array([0.5])}, "pair: 'xi' is dtype float64; needed an array of int64 or bool"),
+        ({"xi": np.array([0.5j])}, "pair: 'xi' is dtype complex128"),
+        ({"segment": np.array([1], dtype=np.int32)}, "pair: 'segment' is dtype int32"),
+        ({"segment": np.array([1], dtype=np.uint64)}, "pair: 'segment' is dtype uint64"),
+        ({"segment": np.array([0.5], dtype=object)}, "pair: 'segment' is dtype object"),
+        ({"segment": [1, 2]}, "pair: 'segment' is a list; needed an array of int64 or bool"),
+        ({"segment": 1}, "pair: 'segment' is a int"),
+        ({1: np.array([1])}, "pair: the name 1 is a int; needed a string"),
+        ({"outer": {"inner": np.array([1])}}, "pair: 'outer' is a dict"),
+    ],
+)
+def test_a_pairing_holds_integers_and_booleans_only(answer: Any, message: str) -> None:
+    with pytest.raises(ContractError, match=message):
+        Pairing(answer)
+
+
+@pytest.mark.parametrize("values", [[-1], [8], [], [[0, 1], [2, 8]]])
+def test_numbers_within_the_sizes_of_the_problem(values: list[Any]) -> None:
+    Pairing({"numbers": np.array(values, dtype=np.int64)}).check_bounds(PAIR)
+
+
+@pytest.mark.parametrize(
+    ("values", "outlier"), [([-2], -2), ([0, 9], 9), ([2**62, 0], 2**62), ([-(2**63), 9], -(2**63))]
+)
+def test_numbers_that_number_nothing(values: list[int], outlier: int) -> None:
+    with pytest.raises(ContractError, match=f"pair: 'numbers' holds {outlier}; needed integers from −1 to 8"):
+        Pairing({"numbers": np.array(values), "active": np.array([True])}).check_bounds(PAIR)
+
+
+def test_entries_of_a_pattern_may_number_more_than_unknowns() -> None:
+    Pairing({"rows": np.zeros(40, dtype=np.int64), "entry": np.array([40])}).check_bounds(PAIR)
+    with pytest.raises(ContractError, match="needed integers from −1 to 40"):
+        Pairing({"rows": np.zeros(40, dtype=np.int64), "entry": np.array([41])}).check_bounds(PAIR)
+
+
+def test_same_as() -> None:
+    one = Pairing({"a": np.array([1, 2]), "b": np.array([True])})
+    assert one.same_as(Pairing(dict(reversed(list(one.items())))))
+    for other in (
+        {"a": np.array([1, 3]), "b": np.array([True])},
+        {"a": np.array([[1, 2]]), "b": np.array([True])},
+        {"a": np.array([1, 2]), "c": np.array([True])},
+        {"a": np.array([1, 2])},
+        {},
+    ):
+        assert not one.same_as(Pairing(other))
+        assert not Pairing(other).same_as(one)
+    assert Pairing({}).same_as(Pairing({}))
+
+
+def test_no_traits_promise_nothing() -> None:
+    traits = Traits()
+    for name in ("passes_flat_patch", "tangent", "symmetric", "conserves_force", "conserves_moment", "continuity"):
+        assert getattr(traits, name) is None
+    assert not traits.batched
+    assert not traits.takes_complex
+    assert not traits.witnesses
+    with pytest.raises(FrozenInstanceError):
+        traits.symmetric = True  # type: ignore[misc]
+
+
+def points(**changed: Any) -> ContactPoints:
+    """Two points of contact, with what is changed."""
+    whole: dict[str, Any] = {entry.name: np.array([0.5, np.nan]) for entry in fields(ContactPoints)}
+    whole |= {"slave_segment": np.array([0, 0]), "master_segment": np.array([1, -1]), "active": np.array([True, False])}
+    whole |= {"position": np.zeros((2, 2)), "normal": np.ones((2, 2))}
+    return ContactPoints(**(whole | changed))
+
+
+def test_contact_points_are_read_only_and_may_be_meaningless() -> None:
+    whole = points(c=[0, 1])
+    assert whole.c.dtype == np.float64
+    assert np.isnan(whole.gap[1])
+    assert whole.active.dtype == np.bool_
+    with pytest.raises(ValueError, match="read-only"):
+        whole.gap[0] = 1
+
+
+def test_no_contact_points() -> None:
+    none = {entry.name: [] for entry in fields(ContactPoints)} | {
+        "position": np.empty((0, 2)),
+        "normal": np.empty((0, 2)),
+    }
+    assert len(ContactPoints(**none).gap) == 0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"gap": np.zeros(3)}, r"ContactPoints.gap: found shape \(3,\); needed \(2,\)"),
+        ({"gap": np.zeros((2, 1))}, r"ContactPoints.gap: found shape \(2, 1\); needed \(2,\)"),
+        ({"normal": np.zeros(2)}, r"ContactPoints.normal: found shape \(2,\); needed \(2, dim\)"),
+        ({"slave_segment": np.array([0, 0, 0])}, r"ContactPoints.c: found shape \(2,\); needed \(3,\)"),
+        ({"master_segment": np.array([0.7, 1.0])}, "ContactPoints.master_segment: found dtype float64; needed int64"),
+        ({"active": np.array([0.3, 1.0])}, "ContactPoints.active: found dtype float64; needed bool"),
+        ({"gap": np.array([1j, 0])}, "ContactPoints.gap: found dtype complex128; needed float64"),
+    ],
+)
+def test_broken_contact_points(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(MisuseError, match=message):
+        points(**changed)

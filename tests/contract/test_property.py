@@ -1,0 +1,116 @@
+"""From numbers to a verdict: nothing that is no number passes, and a doubt never becomes an accusation."""
+
+from __future__ import annotations
+
+from math import inf, nan
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, excess, judge
+
+MOST = Quantity("defect", "1", "u 8X/|g|", "roundoff of a gap")
+LEAST = Quantity("slope", "1", "1.9", "second order", sense="at least")
+QUESTION = Property(
+    id="a.question",
+    family="a",
+    summary="asks",
+    quantities=(MOST, LEAST),
+    cases=lambda interface: None,
+    measure=lambda case, subject: Measurement({}, {}),
+    promise=lambda traits: None,
+)
+
+
+def measured(
+    defect: float = 0.5, slope: float = 2.0, *, held_to: tuple[float, float] = (1.0, 1.9), **more: str
+) -> Measurement:
+    values = {"defect": defect, "slope": slope}
+    return Measurement(values, dict(zip(values, held_to, strict=True)), **more)  # type: ignore[arg-type]
+
+
+def test_a_pass_has_no_reason() -> None:
+    assert judge(QUESTION, measured()) == (Verdict.PASS, "")
+    assert judge(QUESTION, measured(1.0, 1.9)) == (Verdict.PASS, "")
+
+
+def test_a_failure_says_value_and_tolerance() -> None:
+    assert judge(QUESTION, measured(1.5)) == (Verdict.FAIL, "defect 1.5, at most 1")
+    assert judge(QUESTION, measured(slope=1.5)) == (Verdict.FAIL, "slope 1.5, at least 1.9")
+    assert judge(QUESTION, measured(1.5, 1.5)) == (Verdict.FAIL, "defect 1.5, at most 1; slope 1.5, at least 1.9")
+
+
+def test_a_breach_that_no_number_tells() -> None:
+    assert judge(QUESTION, measured(broken="changed its input")) == (Verdict.FAIL, "changed its input")
+    assert judge(QUESTION, measured(2.0, broken="changed its input"))[1].startswith("changed its input; defect 2")
+
+
+def test_a_doubt_excuses_a_failure_and_spoils_no_pass() -> None:
+    assert judge(QUESTION, measured(1.5, undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
+    assert judge(QUESTION, measured(undecided="a kink")) == (Verdict.PASS, "")
+    assert judge(QUESTION, measured(broken="it printed", undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf, np.float64(nan)])
+def test_what_is_not_finite_fails_before_anything_is_compared(value: float) -> None:
+    assert judge(QUESTION, measured(value)) == (Verdict.FAIL, f"defect is {value}")
+    assert judge(QUESTION, measured(slope=value)) == (Verdict.FAIL, f"slope is {value}")
+    assert judge(QUESTION, measured(5.0, value)) == (Verdict.FAIL, f"slope is {value}")
+    assert judge(QUESTION, measured(value, undecided="a kink"))[0] is Verdict.FAIL
+    assert judge(QUESTION, measured(0.0, value, held_to=(nan, nan))) == (Verdict.FAIL, f"slope is {value}")
+
+
+@pytest.mark.parametrize("tolerance", [nan, inf, -inf, np.float64(nan)])
+@pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 1e300])
+def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value: float, tolerance: float) -> None:
+    of_defect, of_slope = measured(value, held_to=(tolerance, 1.9)), measured(slope=value, held_to=(1.0, tolerance))
+    assert judge(QUESTION, of_defect) == (Verdict.UNDECIDED, f"the tolerance of defect is {tolerance}")
+    assert judge(QUESTION, of_slope) == (Verdict.UNDECIDED, f"the tolerance of slope is {tolerance}")
+    assert excess(MOST, value, tolerance) == inf
+    assert excess(LEAST, value, tolerance) == inf
+
+
+def test_a_failure_stands_whatever_the_other_tolerance() -> None:
+    assert judge(QUESTION, measured(2.0, held_to=(1.0, nan))) == (Verdict.FAIL, "defect 2, at most 1")
+    assert judge(QUESTION, measured(broken="it printed", held_to=(nan, nan))) == (Verdict.FAIL, "it printed")
+
+
+def test_a_quantity_may_be_left_unmeasured() -> None:
+    assert judge(QUESTION, Measurement({"defect": 0.5}, {"defect": 1.0})) == (Verdict.PASS, "")
+    assert judge(QUESTION, Measurement({"defect": 2.0}, {"defect": 1.0}))[0] is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("sense", "value", "tolerance", "ratio"),
+    [
+        ("at most", 1.0, 4.0, 0.25),
+        ("at most", 0.0, 0.0, 0.0),
+        ("at most", 5e-324, 0.0, inf),
+        ("at most", -1.0, 4.0, -0.25),
+        ("at most", nan, 1.0, inf),
+        ("at least", 4.0, 1.0, 0.25),
+        ("at least", 1.0, 4.0, 4.0),
+        ("at least", 0.0, 1.0, inf),
+        ("at least", -1.0, 1.0, inf),
+        ("at least", 0.0, 0.0, 0.0),
+        ("at least", inf, 1.0, inf),
+    ],
+)
+def test_excess(sense: Literal["at most", "at least"], value: float, tolerance: float, ratio: float) -> None:
+    assert excess(Quantity("x", "1", "", "", sense), value, tolerance) == ratio
+
+
+def test_verdicts_read_as_words_and_their_numbers_are_those_of_reports() -> None:
+    assert [str(verdict) for verdict in Verdict] == [
+        "pass", "fail", "undecided", "not applicable", "crashed", "not provided", "not loaded", "not judged",
+    ]  # fmt: skip
+    assert [int(verdict) for verdict in Verdict] == list(range(8))
+
+
+def test_only_a_decision_counts_as_judged() -> None:
+    case = Case(pair := Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]]), pair.nodes.reshape(-1))
+    decided = {verdict for verdict in Verdict if Outcome(case, verdict).decided}
+    assert decided == {Verdict.PASS, Verdict.FAIL, Verdict.CRASHED}

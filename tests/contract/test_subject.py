@@ -1,0 +1,306 @@
+"""Whatever a plugin answers, what comes over the counter is checked or an error that says what was wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.run.registry import load_formulation
+from contactverif.scenes.named_states import named_case
+
+PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
+Z = PAIR.nodes.reshape(-1)
+CASE = Case(PAIR, Z, penalty=10.0)
+BATCH = np.stack([Z, Z + 1, 2 * Z, Z - 1, Z, 3 * Z]).reshape(2, 3, -1)
+
+
+class Springs:
+    """A correct plugin with every part: each unknown is a spring to the origin. Parts are replaced to break it."""
+
+    def __init__(self, penalty: float, **parts: Any) -> None:
+        self.penalty = penalty
+        self.traits = Traits(tangent="exact")
+        for name, part in parts.items():
+            setattr(self, name, part)
+
+    def pair(self, interface: Interface, z: Any) -> Any:
+        return {"active": z > 0}
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
+        return self.penalty * z
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
+        return sparse.csr_array(self.penalty * np.eye(z.size))
+
+    def contact_points(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
+        one, places = np.zeros(1), np.zeros((1, 2))
+        none = np.zeros(1, dtype=np.int64)
+        return ContactPoints(none, one, none, one, places, places, one, one, one, one > 0, one, one)
+
+
+def subject(**parts: Any) -> Subject:
+    return Subject("springs", lambda *, penalty: Springs(penalty, **parts))
+
+
+def asked(verb: str, **parts: Any) -> Any:
+    """What comes over the counter when the verb is asked of springs with some parts replaced."""
+    guarded = subject(**parts).on(CASE)
+    pairing = guarded.pair(PAIR, Z) if verb != "pair" else None
+    return guarded.pair(PAIR, Z) if verb == "pair" else getattr(guarded, verb)(PAIR, pairing, Z)
+
+
+def always(answer: Any) -> Callable[..., Any]:
+    return lambda *_: answer
+
+
+def raising(*_: Any, **__: Any) -> Any:
+    raise ZeroDivisionError("by nothing")
+
+
+def test_a_correct_plugin() -> None:
+    springs = subject()
+    assert springs.provides == {"pair", "tangent", "contact_points"}
+    assert springs.traits.tangent == "exact"
+    pairing = asked("pair")
+    assert isinstance(pairing, Pairing)
+    assert pairing["active"].sum() == (Z > 0).sum()
+    assert asked("residual").tolist() == (10 * Z).tolist()
+    assert asked("tangent").toarray().tolist() == (10 * np.eye(10)).tolist()
+    assert asked("contact_points").gap.tolist() == [0]
+
+
+def test_the_penalty_in_the_kind_of_the_formulation() -> None:
+    assert subject().penalty(CASE) == 10
+    assert subject(traits=Traits(penalty="distributed")).penalty(CASE) == 10
+    assert subject(traits=Traits(penalty="nodal")).penalty(CASE) == 20  # mean slave segment: 2
+    assert subject().with_penalty(7).residual(PAIR, None, Z).tolist() == (7 * Z).tolist()
+
+
+def test_a_residual_alone_is_a_plugin() -> None:
+    class Least:
+        def residual(self, interface: Interface, pairing: None, z: Any) -> Any:
+            assert pairing is None
+            return -z
+
+    least = Subject("least", lambda *, penalty: Least())
+    assert least.provides == frozenset()
+    assert least.traits == Traits()
+    guarded = least.on(CASE)
+    assert guarded.pair(PAIR, Z) is None
+    assert guarded.residual(PAIR, None, Z).tolist() == (-Z).tolist()
+
+
+def test_a_part_that_is_none_is_not_provided() -> None:
+    assert subject(tangent=None, pair=None).provides == {"contact_points"}
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.complex128])
+def test_a_batch_equals_a_loop(dtype: type) -> None:
+    states = BATCH.astype(dtype)
+    seen: list[int] = []
+
+    def residual(_: Interface, __: Pairing, z: Any) -> Any:
+        seen.append(z.ndim)
+        return z * np.roll(z, 1, axis=-1)
+
+    answers = {}
+    for batched in (False, True):
+        guarded = subject(residual=residual, traits=Traits(batched=batched)).on(CASE)
+        answers[batched] = guarded.residual(PAIR, None, states)
+    assert seen == [1] * 6 + [3]
+    assert answers[True].shape == states.shape
+    assert answers[True].dtype == dtype
+    assert np.array_equal(answers[True], answers[False])
+
+
+@pytest.mark.parametrize("verb", ["pair", "residual", "tangent", "contact_points"])
+def test_a_plugin_that_raises(verb: str) -> None:
+    with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$") as caught:
+        asked(verb, **{verb: raising})
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert isinstance(caught.value, ContractError)
+    assert not isinstance(caught.value, MisuseError)
+
+
+@pytest.mark.parametrize("verb", ["pair", "residual", "tangent", "contact_points"])
+def test_a_plugin_that_writes_to_its_input(verb: str) -> None:
+    def writing(interface: Interface, *more: Any) -> Any:
+        more[-1][0] = 1.0
+
+    with pytest.raises(PluginError, match=f"^{verb}: ValueError: assignment destination is read-only"):
+        asked(verb, **{verb: writing})
+    z = Z.copy()
+    with pytest.raises(PluginError):
+        subject(residual=writing).on(CASE).residual(PAIR, None, z)
+    assert np.array_equal(z, Z)
+
+
+def test_a_plugin_that_writes_to_the_interface_or_the_pairing() -> None:
+    def writing(where: Callable[..., Any]) -> Callable[..., Any]:
+        def residual(*arguments: Any) -> Any:
+            where(*arguments)[...] = 0
+            return arguments[-1]
+
+        return residual
+
+    for where in (lambda i, p, z: i.nodes, lambda i, p, z: i.slave.segments, lambda i, p, z: p["active"]):
+        with pytest.raises(PluginError, match="read-only"):
+            asked("residual", residual=writing(where))
+
+
+NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, -np.inf, Z)
+
+
+@pytest.mark.parametrize(
+    ("verb", "answer", "error", "message"),
+    [
+        ("residual", Z.tolist(), ContractError, r"residual: returned a list; needed an array of shape \(10,\)"),
+        ("residual", None, ContractError, "residual: returned a NoneType"),
+        ("residual", Z[:9], ContractError, r"residual: returned shape \(9,\); needed \(10,\), that of z"),
+        ("residual", Z.reshape(5, 2), ContractError, r"residual: returned shape \(5, 2\)"),
+        (
+            "residual",
+            Z.astype(np.float32),
+            ContractError,
+            "residual: returned dtype float32; needed float64, that of z",
+        ),
+        ("residual", Z.astype(complex), ContractError, "residual: returned dtype complex128; needed float64"),
+        ("residual", Z.astype(int), ContractError, "residual: returned dtype int64"),
+        ("residual", NAN, NonFiniteError, "residual: nan in 1 of 10 entries"),
+        ("residual", INF, NonFiniteError, "residual: -inf in 2 of 10 entries"),
+        ("tangent", np.eye(10).tolist(), ContractError, "tangent: returned a list; needed an array or scipy.sparse"),
+        ("tangent", np.eye(9), ContractError, r"tangent: returned shape \(9, 9\); needed \(10, 10\)"),
+        ("tangent", np.eye(10, dtype=np.float32), ContractError, "tangent: returned dtype float32; needed float64"),
+        ("tangent", np.diag(NAN), NonFiniteError, "tangent: nan in 1 of 100 entries"),
+        ("tangent", sparse.csr_array(np.diag(INF)), NonFiniteError, "tangent: -inf in 2 of "),
+        ("tangent", sparse.coo_matrix(np.diag(NAN)), NonFiniteError, "tangent: nan in 1 of "),
+        ("contact_points", {}, ContractError, "contact_points: returned a dict; needed ContactPoints"),
+        ("contact_points", None, ContractError, "contact_points: returned a NoneType"),
+        ("pair", None, ContractError, "pair: returned a NoneType; needed a mapping"),
+        ("pair", {"xi": np.zeros(3)}, ContractError, "pair: 'xi' is dtype float64"),
+        ("pair", {"segment": np.array([11])}, ContractError, "pair: 'segment' holds 11; needed integers from −1 to 10"),
+        ("pair", Pairing({"segment": np.array([-2])}), ContractError, "pair: 'segment' holds -2"),
+    ],
+)
+def test_a_wrong_answer(verb: str, answer: Any, error: type[ContractError], message: str) -> None:
+    with pytest.raises(error, match=message):
+        asked(verb, **{verb: always(answer)})
+
+
+def test_one_bad_state_of_a_batch() -> None:
+    def residual(_: Interface, __: Pairing, z: Any) -> Any:
+        return np.where(z > 11, np.nan, z)
+
+    for batched in (False, True):
+        guarded = subject(residual=residual, traits=Traits(batched=batched)).on(CASE)
+        with pytest.raises(NonFiniteError, match="residual: nan in 2 of "):
+            guarded.residual(PAIR, None, BATCH)
+
+
+class WithoutResidual:
+    """No plugin at all."""
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (raising, PluginError, "make: ZeroDivisionError: by nothing"),
+        (lambda: Springs(1.0), PluginError, "make: TypeError: .*penalty"),
+        (lambda *, penalty: None, ContractError, "make: returned a NoneType without a `residual`"),
+        (lambda *, penalty: WithoutResidual(), ContractError, "make: returned a WithoutResidual without a `residual`"),
+        (
+            lambda *, penalty: Springs(penalty, residual=Z),
+            ContractError,
+            "make: returned a Springs without a `residual`",
+        ),
+        (
+            lambda *, penalty: Springs(penalty, traits={"tangent": "exact"}),
+            ContractError,
+            "traits: found a dict; needed",
+        ),
+        (lambda *, penalty: Springs(penalty, traits=None), ContractError, "traits: found a NoneType; needed"),
+    ],
+)
+def test_a_wrong_factory(make: Callable[..., Any], error: type[ContractError], message: str) -> None:
+    with pytest.raises(error, match=message):
+        Subject("wrong", make)
+
+
+def test_a_factory_that_fails_for_the_penalty_of_the_case() -> None:
+    def make(*, penalty: float) -> Springs:
+        if penalty > 1:
+            raise ValueError("too stiff")
+        return Springs(penalty)
+
+    assert isinstance(Subject("soft", make).with_penalty(1.0), CheckedFormulation)
+    with pytest.raises(PluginError, match="make: ValueError: too stiff"):
+        Subject("soft", make).on(CASE)
+
+
+@pytest.mark.parametrize(
+    ("enforcement", "count", "message"),
+    [
+        ("penalty", 3, "3 of them, with the trait enforcement 'penalty'; needed \"multiplier\""),
+        ("multiplier", 0, "0 of them, with the trait enforcement 'multiplier'; needed n_multipliers"),
+        ("multiplier", -1, "returned -1; needed an integer ≥ 0"),
+        ("multiplier", 1.0, "returned 1.0; needed an integer ≥ 0"),
+        ("multiplier", True, "returned True; needed an integer ≥ 0"),
+    ],
+)
+def test_multipliers_and_the_trait_go_together(enforcement: Any, count: Any, message: str) -> None:
+    class Counting:
+        traits = Traits(enforcement=enforcement)
+
+        def n_multipliers(self, interface: Interface) -> Any:
+            return count
+
+        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+            return z
+
+    guarded = Subject("counting", lambda *, penalty: Counting()).with_penalty(1.0)
+    with pytest.raises(ContractError, match=re.escape(message)):
+        guarded.n_multipliers(PAIR)
+
+
+def test_multipliers_are_counted_once_an_interface() -> None:
+    class Restless:
+        traits = Traits(enforcement="multiplier")
+        count = 0
+
+        def n_multipliers(self, interface: Interface) -> int:
+            self.count += 1
+            return self.count
+
+        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+            return z
+
+    guarded = Subject("restless", lambda *, penalty: Restless()).with_penalty(1.0)
+    assert [guarded.n_multipliers(PAIR) for _ in range(3)] == [1, 1, 1]
+    assert guarded.n_multipliers(PAIR.swapped()) == 2
+
+
+def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:
+    """With multipliers left out, nts-lm would answer as nts does."""
+    case, formulation = named_case("c"), load_formulation("nts-lm")
+    assert isinstance(formulation, Subject)
+    guarded = formulation.on(case)
+    for ask in (
+        lambda: guarded.pair(case.interface, case.z),
+        lambda: guarded.residual(case.interface, None, case.z),
+        lambda: guarded.tangent(case.interface, None, case.z),
+        lambda: guarded.contact_points(case.interface, None, case.z),
+    ):
+        with pytest.raises(
+            MisuseError, match=r"z: found shape \(20,\); needed \(\.\.\., 25\), 20 positions and 5 mult"
+        ):
+            ask()

@@ -1,0 +1,507 @@
+"""Newton's method: the exact pressure, every way to end, and what a trace tells. Numbers of Fig. 30 of the paper."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from math import isnan
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.errors import MisuseError, PluginError
+from contactverif.contract.formulation import Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics import bulk
+from contactverif.mechanics import scene as scene_module
+from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.scene import Scene
+from contactverif.run.registry import load_formulation
+from contactverif.scenes import catalogue
+from contactverif.scenes.blocks import two_blocks
+
+ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
+
+
+def subject(name: str) -> Subject:
+    found = load_formulation(name)
+    assert isinstance(found, Subject)
+    return found
+
+
+def on(name: str, scene: Scene) -> CheckedFormulation:
+    return subject(name).on(scene.case())
+
+
+def solved(name: str, scene: Scene, **how: Any) -> Trace:
+    return solve(scene, on(name, scene), **how)
+
+
+def mean_pressure(scene: Scene, q: FloatArray) -> tuple[float, float]:
+    """Mean normal stress of each body over its Gauss points, as a pressure."""
+    upper, lower = (-stresses[..., 1] for stresses in scene.stresses(q))
+    return float(upper.mean()), float(lower.mean())
+
+
+# --- the exact answer -------------------------------------------------------------------------------------------
+
+MASTERS = {"one": [0.0, 8.0], "matching": [0.0, 2, 4, 8], "b": [0.0, 4, 8], "crossing": [0.0, 1.7, 3.1, 6.4, 8.0]}
+
+
+@pytest.mark.parametrize(
+    ("name", "master"),
+    [
+        ("nts-ar", "one"),
+        ("vts-me", "b"),
+        ("vts-g", "one"),
+        ("vts-ppt", "crossing"),
+        ("vts-ppt-basic", "crossing"),
+        ("vts-ppt-balanced", "crossing"),
+    ],
+)
+def test_the_pressure_of_two_pressed_blocks(name: str, master: str) -> None:
+    """p = Δ/(H1/M1 + H2/M2 + 1/ε̂), on a pair of meshes that each formulation can do."""
+    scene = two_blocks(
+        [0, 2, 4, 8],
+        [0, 2, 6],
+        MASTERS[master],
+        [-4, -2, 0],
+        young=(1, 3),
+        poisson=(0.3, 0.2),
+        penalty=10,
+        approach=0.1,
+    )
+    trace = solved(name, scene)
+    assert trace.end is End.CONVERGED
+    upper, lower = mean_pressure(scene, trace.solution)
+    assert abs(upper - 0.017369727047) <= 1e-12  # as verification.md prints it
+    assert abs(lower - 0.017369727047) <= 1e-12
+    moduli = [
+        Fraction(1) * Fraction(7, 10) / (Fraction(13, 10) * Fraction(4, 10)),
+        Fraction(3) * 8 / 10 / Fraction(72, 100),
+    ]
+    exact = float(Fraction(1, 10) / (6 / moduli[0] + 4 / moduli[1] + Fraction(1, 10)))
+    matrix, _ = System(scene, on(name, scene)).matrix(trace.solution, on(name, scene).pair(scene.interface, trace.z))
+    assert abs(upper - exact) <= UNIT_ROUNDOFF * np.linalg.cond(matrix) * 0.1  # of a displacement of 0.1
+
+
+# --- every end --------------------------------------------------------------------------------------------------
+
+
+def documented(trace: Trace, scene: Scene) -> None:
+    """Shapes and meanings, whatever the end."""
+    n = len(trace.q)
+    assert trace.scene is scene
+    assert trace.q.shape == (n, scene.n_free)
+    for name in ("factors", "residuals", "energies", "floors", "roundings", "changes", "conditions"):
+        assert getattr(trace, name).shape == (n,), name
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(trace, name)[0] = 0
+    assert trace.changes.dtype == np.int64
+    assert isnan(trace.energies[-1])
+    assert trace.n_iterations == np.isfinite(trace.energies).sum()
+    assert isnan(trace.conditions[-1]) == (trace.end is not End.SINGULAR)
+    assert np.array_equal(trace.solution, trace.q[-1])
+    assert np.array_equal(trace.z, scene.positions(trace.q[-1], trace.factors[-1]))
+    assert trace.converged == (trace.end is End.CONVERGED) == (trace.roundings[-1] <= 1)
+    assert set(trace.seconds) == {"pair", "residual", "tangent", "solve"}
+    assert all(value >= 0 for value in trace.seconds.values())
+    assert trace.end.words
+    assert trace.end.advice.count("\n") == 0
+
+
+class Springs:
+    """Springs on both sides whether open or not: forces stiffness × (z − Z), said to have another tangent."""
+
+    def __init__(self, penalty: float, said: float = 1.0, noise: float = 0.0) -> None:
+        self.penalty, self.said, self.noise = penalty, said, noise
+        self.traits = Traits()
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        moved = z - interface.nodes.reshape(-1)
+        rough = np.sin(1e18 * moved + np.arange(z.size))  # another number at every iterate, the same at the same one
+        return self.penalty * (moved + self.noise * np.abs(z) * rough)
+
+    def tangent(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        return self.said * self.penalty * np.eye(z.size)
+
+
+def springs(scene: Scene, **how: float) -> CheckedFormulation:
+    return Subject("springs", lambda *, penalty: Springs(penalty, **how)).with_penalty(1e4)
+
+
+def test_converged() -> None:
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    trace = solved("vts-ppt", scene)
+    documented(trace, scene)
+    assert trace.end is End.CONVERGED
+    assert (trace.factors == 1).all()
+    assert trace.changes[0] == -1
+    assert (trace.changes[1:] >= 0).all()
+    assert (trace.conditions[:-1] > 0).all()
+    assert (trace.conditions[:-1] < 1).all()
+
+
+def test_a_two_cycle_is_named() -> None:
+    scene = catalogue.made("c", penalty=1e4)
+    trace = solved("vts-me", scene)
+    documented(trace, scene)
+    assert trace.end is End.CYCLE
+    assert np.abs(trace.q[-1] - trace.q[-3]).max() <= 2.0**-20 * np.abs(trace.q[-1] - trace.q[-2]).max()
+    assert (trace.changes[-2:] > 0).all()  # two pairings take turns
+    assert min(trace.residuals[-4:]) > 1e3 * max(trace.floors[-4:])
+
+
+@pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
+@pytest.mark.parametrize("name", catalogue.BLOCKS)
+def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
+    name: str, dense: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever roundoff makes of the matrix: a step of 1e14 downwards would find contact there, and "converge"."""
+    if not dense:
+        monkeypatch.setattr(scene_module, "DENSE", 0)
+    for degrees, poisson, refine in ((0.0, 0.3, 1), (10.0, 0.2, 3), (33.0, 0.45, 1), (77.0, 0.0, 2)):
+        scene = catalogue.made(name, lowered=-0.1, degrees=degrees, poisson=poisson, refine=refine)
+        trace = solved("vts-ppt", scene)
+        documented(trace, scene)
+        assert trace.end is End.SINGULAR
+        assert trace.n_iterations == 0
+        assert trace.conditions[-1] <= scene.n_free * UNIT_ROUNDOFF
+    assert "contact" in trace.end.advice
+
+
+@pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
+def test_a_stiff_contact_is_not_singular(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not dense:
+        monkeypatch.setattr(scene_module, "DENSE", 0)
+    for penalty, ratio in ((1e14, 1.0), (1e4, 1e6), (1e14, 1e6)):
+        scene = catalogue.made("c", penalty=penalty, ratio=ratio)
+        system = System(scene, on("vts-ppt", scene))
+        matrix, _ = system.matrix(scene.start, system.pair(scene.start))
+        full = matrix if dense else matrix.toarray()
+        exact = 1 / np.linalg.cond(full, 1)
+        condition = system.step(matrix, np.ones(scene.n_free)).condition
+        assert exact <= condition * (1 + scene.n_free * UNIT_ROUNDOFF / exact)  # an estimate of |K⁻¹| from below
+        assert condition <= 3 * exact
+
+
+def test_iterates_that_leave() -> None:
+    scene = catalogue.made("c")
+    trace = solve(scene, springs(scene, said=0.1), start=np.full(scene.n_free, 1e-3))
+    documented(trace, scene)
+    assert trace.end is End.DIVERGED
+    assert trace.residuals[-1] > 1e8 * trace.residuals[0] > 1e8 * trace.residuals[-2] / trace.residuals[-1]
+    assert np.isfinite(trace.q).all()
+
+
+def test_out_of_iterations() -> None:
+    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    trace = solved("vts-ppt-basic", scene, iterations=3)
+    documented(trace, scene)
+    assert trace.end is End.EXHAUSTED
+    assert trace.n_iterations == 3
+    assert len(trace.q) == 4
+    whole = solved("vts-ppt-basic", scene)
+    assert np.array_equal(whole.q[:4], trace.q)
+    assert whole.end is End.CONVERGED
+
+
+def test_stagnated_just_above_roundoff() -> None:
+    scene = catalogue.made("c")
+    quiet = solve(scene, springs(scene))
+    assert quiet.end is End.CONVERGED
+    trace = solve(scene, springs(scene, noise=1e3 * UNIT_ROUNDOFF))
+    documented(trace, scene)
+    assert trace.end is End.STAGNATED
+    assert 1 < min(trace.roundings) <= 1e3
+
+
+def test_a_wrong_tangent_is_no_error() -> None:
+    """Where it says that nothing pushes though something does, what pushes is no roundoff."""
+    scene = replace(catalogue.made("c"), bodies=tuple(replace(b, load=0 * b.load) for b in catalogue.made("c").bodies))
+    trace = solve(scene, springs(scene, said=0.0, noise=1e-3), start=np.zeros(scene.n_free), iterations=5)
+    documented(trace, scene)
+    assert trace.roundings[0] > 1e12
+    assert trace.end is not End.CONVERGED
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("scene", ["b", "c", "c-prime", "example-1", "example-1bis"])
+@pytest.mark.parametrize("penalty", [1e2, 1e5, 1e9])
+def test_non_convergence_never_raises(name: str, scene: str, penalty: float) -> None:
+    for lowered in (-1e-3, 0.0, 1.0, 3.0):
+        made = catalogue.made(scene, penalty=penalty, lowered=lowered, sides="free", degrees=10.0)
+        documented(solved(name, made, iterations=12), made)
+
+
+def test_bad_options_of_a_solution() -> None:
+    scene = catalogue.made("a1")
+    formulation = on("vts-ppt", scene)
+    for how, message in (
+        ({"load_steps": 0}, "load_steps: found 0; needed at least 1"),
+        ({"iterations": 0}, "iterations: found 0; needed at least 1"),
+        ({"start": np.zeros(3)}, f"start: found shape (3,); needed shape ({scene.n_free},)"),
+        ({"start": np.full(scene.n_free, np.nan)}, "start: found NaN or infinity; needed finite numbers"),
+    ):
+        with pytest.raises(MisuseError) as error:
+            solve(scene, formulation, **how)  # type: ignore[arg-type]
+        assert str(error.value) == message
+
+
+# --- what a trace tells -----------------------------------------------------------------------------------------
+
+
+def test_residuals_energies_and_changes_are_what_they_say() -> None:
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    formulation = on("vts-ppt-basic", scene)
+    trace = solve(scene, formulation)
+    pairings = []
+    for index, q in enumerate(trace.q):
+        z = scene.interface.nodes.reshape(-1) + scene.moved + np.asarray(scene.spread) @ q
+        pairing = formulation.pair(scene.interface, z)
+        assert pairing is not None
+        pairings.append(pairing)
+        contact = formulation.residual(scene.interface, pairing, z)
+        residual = scene.stiffness @ q - scene.load + np.asarray(scene.spread).T @ contact
+        assert abs(np.abs(residual).max() - trace.residuals[index]) <= trace.floors[index]
+        if index < trace.n_iterations:
+            energy = abs((trace.q[index + 1] - q) @ residual)
+            step = np.abs(trace.q[index + 1] - q).sum()
+            assert abs(energy - trace.energies[index]) <= 2 * trace.floors[index] * step + 1e-15 * energy
+            matrix, _ = System(scene, formulation).matrix(q, pairing)
+            exact = 1 / np.linalg.cond(matrix, 1)
+            assert exact <= trace.conditions[index] * (1 + scene.n_free * UNIT_ROUNDOFF / exact)  # |K⁻¹| from below
+            assert trace.conditions[index] <= 3 * exact
+    changes = [sum(int((b[name] != a[name]).sum()) for name in a) for a, b in itertools.pairwise(pairings)]
+    assert trace.changes.tolist() == [-1, *changes]
+    assert trace.residuals[0] > 1e10 * trace.residuals[-1]
+
+
+def test_load_steps_end_at_the_same_solution() -> None:
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5)
+    once, four = solved("vts-ppt", scene), solved("vts-ppt", scene, load_steps=4)
+    documented(four, scene)
+    assert four.end is once.end is End.CONVERGED
+    matrix, floor = System(scene, on("vts-ppt", scene)).matrix(
+        once.solution, on("vts-ppt", scene).pair(scene.interface, once.z)
+    )
+    # both stop where the residual is below its roundoff
+    bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * floor.max()
+    assert np.abs(four.solution - once.solution).max() <= bound
+    factors, counts = np.unique(four.factors, return_counts=True)
+    assert factors.tolist() == [0.25, 0.5, 0.75, 1.0]
+    assert (np.diff(four.factors) >= 0).all()
+    assert counts.sum() - 4 == four.n_iterations
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    assert (four.changes[starts] == -1).all()  # each load step begins anew, from where the one before ended
+    assert np.array_equal(four.q[starts[1:]], four.q[starts[1:] - 1])
+    assert np.array_equal(four.q[0], scene.start / 4)
+    pressures = [mean_pressure(scene, four.q[last])[0] for last in np.cumsum(counts) - 1]
+    assert (np.diff(pressures) > 0).all()
+
+
+def test_load_steps_of_an_imposed_displacement() -> None:
+    scene = two_blocks([0, 1, 3], [0, 1], [0, 2, 3], [-1, 0], penalty=10, approach=0.1)
+    trace = solved("vts-ppt", scene, load_steps=2)
+    half = [-stresses[..., 1] for stresses in scene.stresses(trace.q[np.flatnonzero(trace.factors == 0.5)[-1]], 0.5)]
+    exact = 0.1 / (1 + 1 + 0.1)
+    bound = 64 * UNIT_ROUNDOFF  # of displacements up to 0.1 over cells of 1 on coordinates up to 3
+    assert max(np.abs(values - exact / 2).max() for values in half) <= bound
+    assert abs(mean_pressure(scene, trace.solution)[0] - exact) <= bound
+
+
+def test_a_load_step_that_fails_is_the_last() -> None:
+    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    trace = solved("vts-ppt-basic", scene, load_steps=3, iterations=2)
+    assert trace.end is End.EXHAUSTED
+    assert trace.factors.tolist() == [1 / 3] * 3
+    assert np.array_equal(trace.z, scene.positions(trace.solution, 1 / 3))
+
+
+class Wrapped:
+    """A formulation with some of its parts left out or replaced."""
+
+    def __init__(self, inner: Any, **parts: Any) -> None:
+        self.traits = inner.traits
+        for name in ("pair", "residual", "tangent"):
+            setattr(self, name, parts.get(name, getattr(inner, name)))
+
+
+def wrapped(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
+    inner = subject(name)
+    return Subject(name, lambda *, penalty: Wrapped(inner._make(penalty=penalty), **parts)).on(scene.case())
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic", "nts-ar"])
+def test_a_formulation_without_tangent_is_differentiated(name: str) -> None:
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5)
+    formulation = wrapped(name, scene, tangent=None)
+    assert "tangent" not in formulation.provides
+    trace, own = solve(scene, formulation), solved(name, scene)
+    documented(trace, scene)
+    assert trace.end is own.end is End.CONVERGED
+    asked_not_to = solved(name, scene, own_tangent=False)
+    assert np.array_equal(asked_not_to.q, trace.q)
+    pairing = formulation.pair(scene.interface, own.z)
+    matrix, floor = System(scene, formulation).matrix(own.solution, pairing)
+    bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * max(floor.max(), trace.floors[-1])
+    assert np.abs(trace.solution - own.solution).max() <= bound
+    exact, _ = System(scene, on("vts-ppt" if name == "vts-ppt-basic" else name, scene)).matrix(own.solution, pairing)
+    # central differences: a third power of (u X / shortest) twice over
+    h = (UNIT_ROUNDOFF * np.abs(own.z).max() / 2) ** (1 / 3)
+    assert np.abs(matrix - exact).max() <= h**2 * np.abs(exact).max()
+
+
+def test_a_formulation_without_pairing() -> None:
+    scene = catalogue.made("c")
+    trace = solve(scene, springs(scene))
+    assert trace.end is End.CONVERGED
+    assert (trace.changes == -1).all()
+    assert trace.n_iterations == 1  # linear
+    expected = np.linalg.solve(scene.stiffness + 1e4 * np.eye(scene.n_free), scene.load)
+    matrix, floor = System(scene, springs(scene)).matrix(trace.solution, None)
+    bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * floor.max()
+    assert np.abs(trace.solution - expected).max() <= bound
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced", "nts-ar"])
+def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: Callable[[], Scene] = lambda: catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
+    scene = made()
+    dense = solved(name, scene)
+    matrix, floor = System(scene, on(name, scene)).matrix(
+        dense.solution, on(name, scene).pair(scene.interface, dense.z)
+    )
+    monkeypatch.setattr(scene_module, "DENSE", 0)
+    monkeypatch.setattr(bulk, "DENSE", 0)
+    large = made()
+    trace = solved(name, large)
+    documented(trace, large)
+    assert sparse.issparse(large.stiffness)
+    assert trace.end is dense.end is End.CONVERGED
+    bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * floor.max()
+    assert np.abs(trace.solution - dense.solution).max() <= bound
+
+
+@pytest.mark.parametrize("verb", ["pair", "residual", "tangent"])
+def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
+    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    calls = 0
+    inner = getattr(subject("vts-ppt-basic")._make(penalty=1e4), verb)
+
+    def third_time(*arguments: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise ZeroDivisionError("by nothing")
+        return inner(*arguments)
+
+    with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$"):
+        solve(scene, wrapped("vts-ppt-basic", scene, **{verb: third_time}))
+    assert calls == 3
+
+
+@pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
+def test_unsymmetric_matrices_are_solved_right(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not dense:
+        monkeypatch.setattr(scene_module, "DENSE", 0)
+    scene = catalogue.made("c", sides="free", penalty=1e5, lowered=0.05)
+    system = System(scene, on("vts-ppt", scene))
+    q = scene.start + 1e-3 * np.sin(np.arange(scene.n_free))
+    pairing = system.pair(q)
+    matrix, _ = system.matrix(q, pairing)
+    residual = system.residual(q, pairing)
+    full = matrix if dense else matrix.toarray()
+    assert np.abs(full - full.T).max() > 1e-3 * np.abs(full).max()
+    step = system.step(matrix, -residual).change
+    assert step is not None
+    expected = np.linalg.solve(full, -residual)
+    assert np.abs(step - expected).max() <= 4 * UNIT_ROUNDOFF * np.linalg.cond(full) * np.abs(expected).max()
+    other = np.linalg.solve(full.T, -residual)
+    assert np.abs(other - expected).max() > 1e-3 * np.abs(expected).max()
+
+
+# --- Fig. 30 ----------------------------------------------------------------------------------------------------
+
+
+def at_the_solution(scene: Scene) -> tuple[Trace, FloatArray, FloatArray]:
+    """The consistent solution, and there the consistent matrix and that of the basic version."""
+    trace = solved("vts-ppt", scene)
+    assert trace.end is End.CONVERGED
+    matrices = []
+    for name in ("vts-ppt", "vts-ppt-basic"):
+        system = System(scene, on(name, scene))
+        matrices.append(system.matrix(trace.solution, system.pair(trace.solution))[0])
+    return trace, matrices[0], matrices[1]
+
+
+def spectral_radius(consistent: FloatArray, basic: FloatArray) -> float:
+    """Of I − K_basic⁻¹ K_consistent."""
+    return float(np.abs(np.linalg.eigvals(np.eye(len(basic)) - np.linalg.solve(basic, consistent))).max())
+
+
+def iterations_for(decades: int, name: str, scene: Scene) -> int:
+    """Newton steps until the residual is down by so many decades, whatever the solver would stop at."""
+    system, q = System(scene, on(name, scene)), scene.start
+    first = None
+    for iteration in range(40):
+        pairing = system.pair(q)
+        residual = system.residual(q, pairing)
+        first = np.abs(residual).max() if first is None else first
+        if np.abs(residual).max() <= 10.0**-decades * first:
+            return iteration
+        step = system.step(system.matrix(q, pairing)[0], -residual).change
+        assert step is not None
+        q = q + step
+    raise AssertionError(f"{name} does not lose {decades} decades in 40 steps")
+
+
+@pytest.mark.parametrize(
+    ("ratio", "basic", "consistent"), [(1.0, (15, 16), (2,)), (0.9, (15, 16), (3, 4)), (0.5, (17,), (4,))]
+)
+def test_iterations_of_figure_30(ratio: float, basic: tuple[int, ...], consistent: tuple[int, ...]) -> None:
+    """For 14 decades. The paper prints no materials: equal, nearly so, and one body twice as stiff as the other."""
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=ratio, lowered=0.0)
+    assert iterations_for(14, "vts-ppt-basic", scene) in basic
+    assert iterations_for(14, "vts-ppt", scene) in consistent
+    assert iterations_for(12, "vts-me", scene) == 3
+
+
+def test_iterations_down_to_roundoff() -> None:
+    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    consistent, basic = solved("vts-ppt", scene), solved("vts-ppt-basic", scene)
+    assert consistent.end is basic.end is End.CONVERGED
+    assert consistent.n_iterations == 4
+    assert basic.n_iterations in (15, 16)
+
+
+@pytest.mark.parametrize("sides", ["free", "rollers"])
+def test_the_basic_version_converges_at_the_rate_of_its_spectral_radius(sides: Any) -> None:
+    scene = catalogue.made("c", penalty=1e4, sides=sides, lowered=0.0)
+    exact, consistent, basic = at_the_solution(scene)
+    rate = spectral_radius(consistent, basic)
+    assert 0.12 <= round(rate, 2) <= 0.14
+    errors = np.abs(solved("vts-ppt-basic", scene).q - exact.solution).max(axis=1)
+    # the tail: linear terms alone are left, and roundoff is not yet seen
+    tail = errors[(errors < 1e-4 * errors[0]) & (errors > 1e-10 * errors[0])]
+    assert len(tail) >= 4
+    assert np.abs(tail[1:] / tail[:-1] - rate).max() <= 1e-3
+
+
+@pytest.mark.parametrize("sides", ["free", "rollers"])
+@pytest.mark.parametrize(("over_young", "rate"), [(0.1, 0.03), (1e4, 0.37)])
+def test_the_rate_of_the_basic_version_with_the_penalty(over_young: float, rate: float, sides: Any) -> None:
+    scene = catalogue.made("c", penalty=over_young * 1e4, sides=sides, lowered=0.0)
+    _, consistent, basic = at_the_solution(scene)
+    assert round(spectral_radius(consistent, basic), 2) == rate  # to the digits that are printed
+
+
+def test_every_end_has_its_number_and_its_words() -> None:
+    assert len({end.words for end in End}) == len(End) == 6
+    assert [int(end) for end in End] == list(range(6))

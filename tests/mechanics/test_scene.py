@@ -1,0 +1,497 @@
+"""A scene and its case are the same bits; what is far away changes none; what a scene cannot be has its line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+import pytest
+import skfem
+
+from contactverif import oracle
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.body import Body, block, rigid
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.subject import Subject
+from contactverif.geometry import projection
+from contactverif.geometry.compiled import uncompiled
+from contactverif.mechanics import newton
+from contactverif.mechanics import scene as scene_module
+from contactverif.mechanics.bulk import body_from_mesh, stiffness
+from contactverif.mechanics.scene import Scene, has_bodies, scene_of
+from contactverif.run.registry import load_formulation
+from contactverif.scenes import catalogue
+from contactverif.scenes.blocks import Placing, exact_unknowns, two_blocks
+from contactverif_nts import eq6, walk
+
+ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
+LEANING = (cos(radians(17.3)), sin(radians(17.3)))
+
+
+def pressed(**more: Any) -> Scene:
+    """Two blocks whose meshes do not match, pressed together; leaning, off the origin."""
+    given: dict[str, Any] = {
+        "young": (1.0, 3.0),
+        "poisson": (0.3, 0.2),
+        "penalty": 10.0,
+        "pressure": 0.5,
+        "placing": Placing(LEANING, (1.0, -2.0), 2.0),
+    }
+    return two_blocks([0, 1, 2.5, 4], [0, 1, 2, 3.5], [0, 2, 3, 4], [-3, -1, 0], **(given | more))
+
+
+def in_triangles(body: Body) -> Body:
+    return replace(body, cells=np.vstack([body.cells[:, [0, 1, 2]], body.cells[:, [0, 2, 3]]]))
+
+
+def three_bodies() -> Scene:
+    """A quadrilateral and a triangular slave on one master, of different heights."""
+    master = block(np.linspace(0, 8, 6), [-2, -1, 0], contact="top", approach=0.0, young=5.0, name="base")
+    left = block([0.5, 1, 3], [0, 1, 2], contact="bottom", approach=0.125, tilt=0.01, lowered=0.125, poisson=0.25)
+    right = in_triangles(block([4, 6, 7.5], [0, 3], contact="bottom", pressure=0.25, lowered=0.0625, young=2.0))
+    return Scene((left, master, right), slave=(0, 2), master=(1,), penalty=7.0)
+
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "quadrilaterals": pressed,
+    "triangles": lambda: replace(pressed(), bodies=tuple(map(in_triangles, pressed().bodies))),
+    "triangles on quadrilaterals": lambda: replace(
+        pressed(), bodies=(in_triangles(pressed().bodies[0]), pressed().bodies[1])
+    ),
+    "rigid floor": lambda: pressed(rigid_master=True),
+    "rigid both": lambda: Scene(
+        (rigid([[0, 0], [1, 0], [3, 0]], moved=(0, -0.5)), rigid([[4, 0], [-1, 0]])), penalty=1 / 3
+    ),
+    "three": three_bodies,
+    "named": lambda: catalogue.made("c", degrees=33.0),
+}
+every_scene = pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
+
+
+def bits(arrays: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
+    """Arrays as what can be compared bit by bit."""
+    found = {}
+    for name, values in arrays.items():
+        array = np.asarray(values)
+        found[name] = (array.dtype, array.shape, array.tobytes())
+    return found
+
+
+ATTRIBUTES = ("nodes", "cells", "contact", "young", "poisson", "fixed", "imposed", "load", "axis", "start")
+
+
+def same_body(one: Body, other: Body) -> bool:
+    return bits({name: getattr(one, name) for name in ATTRIBUTES}) == bits(
+        {name: getattr(other, name) for name in ATTRIBUTES}
+    )
+
+
+@every_scene
+def test_round_trip_through_a_case(make: Callable[[], Scene]) -> None:
+    scene = make()
+    case = scene.case(seed=7)
+    assert has_bodies(case)
+    assert (case.seed, case.penalty, case.name) == (7, scene.penalty, scene.name)
+    for again in (scene_of(case), scene_of(Case.from_arrays(case.to_arrays()))):
+        assert (again.slave, again.master) == (scene.slave, scene.master)
+        assert (again.penalty, again.name) == (scene.penalty, scene.name)
+        assert bits(again.facts) == bits(scene.facts)
+        assert len(again.bodies) == len(scene.bodies)
+        assert all(map(same_body, again.bodies, scene.bodies))
+        assert bits(again.case(seed=7).to_arrays()) == bits(case.to_arrays())
+
+
+def test_the_bodies_of_a_case_are_called_by_their_roles() -> None:
+    again = scene_of(three_bodies().case())
+    assert [body.name for body in again.bodies] == ["slave 1", "master", "slave 2"]
+
+
+def test_one_scene_is_made_of_one_case() -> None:
+    case = pressed().case()
+    assert scene_of(case) is scene_of(case)
+
+
+def test_a_case_without_bodies() -> None:
+    interface = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])
+    case = Case(interface, interface.nodes.reshape(-1), parameters={"gap": np.array(1.0)})
+    assert not has_bodies(case)
+    with pytest.raises(MisuseError, match=r"^case: found an interface without bodies; needed a case made of a scene$"):
+        scene_of(case)
+
+
+# --- what a scene is made of ------------------------------------------------------------------------------------
+
+
+def test_the_interface_has_slave_nodes_first() -> None:
+    scene = three_bodies()
+    assert scene.reached == (0, 2, 1)
+    interface = scene.interface
+    assert interface.nodes.tolist() == [
+        *([0.5, 0], [1, 0], [3, 0]),
+        *([4, 0], [6, 0], [7.5, 0]),
+        *([x, 0] for x in np.linspace(0, 8, 6).tolist()),
+    ]
+    assert interface.slave.segments.tolist() == [[0, 1], [1, 2], [3, 4], [4, 5]]
+    assert sorted(interface.master.segments.tolist()) == [[n + 1, n] for n in range(6, 11)]
+    assert scene.part == (slice(0, 4), slice(4, 8), slice(8, 18))  # at the sides, on rollers, y alone is free
+    assert [unknowns.tolist() for unknowns in scene.unknowns[:2]] == [[1, 2, 3, 5], [1, 2, 3, 5]]
+
+
+def at_random(scene: Scene) -> FloatArray:
+    q: FloatArray = np.random.default_rng(3).normal(size=scene.n_free)
+    return q
+
+
+@every_scene
+@pytest.mark.parametrize("factor", [1.0, 0.25])
+def test_positions_are_those_of_the_displaced_bodies(make: Callable[[], Scene], factor: float) -> None:
+    scene = make()
+    q = at_random(scene)
+    displaced = scene.displacements(q, factor)
+    expected = np.vstack([(scene.bodies[k].nodes + displaced[k])[scene.bodies[k].contact_nodes] for k in scene.reached])
+    positions = scene.positions(q, factor).reshape(-1, 2)
+    terms = np.abs(scene.interface.nodes).max() + np.abs(q).max(initial=1.0)
+    assert np.abs(positions - expected).max() <= 8 * UNIT_ROUNDOFF * terms  # a sum of four products at most
+
+
+@every_scene
+def test_spread_is_the_derivative_of_positions(make: Callable[[], Scene]) -> None:
+    scene = make()
+    spread = np.asarray(scene.spread)
+    for unknown, unit in enumerate(np.eye(scene.n_free)):
+        difference = scene.positions(unit) - scene.positions(0 * unit)
+        assert np.abs(difference - spread[:, unknown]).max() <= 4 * UNIT_ROUNDOFF * np.abs(scene.positions(unit)).max()
+    # each unknown moves one node by one: columns are orthonormal
+    assert np.abs(spread.T @ spread - np.eye(scene.n_free)).max(initial=0.0) <= 4 * UNIT_ROUNDOFF
+
+
+def test_the_first_guess() -> None:
+    scene = pressed(lowered=0.25)
+    moved = scene.positions(scene.start).reshape(-1, 2) - scene.interface.nodes
+    down = 0.25 * 2 * np.array([LEANING[1], -LEANING[0]])  # the scene is scaled by 2
+    bound = 4 * UNIT_ROUNDOFF * np.abs(scene.interface.nodes).max()
+    assert np.abs(moved[:4] - down).max() <= bound
+    assert not moved[4:].any()
+    assert np.array_equal(scene.case().z, scene.positions(scene.start))
+
+
+def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    dense = pressed()
+    q = at_random(dense)
+    positions, forces = dense.positions(q), dense.bulk_forces(q)
+    monkeypatch.setattr(scene_module, "DENSE", 0)
+    large = replace(dense)
+    assert not isinstance(large.stiffness, np.ndarray)
+    assert not isinstance(large.spread, np.ndarray)
+    assert np.array_equal(large.stiffness.toarray(), dense.stiffness)
+    assert np.array_equal(large.spread.toarray(), dense.spread)
+    assert np.abs(large.positions(q) - positions).max() <= 2 * UNIT_ROUNDOFF * np.abs(positions).max()
+    terms = np.abs(dense.stiffness) @ np.abs(q) + np.abs(dense.load)
+    assert (np.abs(large.bulk_forces(q) - forces) <= 2 * len(q) * UNIT_ROUNDOFF * terms).all()
+
+
+# --- forces against exact ones ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.made, catalogue.BLOCKS)],
+    ids=lambda scene: scene.name or "pressed",
+)
+@pytest.mark.parametrize("factor", [1.0, 0.5])
+def test_bulk_forces_of_the_exact_solution_are_the_consistent_ones(scene: Scene, factor: float) -> None:
+    """Uniform pressure: what contact must bring is p ∫ N along the normal, from rationals."""
+    p, interface = float(scene.facts["pressure"]), scene.interface
+    q = factor * exact_unknowns(scene, p, scene.penalty)
+    n_slave, frame = interface.n_slave_nodes, scene.bodies[0].frame
+    along = interface.nodes @ frame[:, 0]  # rounded once more: 4 u X of a length
+    weights = oracle.uniform_pressure_weights(interface, along)
+    expected = (
+        factor * p * weights[:, None] * np.where(np.arange(len(weights)) < n_slave, 1.0, -1.0)[:, None] * (frame[:, 1])
+    )
+    held = np.zeros(len(weights), bool)
+    if scene.bodies[1].rigid:
+        held[n_slave:] = True  # supports take it
+    found = scene.nodal_forces(q, factor)
+    assert not found[held].any()
+    terms = np.abs(scene.stiffness) @ np.abs(q) + factor * np.abs(scene.load)
+    assert np.abs(found - expected)[~held].max() <= 2 * scene.n_free * UNIT_ROUNDOFF * terms.max()
+
+
+def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
+    far = block([100, 101, 103], [0, 1, 2], contact="bottom", approach=0.25, poisson=0.25, young=2.0)
+    free = block([200, 201], [0, 3], contact="top", pressure=0.5, free_sides=True)
+    free = replace(free, fixed=free.fixed | (free.nodes[:, 1:] == 3) & [False, True])  # hangs on its contact side
+    scene = replace(pressed(), bodies=(*pressed().bodies, far, free), slave=(0, 2), master=(1, 3))
+    assert scene.reached == (0, 1)
+    displaced = scene.displacements(scene.start)
+    assert np.abs(displaced[2] - [0, -0.25]).max() <= 64 * UNIT_ROUNDOFF  # pushed from above and nothing below
+    assert np.abs(scene.stresses(scene.start)[2]).max() <= 64 * UNIT_ROUNDOFF
+    hanging = np.asarray(stiffness(free)[0])[np.ix_(*[np.flatnonzero(~free.fixed)] * 2)]
+    bound = UNIT_ROUNDOFF * (np.linalg.cond(hanging) + 201) * 0.5  # its nodes are up to 201 cells from the origin
+    assert np.abs(scene.stresses(scene.start)[3] - [0, -0.5, 0]).max() <= bound
+    assert np.abs(scene.stresses(scene.start, 0.5)[3] - [0, -0.25, 0]).max() <= bound
+
+
+# --- what a scene cannot be -------------------------------------------------------------------------------------
+
+SLAVE, MASTER = pressed(placing=Placing()).bodies
+LOOSE = replace(SLAVE, fixed=np.zeros_like(SLAVE.fixed))
+ROLES = "bodies: found slave {} and master {} of {} bodies; needed each body either slave or master, and at least one"
+HELD = "; needed fixed components that prevent it (contact without friction does not)"
+
+
+@pytest.mark.parametrize(
+    ("bodies", "slave", "master", "message"),
+    [
+        ((SLAVE, MASTER), (0,), (0,), ROLES.format("(0,)", "(0,)", 2)),
+        ((SLAVE, MASTER), (0, 1), (1,), ROLES.format("(0, 1)", "(1,)", 2)),
+        ((SLAVE, MASTER, MASTER), (0,), (1,), ROLES.format("(0,)", "(1,)", 3)),
+        ((SLAVE, MASTER), (0,), (1, 2), ROLES.format("(0,)", "(1, 2)", 2)),
+        ((SLAVE, MASTER), (0, 1), (), "bodies: found no master; needed at least one of both"),
+        ((SLAVE, MASTER), (), (0, 1), "bodies: found no slave; needed at least one of both"),
+        ((), (), (), "bodies: found no slave; needed at least one of both"),
+        ((LOOSE, MASTER), (0,), (1,), f"supports of slave: found no supports: it can move along its first axis{HELD}"),
+        (
+            (replace(LOOSE, name="punch", fixed=np.arange(32).reshape(-1, 2) == 31), MASTER),
+            (0,),
+            (1,),
+            f"supports of punch: found supports: it can move along its first axis{HELD}",
+        ),
+        (
+            (SLAVE, replace(MASTER, fixed=MASTER.fixed & [False, True])),
+            (0,),
+            (1,),
+            f"supports of master: found supports: it can move along its first axis{HELD}",
+        ),
+    ],
+)
+def test_wrong_scenes(bodies: tuple[Body, ...], slave: Any, master: Any, message: str) -> None:
+    with pytest.raises(MisuseError) as error:
+        Scene(bodies, slave, master)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+def test_supports_are_asked_of_a_body_from_a_mesh() -> None:
+    mesh = skfem.MeshQuad.init_tensor(np.arange(5.0), np.arange(3.0)).with_defaults()
+    for supports, said in (({}, "no supports"), ({"top": "across"}, "supports"), ({"left": "across"}, "supports")):
+        loose = body_from_mesh(mesh, contact="bottom", supports=supports, name="punch")
+        with pytest.raises(MisuseError) as error:
+            Scene((loose, MASTER))
+        assert str(error.value) == f"supports of punch: found {said}: it can move along its first axis{HELD}"
+    for supports in ({"left": "along"}, {"top": "along"}, {"top": "both"}):
+        Scene((body_from_mesh(mesh, contact="bottom", supports=supports), MASTER))  # contact holds the rest
+
+
+def test_bodies_that_cannot_meet() -> None:
+    far = replace(MASTER, nodes=MASTER.nodes - [0, 1e3])
+    scene = Scene((SLAVE, far))
+    with pytest.raises(MisuseError, match=r"^bodies: found no slave within reach of a master; needed bodies that can"):
+        _ = scene.interface
+
+
+def test_a_body_out_of_reach_that_nothing_holds() -> None:
+    far = block([100, 101, 103], [0, 1, 2], contact="bottom", pressure=0.5, name="far")  # contact alone would hold it
+    scene = Scene((SLAVE, MASTER, far), slave=(0, 2))
+    with pytest.raises(
+        MisuseError,
+        match=r"^supports of far: found not enough to hold a body that can touch nothing; needed supports against",
+    ):
+        scene.stresses(scene.start)
+
+
+# --- far away ---------------------------------------------------------------------------------------------------
+
+
+class Counting:
+    """A formulation that notes what it is asked, and how large the pairings are."""
+
+    def __init__(self, inner: Any, seen: list[tuple[Any, ...]]) -> None:
+        self.inner, self.seen = inner, seen
+        self.traits = inner.traits
+
+    def pair(self, interface: Interface, z: Any) -> Pairing:
+        pairing: Pairing = self.inner.pair(interface, z)
+        sizes = [(name, values.size) for name, values in sorted(pairing.items())]
+        self.seen.append(("pair", len(interface.slave), len(interface.master), z.size, *sizes))
+        return pairing
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
+        self.seen.append(("residual", z.shape))
+        return self.inner.residual(interface, pairing, z)
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
+        tangent = self.inner.tangent(interface, pairing, z)
+        self.seen.append(("tangent", tangent.shape, tangent.nnz))
+        return tangent
+
+
+def counted(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
+    seen: list[tuple[Any, ...]] = []
+    inner = load_formulation(name)
+    assert isinstance(inner, Subject)
+    return Subject(name, lambda *, penalty: Counting(inner._make(penalty=penalty), seen)), seen
+
+
+def with_a_far_body(scene: Scene, role: str) -> Scene:
+    far = block([4e3, 4001, 4003], [0, 1, 2], contact="bottom" if role == "slave" else "top", approach=0.25)
+    bodies = (*scene.bodies, far)
+    return replace(scene, bodies=bodies, **{role: (*getattr(scene, role), len(bodies) - 1)})
+
+
+@pytest.mark.parametrize("role", ["slave", "master"])
+@pytest.mark.parametrize("name", ALL)
+def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
+    alone = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    beside = with_a_far_body(alone, role)
+    assert len(beside.bodies) == 3
+    answers, counts = [], []
+    for scene in (alone, beside):
+        subject, seen = counted(name)
+        case = scene.case()
+        formulation = subject.on(case)
+        pairing = formulation.pair(case.interface, case.z)
+        assert pairing is not None
+        tangent = formulation.tangent(case.interface, pairing, case.z)
+        residual = formulation.residual(case.interface, pairing, case.z)
+        answers.append(
+            bits(
+                {
+                    "nodes": case.interface.nodes,
+                    "slave": case.interface.slave.segments,
+                    "master": case.interface.master.segments,
+                    "z": case.z,
+                    "residual": residual,
+                    **{f"pairing {key}": values for key, values in pairing.items()},
+                    **{f"tangent {key}": getattr(tangent, key) for key in ("row", "col", "data")},
+                }
+            )
+        )
+        trace = newton.solve(scene, formulation, iterations=8)
+        said = ("q", "factors", "residuals", "energies", "floors", "changes", "conditions")
+        answers[-1] |= bits({key: getattr(trace, key) for key in said})
+        answers[-1]["end"] = (trace.end,)
+        counts.append(seen)
+    assert answers[0] == answers[1]
+    assert counts[0] == counts[1]
+    assert {entry[0] for entry in counts[0]} == {"pair", "residual", "tangent"}
+
+
+def test_a_near_body_does_change_it() -> None:
+    alone = catalogue.made("c")
+    near = block([13, 14], [0, 4], contact="bottom", approach=0.0)
+    beside = replace(alone, bodies=(*alone.bodies, near), slave=(0, 2))
+    assert len(beside.interface.slave) == len(alone.interface.slave) + 1
+
+
+def bent(seed: int, n_master: int) -> tuple[Interface, FloatArray]:
+    """A wavy slave pressed into a wavy master, with some overhang."""
+    random = np.random.default_rng(seed)
+    upper, lower = np.linspace(0, 10, 9), np.linspace(-0.4, 10.3, n_master + 1)
+    upper[1:-1] += random.uniform(-0.3, 0.3, 7)
+    slave = np.column_stack([upper, -0.1 - 0.1 * random.random(9)])
+    master = np.column_stack([lower, 0.1 * random.random(n_master + 1)])[::-1]
+    interface = Interface.from_chains(slave, master)
+    return interface, interface.nodes.reshape(-1)
+
+
+def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
+    """The same, and a chain of the master that is far away."""
+    far = np.column_stack([1e4 + np.arange(n_far + 1.0), np.full(n_far + 1, -3.0)])[::-1]
+    numbers = interface.n_nodes + np.arange(n_far + 1)
+    return Interface(
+        np.vstack([interface.nodes, far]),
+        interface.slave,
+        Surface(np.vstack([interface.master.segments, np.column_stack([numbers[:-1], numbers[1:]])])),
+    )
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_far_chain_of_the_master_changes_no_bit(name: str) -> None:
+    """Stronger than a far body: here the formulation itself is given the far segments."""
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject)
+    touching = 0
+    for seed in range(24):
+        interface, z = bent(seed, n_master=4 + seed % 9)
+        case = Case(interface, z, penalty=10.0)
+        formulation = subject.on(case)
+        more = with_a_far_chain(interface, n_far=1 + seed % 7)
+        pairs, forces, tangents = [], [], []
+        for each in (interface, more):
+            own = each.nodes.reshape(-1)
+            pairing = formulation.pair(each, own)
+            assert pairing is not None
+            pairs.append(bits(pairing))
+            forces.append(formulation.residual(each, pairing, own))
+            tangents.append(formulation.tangent(each, pairing, own).toarray())
+        assert pairs[0] == pairs[1]
+        assert forces[1][: z.size].tobytes() == forces[0].tobytes()
+        assert not forces[1][z.size :].any()
+        assert tangents[1][: z.size, : z.size].tobytes() == tangents[0].tobytes()
+        assert not tangents[1][z.size :].any()
+        assert not tangents[1][:, z.size :].any()
+        touching += int(np.abs(forces[0]).max() > 0)
+    assert touching == 24
+
+
+Counts = tuple[int, int]
+
+
+@pytest.fixture
+def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
+    """How many distances from a point to a segment one `pair` evaluates, and how many of them to far segments.
+
+    Counted inside the search itself: its own Python functions run, not compiled, with a counter for a distance.
+    """
+    distance, search = uncompiled(projection.distance_to_segment), uncompiled(projection.nearest_segment)
+    pairs = [(module, uncompiled(module.pair)) for module in (eq6, walk)]
+
+    def count(name: str, case: Case) -> Counts:
+        evaluated: list[bool] = []
+
+        def counting(p: Any, x1: Any, x2: Any) -> Any:
+            evaluated.append(x1[0] > 1e3)
+            return distance(p, x1, x2)
+
+        subject = load_formulation(name)
+        assert isinstance(subject, Subject)
+        with monkeypatch.context() as patched:
+            patched.setattr(projection, "distance_to_segment", counting)
+            for module, pair in pairs:
+                patched.setattr(module, "nearest_segment", search)
+                patched.setattr(module, "pair", pair)
+            pairing = subject.on(case).pair(case.interface, case.z)
+        assert pairing == subject.on(case).pair(case.interface, case.z)  # what was counted is what is compiled
+        return len(evaluated), sum(evaluated)
+
+    return count
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_far_body_costs_no_evaluation(name: str, distances: Callable[[str, Case], Counts]) -> None:
+    alone = catalogue.made("c", refine=2)
+    expected = distances(name, alone.case())
+    assert expected[0] > len(alone.interface.slave)
+    for role in ("slave", "master"):
+        assert distances(name, with_a_far_body(alone, role).case()) == expected
+
+
+@pytest.mark.parametrize("name", ["nts", "vts-me", "vts-ppt-balanced"])
+@pytest.mark.parametrize("n_master", [5, 7, 12, 15, 16])
+@pytest.mark.parametrize("n_far", [8, 200])
+def test_no_distance_to_far_segments_of_an_interface_is_evaluated(
+    name: str, n_master: int, n_far: int, distances: Callable[[str, Case], Counts]
+) -> None:
+    interface, z = bent(3, n_master)
+    more = with_a_far_chain(interface, n_far)
+    expected = distances(name, Case(interface, z))
+    assert expected[0] > 0
+    assert distances(name, Case(more, more.nodes.reshape(-1))) == (expected[0], 0)

@@ -1,0 +1,270 @@
+"""Meshes from elsewhere: every format that is promised, every way to be wrong, each with its message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.meshes.mesh_file import check_facing, read_interface
+
+PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
+# Two blocks, one above the other, a gap of 0.5 between them; lines of the lower one run left to right.
+POINTS = [[0, 0], [4, 0], [4, 1], [2, 1], [0, 1], [1, 1.5], [3, 1.5], [3, 2.5], [1, 2.5]]
+UPPER, LOWER = [[5, 6]], [[4, 3], [3, 2]]
+CELLS = [[0, 1, 2, 4], [8, 7, 6, 5]]  # the upper one clockwise
+NAMES = {"punch": np.array([1, 1]), "base": np.array([2, 1]), "bodies": np.array([3, 2])}
+
+
+def blocks(
+    *, points: object = POINTS, upper: object = UPPER, lower: object = LOWER, cells: object = (), line: str = "line"
+) -> meshio.Mesh:
+    """The two blocks in memory, their groups as physical groups; without cells unless they are given."""
+    parts = [(line, np.array(upper)), (line, np.array(lower))] + ([("quad", np.array(cells))] if len(cells) else [])
+    tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
+    points = np.column_stack([points, np.zeros(len(points))]) if np.shape(points)[1] == 2 else np.array(points)
+    return meshio.Mesh(
+        points, parts, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}, field_data=dict(NAMES)
+    )
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., Interface]:
+    """Writes a mesh as .msh 2.2 and reads its interface; the punch is the slave."""
+
+    def written_and_read(mesh: meshio.Mesh, *, slave: str = "punch", master: str = "base", **more: bool) -> Interface:
+        meshio.write(tmp_path / "mesh.msh", mesh, file_format="gmsh22", binary=False)
+        return read_interface(tmp_path / "mesh.msh", slave=slave, master=master, **more)
+
+    return written_and_read
+
+
+def points_of(interface: Interface) -> tuple[list[list[float]], list[list[float]]]:
+    """The points of one open chain a side, in walking order."""
+    sides = []
+    for surface in (interface.slave, interface.master):
+        segments = surface.segments[surface.chain_order]
+        assert np.array_equal(segments[1:, 0], segments[:-1, 1])
+        sides.append(interface.nodes[[segments[0, 0], *segments[:, 1]]].tolist())
+    return sides[0], sides[1]
+
+
+RIGHT = ([[1.0, 1.5], [3.0, 1.5]], [[4.0, 1.0], [2.0, 1.0], [0.0, 1.0]])
+
+
+def test_the_punch_of_the_documentation() -> None:
+    interface = read_interface(PUNCH, slave="punch", master="base")
+    assert (len(interface.slave), len(interface.master)) == (5, 11)
+    slave, master = points_of(interface)
+    assert slave[0] == [3, 4]
+    assert slave[-1] == [7, 4]
+    assert master[0] == [10, 4]
+    assert master[-1] == [0, 4]
+    assert not {x for x, _ in slave} & {x for x, _ in master}
+    swapped = read_interface(str(PUNCH), slave="base", master="punch")
+    assert points_of(swapped) == (master, slave)
+
+
+def test_a_number_is_as_good_as_a_name() -> None:
+    by_name, by_number = (read_interface(PUNCH, slave=a, master=b) for a, b in (("punch", "base"), ("1", "2")))
+    assert np.array_equal(by_name.nodes, by_number.nodes)
+    assert np.array_equal(by_name.slave.segments, by_number.slave.segments)
+
+
+@pytest.mark.parametrize("binary", [False, True], ids=["ascii", "binary"])
+@pytest.mark.parametrize("version", ["gmsh22", "gmsh"])
+def test_gmsh_formats(version: str, binary: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = meshio.read(PUNCH, file_format="gmsh")
+    meshio.write(tmp_path / "punch.msh", mesh, file_format=version, binary=binary)
+    capsys.readouterr()
+    interface = read_interface(tmp_path / "punch.msh", slave="1", master="base")
+    assert points_of(interface) == points_of(read_interface(PUNCH, slave="punch", master="base"))
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("upper", [[[5, 6]], [[6, 5]]])
+@pytest.mark.parametrize("lower", [[[4, 3], [3, 2]], [[2, 3], [3, 4]], [[4, 3], [2, 3]], [[3, 2], [4, 3]]])
+def test_cells_tell_the_side_whatever_the_order_of_the_lines(
+    upper: list[list[int]], lower: list[list[int]], read: Callable[..., Interface]
+) -> None:
+    assert points_of(read(blocks(upper=upper, lower=lower, cells=[[0, 1, 2, 3], [8, 7, 6, 5]]))) == RIGHT
+
+
+def test_one_cell_beside_a_chain_tells_all_of_it(read: Callable[..., Interface]) -> None:
+    mesh = blocks(cells=[[0, 1, 2, 3], [8, 7, 6, 5]])  # nothing beside the line from node 4 to node 3
+    assert points_of(read(mesh)) == RIGHT
+
+
+def test_without_cells_a_chain_runs_as_its_first_line(read: Callable[..., Interface]) -> None:
+    assert points_of(read(blocks(lower=[[2, 3], [4, 3]]))) == RIGHT
+    with pytest.raises(
+        MisuseError, match=r"--mesh: found mean normals \(0, -1\) of the slave and \(0, -1\) of the mas"
+    ):
+        read(blocks(lower=[[4, 3], [2, 3]]))
+
+
+def test_flip_exchanges_the_orientation(read: Callable[..., Interface]) -> None:
+    lines_only = blocks(upper=[[6, 5]])
+    assert points_of(read(lines_only, flip=True)) == RIGHT
+    assert points_of(read(lines_only)) == (RIGHT[0][::-1], RIGHT[1][::-1])
+    rigid_base = blocks(cells=[[8, 7, 6, 5]])  # the base is lines alone, which run the wrong way
+    with pytest.raises(MisuseError, match="--flip where only one surface has cells"):
+        read(rigid_base)
+    assert points_of(read(rigid_base, flip=True)) == RIGHT
+    told = read_interface(PUNCH, slave="punch", master="base", flip=True)
+    assert points_of(told)[0][0] == [7, 4]
+
+
+def test_gmsh_turns_the_lines_of_a_negative_curve(tmp_path: Path) -> None:
+    text = PUNCH.read_text()
+    assert "8 3 4 0 7 4 0 1 -1 2 8 -5" in text  # curve 8 is in group 1 against its direction
+    start, end = text.index("$Elements"), text.index("$EndElements")
+    lines_only = text[start:end].splitlines()[2:20]  # the blocks of the two groups, 11 and 5 lines
+    (tmp_path / "lines.msh").write_text("\n".join([text[:start] + "$Elements", "2 16 1 16", *lines_only, text[end:]]))
+    interface = read_interface(tmp_path / "lines.msh", slave="punch", master="base")
+    assert points_of(interface) == points_of(read_interface(PUNCH, slave="punch", master="base"))
+
+
+ABAQUS = """*NODE
+1, 0, 1\n2, 2, 1\n3, 4, 1\n4, 1, 1\n5, 3, 1\n6, 1, 2\n7, 3, 2\n8, 0, 0\n9, 4, 0
+*ELEMENT, TYPE=T2D2
+1, 1, 2\n2, 2, 3\n3, 4, 5
+*ELEMENT, TYPE=CPS4R
+4, 4, 5, 7, 6
+*ELEMENT, TYPE=CPS3
+5, 8, 2, 1\n6, 8, 9, 2\n7, 9, 3, 2
+*ELSET, ELSET=Base\n1, 2
+*ELSET, ELSET=Punch\n3, 4
+"""
+
+
+def test_abaqus_sets_may_hold_cells_beside_the_lines(tmp_path: Path) -> None:
+    (tmp_path / "mesh.inp").write_text(ABAQUS)
+    interface = read_interface(tmp_path / "mesh.inp", slave="Punch", master="Base")
+    assert points_of(interface) == ([[1, 1], [3, 1]], [[4, 1], [2, 1], [0, 1]])
+    with pytest.raises(MisuseError, match=r"--slave: found 'punch', which is no group of the file; needed 'Punch'\?"):
+        read_interface(tmp_path / "mesh.inp", slave="punch", master="Base")
+
+
+@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.vtk", "mesh.mesh"])
+def test_formats_that_number_their_groups(name: str, tmp_path: Path) -> None:
+    mesh = blocks(cells=[[0, 1, 2, 3], [8, 7, 6, 5]])
+    if name == "mesh.mesh":
+        mesh.cell_data = {"medit:ref": mesh.cell_data["gmsh:physical"]}
+    mesh.field_data = {}
+    meshio.write(tmp_path / name, mesh)
+    assert points_of(read_interface(tmp_path / name, slave="1", master="2")) == RIGHT
+
+
+def test_second_order_cells_tell_the_side_by_their_corners(read: Callable[..., Interface]) -> None:
+    points = [*POINTS, [2, 1.5], [2, 2], [1, 2]]
+    mesh = blocks(points=points, lower=[[2, 3], [3, 4]], upper=[[6, 5]])
+    mesh.cells.append(meshio.CellBlock("triangle6", np.array([[5, 6, 8, 9, 10, 11]])))
+    mesh.cell_data = {key: [*value, np.array([9])] for key, value in mesh.cell_data.items()}
+    assert points_of(read(mesh)) == RIGHT
+
+
+def test_closed_chains_need_no_facing(read: Callable[..., Interface]) -> None:
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    points = np.vstack([square, 2 * square])
+    inner, outer = [[0, 1], [1, 2], [3, 2], [3, 0]], [[5, 4], [6, 5], [7, 6], [4, 7]]
+    interface = read(blocks(points=points, upper=inner, lower=outer))
+    assert (interface.slave.neighbours >= 0).all()
+    assert interface.slave.segments.tolist() == [[0, 1], [1, 2], [2, 3], [3, 0]]
+    assert interface.master.segments.tolist() == [[5, 4], [6, 5], [7, 6], [4, 7]]
+
+
+def with_z(z: float) -> list[list[float]]:
+    return [[x, y, z if (x, y) == (4, 1) else 3.0] for x, y in POINTS]
+
+
+def test_a_plane_may_be_a_little_rough(read: Callable[..., Interface]) -> None:
+    assert points_of(read(blocks(points=with_z(3 + 1e-12), lower=[[2, 3], [3, 4]]))) == RIGHT
+
+
+NAN = [[0, 0], [4, 0], [4, 1], [np.nan, 1], *POINTS[4:]]
+TWIN = [*POINTS[:5], [1, 1.5], [3, 1.5], [3, 1.5], [2, 1.5]]
+SPLIT = [*POINTS[:4], [0, 1], [1, 1.5], [3, 1.5], [2, 1], [1, 2.5]]
+WRONG = {
+    "line3": (blocks(upper=[[5, 6, 7]], lower=[[4, 2, 3]], line="line3"), "--slave: found 'punch' with elements line3"),
+    "z": (blocks(points=with_z(1.0)), "--mesh: found z from 1 to 3; needed a mesh in a plane of constant z"),
+    "nan": (blocks(points=NAN), "--mesh: found NaN or infinity among its coordinates"),
+    "shared": (blocks(upper=[[3, 6]]), r"--master: found a node of the slave surface too, at \(2, 1\)"),
+    "branch": (blocks(lower=[[4, 3], [3, 2], [3, 0]]), r"--master: found 3 lines that meet at \(2, 1\); needed chains"),
+    "twice": (blocks(lower=[[4, 3], [3, 4]]), "--master: found the same line twice"),
+    "point": (blocks(lower=[[4, 4]]), "--master: found segment 0 that begins and ends"),
+    "zero": (blocks(points=TWIN, upper=[[6, 7]]), "--slave: found segment 0 of zero length"),
+    "split": (blocks(points=SPLIT, lower=[[4, 3], [7, 2]]), r"--master: found coincident nodes .* at \(2.0, 1.0\)"),
+    "between": (
+        blocks(points=[*POINTS, [2, 3], [2, 0]], upper=[[3, 4]], lower=[[5, 6]], cells=[[0, 1, 3, 4], [4, 3, 7, 8]]),
+        r"--slave: found a line with cells on both sides, at \(2, 1\); needed lines on the boundary",
+    ),
+    "sides": (
+        blocks(lower=[[4, 3], [3, 2]], cells=[[0, 1, 3, 4], [3, 2, 7, 8]]),
+        r"--master: found a chain that changes the side of its body, at \(",
+    ),
+}
+
+
+@pytest.mark.parametrize(("mesh", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_meshes(mesh: meshio.Mesh, message: str, read: Callable[..., Interface]) -> None:
+    with pytest.raises(MisuseError, match=message):
+        read(mesh)
+
+
+@pytest.mark.parametrize(
+    ("slave", "master", "message"),
+    [
+        (
+            "pnch",
+            "base",
+            r"--slave: found 'pnch', which is no group of the file; needed 'punch'\? The groups are .*'base'",
+        ),
+        ("zzz", "base", r"--slave: found 'zzz', which is no group of the file; needed one of '1' \(line\), "),
+        ("punch", "base body", "--master: found 'base body' with elements quad, no lines"),
+        ("punch", "punch", "--master: found 'punch', which is the slave too"),
+        ("punch", "1", "--master: found a node of the slave surface too"),
+    ],
+)
+def test_wrong_groups(slave: str, master: str, message: str) -> None:
+    with pytest.raises(MisuseError, match=message):
+        read_interface(PUNCH, slave=slave, master=master)
+
+
+def test_a_file_without_groups(tmp_path: Path) -> None:
+    mesh = blocks()
+    mesh.cell_data, mesh.field_data = {}, {}
+    meshio.write(tmp_path / "mesh.vtk", mesh)
+    with pytest.raises(
+        MisuseError, match="--slave: found 'punch', which is no group of the file; needed groups in the"
+    ):
+        read_interface(tmp_path / "mesh.vtk", slave="punch", master="base")
+
+
+@pytest.mark.parametrize("name", ["mesh.msh", "mesh.vtk", "mesh.inp", "mesh.unheard-of", "mesh"])
+@pytest.mark.parametrize("text", ["", "junk\n", "$MeshFormat\n4.1 0 8\n", PUNCH.read_text()[:900]])
+def test_unreadable_files(name: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(MisuseError, match="--mesh: found "):
+        read_interface(tmp_path / name, slave="punch", master="base")
+    assert capsys.readouterr() == ("", "")  # meshio prints; the message is ours to print
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.msh", tmp_path):
+        with pytest.raises(MisuseError, match=r"--mesh: found '.*', which is no file; needed a mesh file"):
+            read_interface(path, slave="punch", master="base")
+
+
+def test_facing_is_asked_of_the_whole_surface() -> None:
+    roof = [[0, 2], [1, 1], [2, 2]]  # one of its normals alone is square to the base's
+    check_facing(Interface.from_chains(roof, [[2, 0], [0, 0]]))
+    with pytest.raises(MisuseError, match="do not oppose each other"):
+        check_facing(Interface.from_chains(roof, [[0, 0], [2, 0]]))
+    with pytest.raises(MisuseError, match="do not oppose each other"):
+        check_facing(Interface.from_chains(roof, [[3, 0], [3, 2]]))

@@ -1,0 +1,310 @@
+"""Names, options, wrappers, and plugins that do not load; all entry points here are fakes."""
+
+from __future__ import annotations
+
+import sys
+import types
+from typing import Any, Literal
+
+import pytest
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Property
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.run import registry
+from contactverif.run.registry import load_formulation, load_formulations, load_properties, subject_of
+
+
+class Plugin:
+    def __init__(self, **options: Any) -> None:
+        self.options = options
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return 0 * z
+
+
+def plain(*, penalty: float) -> Plugin:
+    return Plugin(penalty=penalty)
+
+
+def with_options(
+    *,
+    penalty: float,
+    n: int = 2,
+    factor: float = 1.0,
+    area: Literal["reference", "current"] = "current",
+    on: bool = True,
+) -> Plugin:
+    if n < 1:
+        raise MisuseError("n", str(n), "at least 1")
+    return Plugin(penalty=penalty, n=n, factor=factor, area=area, on=on)
+
+
+def any_options(*, penalty: float, **options: Any) -> Plugin:
+    return Plugin(**options)
+
+
+def needing(*, penalty: float, order: int) -> Plugin:
+    return Plugin(order=order)
+
+
+def twice(*, penalty: float, inner: Any, mode: str = "average") -> Plugin:
+    """Two of it.
+
+    And more about them.
+    """
+    return Plugin(inner=inner(penalty=penalty), mode=mode)
+
+
+def raising(*, penalty: float) -> Plugin:
+    raise RuntimeError("no licence")
+
+
+def empty(*, penalty: float) -> object:
+    return object()
+
+
+def question(name: str) -> Property:
+    return Property(name, "", "", (), lambda interface: None, lambda case, subject: None, lambda traits: None)  # type: ignore[arg-type, return-value]
+
+
+FORMULATIONS: dict[str, Any] = {
+    "nts": plain,
+    "vts-ppt": with_options,
+    "vts-me": with_options,
+    "any": any_options,
+    "needing": needing,
+    "twice": twice,
+    "raising": raising,
+    "empty": empty,
+    "number": 7,
+}
+
+
+class Entry:
+    """As much of an entry point as the registry looks at; remembers whether it was loaded."""
+
+    dist = None
+
+    def __init__(self, name: str, what: Any, value: str = "") -> None:
+        self.name, self.what, self.value = name, what, value or f"fake:{name}"
+        self.loads = 0
+
+    def load(self) -> Any:
+        self.loads += 1
+        if isinstance(self.what, BaseException):
+            raise self.what
+        return self.what
+
+
+@pytest.fixture
+def entries(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Entry]]:
+    installed = {
+        registry.FORMULATIONS: [Entry(name, make) for name, make in reversed(FORMULATIONS.items())],
+        registry.PROPERTIES: [
+            Entry(name, question(name)) for name in ("patch.flat.solve", "balance.force", "patch.flat.transmission")
+        ],
+    }
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: installed[group])
+    return installed
+
+
+def loaded(text: str) -> Any:
+    subject = load_formulation(text)
+    assert isinstance(subject, Subject)
+    assert subject.name == text
+    return subject.with_penalty(3.0).plugin
+
+
+def test_names_are_sorted_and_nothing_is_loaded(entries: dict[str, list[Entry]]) -> None:
+    assert registry.formulation_names() == tuple(sorted(FORMULATIONS))
+    assert registry.property_ids() == ("balance.force", "patch.flat.solve", "patch.flat.transmission")
+    loaded("nts")
+    assert {entry.name for entry in entries[registry.FORMULATIONS] if entry.loads} == {"nts"}
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("vts-ppt", {"n": 2, "factor": 1.0, "area": "current", "on": True}),
+        ("vts-me:n=4", {"n": 4, "factor": 1.0, "area": "current", "on": True}),
+        ("vts-me:factor=1,area=reference,on=false", {"n": 2, "factor": 1, "area": "reference", "on": False}),
+    ],
+)
+@pytest.mark.usefixtures("entries")
+def test_options_are_read(text: str, options: dict[str, Any]) -> None:
+    assert loaded(text).options == {"penalty": 3.0, **options}
+
+
+@pytest.mark.usefixtures("entries")
+def test_values_are_whole_numbers_numbers_truth_or_words() -> None:
+    options = loaded("any:a=1,b=1e-3,c=true,d=-2,e=word").options
+    assert options == {"a": 1, "b": 1e-3, "c": True, "d": -2, "e": "word"}
+    assert isinstance(options["a"], int)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("vts-pt", ["formulation: found 'vts-pt'", "nearest: vts-ppt"]),
+        ("zzz", ["found 'zzz'", "one of any, empty", "vts-ppt"]),
+        ("", ["formulation: found ''", "NAME"]),
+        ("vts-me:", ["'vts-me:'", "OPTION=VALUE"]),
+        ("vts-me:n", ["found 'n' in 'vts-me:n'"]),
+        ("vts-me:n=", ["found 'n='"]),
+        ("vts-me:=4", ["found '=4'"]),
+        ("vts-me:n=1,", ["found ''"]),
+        ("vts-me:n=1,n=2", ["n twice"]),
+        ("vts-me:N=4", ["'N'", "it has n, factor, area, on"]),
+        ("vts-me:facto=4", ["'facto'", "nearest: factor"]),
+        ("nts:n=4", ["'n'", "it has none"]),
+        ("vts-me:n=4.5", ["option n", "found 4.5", "a whole number"]),
+        ("vts-me:n=true", ["option n", "found True", "a whole number"]),
+        ("vts-me:factor=much", ["option factor", "'much'", "a number"]),
+        ("vts-me:on=1", ["option on", "found 1", "true or false"]),
+        ("vts-me:area=Reference", ["option area", "'Reference'", "one of reference, current"]),
+        ("vts-me:n=0", ["n: found 0; needed at least 1"]),
+        ("vts-me:penalty=4", ["option penalty", "the harness gives it"]),
+        ("any:inner=nts", ["option inner", "the harness gives it"]),
+        ("needing", ["no order", "order=VALUE"]),
+        ("twice", ["found 'twice'", "twice/NAME"]),
+        ("twice/", ["found ''"]),
+        ("nts/vts-me", ["nts wraps nothing"]),
+        ("twice/vts-m", ["found 'vts-m'", "nearest: vts-me"]),
+        ("twice/vts-me:n=0", ["n: found 0"]),
+    ],
+)
+@pytest.mark.usefixtures("entries")
+def test_what_the_caller_wrote_wrong_is_said(text: str, told: list[str]) -> None:
+    with pytest.raises(MisuseError) as error:
+        load_formulation(text)
+    for part in told:
+        assert part in str(error.value)
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
+    plugin = loaded("twice:mode=sum/vts-me:n=4")
+    assert plugin.options["mode"] == "sum"
+    assert plugin.options["inner"].options == {"penalty": 3.0, "n": 4, "factor": 1.0, "area": "current", "on": True}
+    assert loaded("twice/twice/nts").options["inner"].options["inner"].options == {"penalty": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("raising", "make: RuntimeError: no licence"),
+        ("empty", "make: returned a object without a `residual`"),
+        ("number", "the entry point gives a int; needed a factory"),
+        ("twice/raising", "raising: make: RuntimeError: no licence"),
+        ("twice/number", "number: the entry point gives a int"),
+    ],
+)
+@pytest.mark.usefixtures("entries")
+def test_what_the_plugin_does_wrong_is_a_row(text: str, reason: str) -> None:
+    found = load_formulation(text)
+    assert isinstance(found, NotLoaded)
+    assert found.formulation == text
+    assert reason in found.reason
+
+
+@pytest.mark.parametrize("error", [ImportError("no module named x"), SystemExit(3), AttributeError("make")])
+def test_a_module_that_does_not_import_is_a_row(entries: dict[str, list[Entry]], error: BaseException) -> None:
+    entries[registry.FORMULATIONS].append(Entry("broken", error))
+    entries[registry.PROPERTIES].append(Entry("broken", error))
+    reason = f"{type(error).__name__}: {error}"
+    for found in (load_formulation("broken"), *load_properties(["broken"])):
+        assert isinstance(found, NotLoaded)
+        assert (found.formulation, found.reason) == ("broken", reason)
+
+
+def test_a_name_that_two_distributions_want_is_a_row(entries: dict[str, list[Entry]]) -> None:
+    entries[registry.FORMULATIONS].append(Entry("nts", plain, "other:nts"))
+    found = load_formulation("nts")
+    assert isinstance(found, NotLoaded)
+    assert found.reason == "registered 2 times: fake:nts, other:nts"
+
+
+def test_a_distribution_that_is_on_the_path_twice_is_no_trouble(entries: dict[str, list[Entry]]) -> None:
+    entries[registry.FORMULATIONS].append(Entry("nts", plain))
+    loaded("nts")
+
+
+@pytest.mark.usefixtures("entries")
+def test_all_are_loaded_for_a_list() -> None:
+    found = load_formulations()
+    names = [item.formulation if isinstance(item, NotLoaded) else item.name for item in found]
+    assert names == sorted(FORMULATIONS)
+    rows = {item.formulation for item in found if isinstance(item, NotLoaded)}
+    assert rows == {"raising", "empty", "number", "needing"}
+    assert [item for item in found if isinstance(item, registry.Wrapper)] == [registry.Wrapper("twice", "Two of it")]
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_wrapper_does_not_stand_alone() -> None:
+    assert set(registry.standalone_names()) == set(FORMULATIONS) - {"twice"}
+
+
+@pytest.mark.parametrize(
+    ("globs", "ids"),
+    [
+        ([], ["balance.force", "patch.flat.solve", "patch.flat.transmission"]),
+        (["patch.*"], ["patch.flat.solve", "patch.flat.transmission"]),
+        (["patch.flat.t*", "balance.force", "balance.*"], ["balance.force", "patch.flat.transmission"]),
+    ],
+)
+def test_properties_match_patterns(entries: dict[str, list[Entry]], globs: list[str], ids: list[str]) -> None:
+    assert [found.id for found in load_properties(globs) if isinstance(found, Property)] == ids
+    assert sum(entry.loads for entry in entries[registry.PROPERTIES]) == len(ids)
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_pattern_that_matches_nothing_is_said() -> None:
+    with pytest.raises(MisuseError, match=r"property: found 'balance.forces'; .* nearest: balance.force"):
+        load_properties(["patch.*", "balance.forces"])
+
+
+@pytest.mark.parametrize(("what", "told"), [(question("other"), "the property 'other'"), (7, "a int")])
+def test_a_property_goes_by_its_id(entries: dict[str, list[Entry]], what: Any, told: str) -> None:
+    entries[registry.PROPERTIES] = [Entry("mine", what)]
+    [found] = load_properties()
+    assert isinstance(found, NotLoaded)
+    assert f"gives {told}; needed a contactverif.contract.property.Property with the id mine" in found.reason
+
+
+def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not a fake: through importlib.metadata, from a module that exists only here."""
+    from importlib.metadata import EntryPoint, EntryPoints
+
+    module = types.ModuleType("a_strangers_plugin")
+    module.make = plain  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "a_strangers_plugin", module)
+    real = EntryPoints(
+        [
+            EntryPoint("stranger", "a_strangers_plugin:make", registry.FORMULATIONS),
+            EntryPoint("misspelt", "a_strangers_plugin:mak", registry.FORMULATIONS),
+        ]
+    )
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: real.select(group=group))
+    loaded("stranger")
+    found = load_formulation("misspelt")
+    assert isinstance(found, NotLoaded)
+    assert "AttributeError" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("traits", "said"),
+    [
+        ({"tangent": "exactly"}, "Traits.tangent: found 'exactly'; needed one of 'exact', 'approximate', None"),
+        ({"witnesses": ["a1"]}, "Traits.witnesses: found a list; needed {property id: name of a case}"),
+    ],
+)
+def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], said: str) -> None:
+    def make(*, penalty: float) -> Any:
+        return Traits(**traits)
+
+    found = subject_of("misspelt", make)
+    assert isinstance(found, NotLoaded)
+    assert found.reason == said

@@ -1,0 +1,463 @@
+"""The runner on formulations and properties made by hand: what is counted, what is shrunk, what fails a run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
+from contactverif.contract.result import NotLoaded, Row, Run
+from contactverif.contract.subject import Subject
+from contactverif.run import runner
+from contactverif.run.runner import PROFILES, Progress, judge_case, run
+
+ERROR = Quantity("error", "1", "1e-6", "a number for a test")
+
+
+def a_case(size: int, name: str = "") -> Case:
+    """An interface of `size` segments a side, which is all that the formulations here look at."""
+    x = np.arange(size + 1.0)
+    sides = [np.column_stack([x, 0 * x]), np.column_stack([x[::-1], 0 * x])]
+    interface = Interface.from_chains(*sides)
+    return Case(interface, interface.nodes.ravel(), name=name)
+
+
+def sizes(most: int = 60) -> st.SearchStrategy[Case]:
+    return st.integers(1, most).map(a_case)
+
+
+def measured(case: Case, subject: Subject) -> Measurement:
+    """The residual against what it ought to be, 0."""
+    formulation = subject.on(case)
+    pairing = formulation.pair(case.interface, case.z)
+    forces = formulation.residual(case.interface, pairing, case.z)
+    return Measurement({"error": float(np.abs(forces).max())}, {"error": 1e-6})
+
+
+ZERO = Property(
+    "patch.zero", "patch", "No force.", (ERROR,), lambda _: sizes(), measured, lambda traits: traits.passes_flat_patch
+)
+
+
+class Plugin:
+    """Its residual is what a function of the number of slave segments says, 0 if it says nothing."""
+
+    def __init__(self, answer: Callable[[int], Any] = lambda size: 0.0, traits: Traits | None = None) -> None:
+        self.answer = answer
+        self.traits = traits or Traits()
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        return self.answer(len(interface.slave)) + 0 * z
+
+
+def subject(answer: Callable[[int], Any] = lambda size: 0.0, **traits: Any) -> Subject:
+    return Subject("mine", lambda *, penalty: Plugin(answer, Traits(**traits)))
+
+
+def from_size(least: int, error: float = 1.0) -> Callable[[int], float]:
+    return lambda size: error if size >= least else 0.0
+
+
+def raising_from(least: int) -> Callable[[int], float]:
+    def answer(size: int) -> float:
+        if size >= least:
+            raise IndexError(f"segment {least}")
+        return 0.0
+
+    return answer
+
+
+def one_row(who: Subject, question: Property = ZERO, **options: Any) -> Row:
+    [row] = run([who], [question], **{"examples": 40, "seed": 1, **options}).rows
+    return row
+
+
+def segments(outcome: Outcome | None) -> int:
+    assert outcome is not None
+    return len(outcome.case.interface.slave)
+
+
+@pytest.fixture
+def witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
+    def named(name: str) -> Case:
+        if name != "C":
+            raise MisuseError("case", repr(name), "C")
+        return a_case(7, "C")
+
+    monkeypatch.setattr(runner, "named_case", named)
+
+
+def test_as_many_different_cases_are_judged_as_asked() -> None:
+    question = replace(ZERO, cases=lambda _: st.integers(1, 10**6).map(lambda seed: replace(a_case(1), seed=seed)))
+    row = one_row(subject(), question, examples=150)
+    assert (row.verdict, row.planned, row.judged) == (Verdict.PASS, 150, 150)
+    assert len({outcome.case.seed for outcome in row.outcomes}) == 150
+    assert not row.unexpected
+    assert row.shrunk is None
+
+
+def test_where_there_are_fewer_cases_all_are_judged() -> None:
+    row = one_row(subject(), replace(ZERO, cases=lambda _: sizes(5)), examples=100)
+    assert (row.verdict, row.planned) == (Verdict.PASS, 5)
+    assert sorted(map(segments, row.outcomes)) == [1, 2, 3, 4, 5]
+
+
+def test_cases_that_could_not_be_made_count_as_not_judged() -> None:
+    question = replace(ZERO, cases=lambda _: st.integers(0, 10**9).filter(lambda size: size < 0).map(a_case))
+    row = one_row(subject(), question, examples=100)
+    assert (row.verdict, row.planned, row.judged) == (Verdict.NOT_JUDGED, 100, 0)
+    assert row.reason == "0 of 100 cases judged; no more cases could be made"
+
+
+def test_all_planned_cases_are_judged_before_one_is_shrunk() -> None:
+    log: list[Progress] = []
+    row = one_row(subject(from_size(3)), progress=log.append)
+    assert [step.phase for step in log] == sorted(
+        (step.phase for step in log), key=["drawing", "judging", "shrinking"].index
+    )
+    judging = [step for step in log if step.phase == "judging"]
+    assert [(step.done, step.planned) for step in judging] == [(done, 40) for done in range(1, 41)]
+    assert {(step.formulation, step.property_id) for step in log} == {("mine", "patch.zero")}
+    assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 20
+
+
+def test_a_failure_is_shrunk_to_the_smallest_case() -> None:
+    row = one_row(subject(from_size(5)))
+    assert (row.verdict, row.planned, row.judged) == (Verdict.FAIL, 40, 40)
+    assert segments(row.shrunk) == 5
+    assert row.shrunk is not None
+    assert row.shrunk.verdict is Verdict.FAIL
+    assert row.reason == row.shrunk.reason == "error 1, at most 1e-06"
+
+
+def test_a_shrunk_failure_is_a_clear_one() -> None:
+    """Fails by a hair from one segment on, clearly from ten, grossly from forty."""
+    row = one_row(subject(lambda size: 1.001e-6 + (1e-2 if size >= 10 else 0) + (1e2 if size >= 40 else 0)))
+    assert segments(row.shrunk) == 10
+
+
+def test_the_worst_kind_of_failure_is_shrunk() -> None:
+    def answer(size: int) -> float:
+        if size >= 20:
+            raise IndexError("late")
+        return 1.0 if size >= 2 else 0.0
+
+    row = one_row(subject(answer))
+    assert row.verdict is Verdict.CRASHED
+    assert segments(row.shrunk) == 20
+
+
+def test_the_same_seed_gives_the_same_rows() -> None:
+    def facts(row: Row) -> Any:
+        return [(segments(outcome), outcome.verdict) for outcome in (*row.outcomes, row.shrunk) if outcome]
+
+    assert facts(one_row(subject(from_size(5)))) == facts(one_row(subject(from_size(5))))
+    assert facts(one_row(subject(from_size(5)), seed=2)) != facts(one_row(subject(from_size(5))))
+
+
+def test_cases_depend_neither_on_the_formulation_nor_on_what_else_is_asked() -> None:
+    other = replace(ZERO, id="patch.other", cases=lambda _: sizes(50))
+    alone = one_row(subject())
+    among = run(
+        [Subject("wrong", lambda *, penalty: Plugin(from_size(2))), subject()], [other, ZERO], examples=40, seed=1
+    )
+    for row in among.rows:
+        if row.question is ZERO:
+            assert [segments(outcome) for outcome in row.outcomes] == [segments(outcome) for outcome in alone.outcomes]
+
+
+def test_cases_depend_on_no_loaded_module_and_nothing_is_written(tmp_path: Path) -> None:
+    """Hypothesis draws constants from the source of loaded modules, and caches them in `.hypothesis`."""
+    (tmp_path / "of_a_user.py").write_text("\n".join(f"a{n} = {1000 + 17 * n}" for n in range(400)))
+    script = (
+        "import sys\n"
+        "if sys.argv[1] == 'with': import of_a_user\n"
+        "from hypothesis import strategies as st\n"
+        "from contactverif.run.driver import draw_cases\n"
+        "strategy = st.lists(st.one_of(st.integers(1000, 8000), st.floats(0, 1)), max_size=9)\n"
+        "print(draw_cases(strategy, seed='1', examples=200).cases)\n"
+    )
+
+    def output(argument: str, hash_seed: str) -> str:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONHASHSEED": hash_seed, "CI": argument}
+        command = [sys.executable, "-c", script, argument]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True).stdout
+
+    assert output("with", "1") == output("without", "2")
+    assert not (tmp_path / ".hypothesis").exists()
+
+
+def test_hypothesis_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    one_row(subject(from_size(5)))
+    one_row(subject(raising_from(5)))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("promise", [True, False, None])
+@pytest.mark.usefixtures("witnesses")
+def test_a_crash_is_an_outcome_that_fails_the_run(promise: bool | None) -> None:
+    who = subject(raising_from(8), passes_flat_patch=promise, witnesses={"patch.zero": "C"})
+    row = one_row(who)
+    assert (row.verdict, row.judged, row.unexpected) == (Verdict.CRASHED, 40, "crashed")
+    assert row.reason == "exception: residual: IndexError: segment 8"
+    assert segments(row.shrunk) == 8
+
+
+@pytest.mark.parametrize(
+    ("error", "how"), [(MemoryError("full"), "memory"), (SystemExit(3), "exit: residual: SystemExit: 3")]
+)
+def test_how_it_crashed_is_said(error: BaseException, how: str) -> None:
+    def answer(size: int) -> float:
+        raise error
+
+    outcome = judge_case(ZERO, a_case(1), subject(answer))
+    assert outcome.verdict is Verdict.CRASHED
+    assert outcome.reason.startswith(how)
+
+
+@pytest.mark.parametrize("promise", [True, False, None])
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (lambda size: np.nan if size >= 6 else 0.0, "not finite: residual: nan in"),
+        (lambda size: np.zeros((2, 1)) if size >= 6 else 0.0, "breaks the contract: residual: returned shape"),
+    ],
+)
+@pytest.mark.usefixtures("witnesses")
+def test_a_breach_of_the_contract_fails_the_run_whatever_was_promised(
+    promise: bool | None, answer: Callable[[int], Any], reason: str
+) -> None:
+    row = one_row(subject(answer, passes_flat_patch=promise, witnesses={"patch.zero": "C"}))
+    assert row.verdict is Verdict.FAIL
+    assert row.reason.startswith(reason)
+    assert row.unexpected == "breaks the contract"
+    assert segments(row.shrunk) == 6
+
+
+def test_a_breach_is_worse_than_a_number() -> None:
+    row = one_row(subject(lambda size: np.nan if size >= 30 else 1e9))
+    assert row.reason.startswith("not finite")
+    assert segments(row.shrunk) == 30
+
+
+def test_warnings_of_numpy_are_no_crash() -> None:
+    """They are errors in many a test suite (this one), and only printed on the command line."""
+    row = one_row(subject(lambda size: 0.0 if np.isnan(np.float64(0) / np.float64(0)) else 1.0))
+    assert row.verdict is Verdict.PASS
+
+
+def test_a_plugin_that_answers_differently_each_time_still_gives_a_case() -> None:
+    calls = iter(range(10**9))
+    row = one_row(subject(lambda size: 1.0 if next(calls) % 7 == 6 else 0.0))
+    assert row.verdict is Verdict.FAIL
+    assert row.shrunk is not None
+    assert row.shrunk.verdict is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("least", "verdict", "unexpected"),
+    [
+        (2, Verdict.FAIL, ""),  # random cases and the witness fail
+        (7, Verdict.FAIL, ""),
+        (8, Verdict.FAIL, ""),  # the witness passes, random cases fail
+        (10**6, Verdict.PASS, "said to fail, and passes"),
+    ],
+)
+@pytest.mark.usefixtures("witnesses")
+def test_a_promise_to_fail_is_broken_when_nothing_fails(least: int, verdict: Verdict, unexpected: str) -> None:
+    row = one_row(subject(from_size(least), passes_flat_patch=False, witnesses={"patch.zero": "C"}))
+    assert (row.verdict, row.unexpected) == (verdict, unexpected)
+    assert row.witness is not None
+    assert row.witness.case.name == "C"
+    assert row.witness.verdict is (Verdict.FAIL if least <= 7 else Verdict.PASS)
+    assert (row.planned, row.judged) == (40, 40)
+
+
+@pytest.mark.usefixtures("witnesses")
+def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() -> None:
+    question = replace(ZERO, cases=lambda _: sizes(5))
+    row = one_row(subject(from_size(6), passes_flat_patch=False, witnesses={"patch.zero": "C"}), question)
+    assert (row.verdict, row.unexpected, row.reason) == (Verdict.FAIL, "", "error 1, at most 1e-06")
+    assert row.shrunk is None
+
+
+@pytest.mark.parametrize(
+    ("named", "reason"),
+    [({}, "traits: witnesses: found none for patch.zero"), ({"patch.zero": "D"}, "traits: case: found 'D'")],
+)
+@pytest.mark.usefixtures("witnesses")
+def test_a_promise_to_fail_needs_a_witness(named: dict[str, str], reason: str) -> None:
+    row = one_row(subject(from_size(2), passes_flat_patch=False, witnesses=named))
+    assert (row.verdict, row.unexpected) == (Verdict.CRASHED, "crashed")
+    assert row.reason.startswith(reason)
+
+
+@pytest.mark.usefixtures("witnesses")
+def test_only_a_promise_to_fail_has_a_witness() -> None:
+    assert one_row(subject(passes_flat_patch=True, witnesses={"patch.zero": "C"})).witness is None
+
+
+def test_a_broken_promise_fails_the_run_and_a_missing_one_does_not() -> None:
+    assert one_row(subject(from_size(5), passes_flat_patch=True)).unexpected == "promised, and fails"
+    assert one_row(subject(from_size(5))).unexpected == ""
+
+
+@pytest.mark.parametrize(("undecided", "verdict"), [(10, Verdict.PASS), (11, Verdict.NOT_JUDGED)])
+def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, verdict: Verdict) -> None:
+    def sometimes(case: Case, who: Subject) -> Measurement:
+        return Measurement({"error": 1.0 * (case.seed <= undecided)}, {"error": 0.5}, "a kink")
+
+    question = replace(
+        ZERO, cases=lambda _: st.integers(1, 100).map(lambda seed: replace(a_case(1), seed=seed)), measure=sometimes
+    )
+    row = one_row(subject(), question, examples=100)
+    assert (row.planned, row.judged, row.verdict) == (100, 100 - undecided, verdict)
+    assert row.unexpected == ("not judged" if verdict is Verdict.NOT_JUDGED else "")
+    if verdict is Verdict.NOT_JUDGED:
+        assert row.reason == "89 of 100 cases judged; most often because a kink"
+
+
+@pytest.mark.parametrize(
+    ("question", "verdict", "reason"),
+    [
+        (replace(ZERO, applicable=lambda traits: "no such thing"), Verdict.NOT_APPLICABLE, "no such thing"),
+        (replace(ZERO, needs=frozenset({"tangent", "pair"})), Verdict.NOT_PROVIDED, "pair, tangent: not provided"),
+        (replace(ZERO, cases=lambda _: None), Verdict.NOT_APPLICABLE, "cannot be asked of what is given"),
+    ],
+)
+def test_what_cannot_be_asked_is_a_row_without_cases(question: Property, verdict: Verdict, reason: str) -> None:
+    row = one_row(subject(), question)
+    assert (row.verdict, row.reason, row.planned, row.outcomes) == (verdict, reason, 0, ())
+    assert not row.unexpected
+
+
+def test_a_promise_about_a_missing_part_is_broken() -> None:
+    row = one_row(subject(passes_flat_patch=True), replace(ZERO, needs=frozenset({"tangent"})))
+    assert row.unexpected == "promised, and not provided"
+
+
+def test_the_given_interface_reaches_the_strategy() -> None:
+    interface = a_case(4).interface
+    question = replace(ZERO, cases=lambda given: sizes(3) if given is interface else None)
+    assert one_row(subject(), question, interface=interface).planned == 3
+
+
+def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:
+    known = {"patch.zero": "issue 12"}
+    fails = one_row(subject(from_size(5), passes_flat_patch=True), known=known)
+    assert (fails.verdict, fails.known, fails.unexpected) == (Verdict.FAIL, "issue 12", "")
+    assert one_row(subject(raising_from(5)), known=known).unexpected == ""
+    assert one_row(subject(lambda size: np.nan), known=known).unexpected == ""
+    assert one_row(subject(), known=known).unexpected == "known to fail, and passes"
+
+
+def test_a_known_failure_that_matches_nothing_is_an_error() -> None:
+    with pytest.raises(MisuseError, match=r"known failure: found 'patch.zeros'; .* nearest: patch.zero"):
+        one_row(subject(), known={"patch.zeros": "issue 12"})
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"profile": "nightl"}, r"profile: found 'nightl'; .* nearest: nightly"),
+        ({"examples": 0}, "examples: found 0; needed at least 1"),
+        ({"seed": -1}, "seed: found -1"),
+    ],
+)
+def test_impossible_requests_are_said(options: dict[str, Any], told: str) -> None:
+    with pytest.raises(MisuseError, match=told):
+        one_row(subject(), **options)
+
+
+def test_nothing_is_asked_twice() -> None:
+    with pytest.raises(MisuseError, match="formulation: found mine 2 times"):
+        run([subject(), subject()], [ZERO])
+    with pytest.raises(MisuseError, match=r"property: found patch\.zero 2 times"):
+        run([subject()], [ZERO, ZERO])
+
+
+def test_what_did_not_load_fails_the_run_and_the_others_run() -> None:
+    lost = [NotLoaded("other", "ImportError: x"), NotLoaded("patch.other", "ImportError: y")]
+    found = run([lost[0], subject()], [ZERO, lost[1]], examples=5, seed=1, known={"patch.other": "lost"})
+    assert [row.formulation for row in found.rows] == ["mine"]
+    assert found.not_loaded == tuple(lost)
+    assert not found.passed
+    assert run([subject()], [ZERO], examples=5, seed=1).passed
+
+
+def test_a_run_knows_what_is_provided_and_where_it_comes_from() -> None:
+    found = run([subject()], [ZERO], profile="ci", examples=5)
+    assert found.provided == {"mine": {"pair": False, "tangent": False, "contact_points": False}}
+    facts = found.provenance
+    assert (facts["profile"], facts["examples"], facts["seed"]) == ("ci", "5", "0")
+    assert facts["numpy_version"] == np.__version__
+    assert facts.keys() >= {"commit", "platform", "created", "command", "python_version", "contactverif_version"}
+    assert all(isinstance(value, str) and value for value in facts.values())
+
+
+def test_a_fresh_seed_can_be_given_again() -> None:
+    def answer(found: Run) -> Any:
+        return found.provenance["seed"], [segments(outcome) for outcome in found.rows[0].outcomes]
+
+    first = answer(run([subject()], [ZERO], examples=20))
+    assert answer(run([subject()], [ZERO], examples=20, seed=int(first[0]))) == first
+    assert answer(run([subject()], [ZERO], examples=20)) != first
+
+
+def test_profiles() -> None:
+    sizes_and_kinds = {name: (profile.examples, profile.derandomised) for name, profile in PROFILES.items()}
+    assert sizes_and_kinds == {"dev": (100, False), "ci": (100, True), "nightly": (2000, False)}
+    assert PROFILES["ci"].settled().seed == 0
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_our_own_mistake_comes_out_with_the_case(late: bool) -> None:
+    """While judging and while shrinking: the property, not the plugin, raises."""
+    failed = False
+
+    def mistaken(case: Case, who: Subject) -> Measurement:
+        nonlocal failed
+        if failed or not late:
+            raise ZeroDivisionError("in a property")
+        failed = len(case.interface.slave) > 1
+        return Measurement({"error": float(failed)}, {"error": 0.5})
+
+    question = replace(ZERO, measure=mistaken, cases=lambda _: sizes(2))
+    with pytest.raises(ZeroDivisionError) as error:
+        one_row(subject(), question)
+    assert len(error.value.__notes__) == 1
+    assert error.value.__notes__[0].startswith("while judging patch.zero of mine on Case(")
+
+
+@pytest.mark.parametrize("call", [3, 45])
+def test_an_interrupt_comes_through(call: int) -> None:
+    """In the judging (of 40 cases) and in the shrinking."""
+    calls = iter(range(1, 10**6))
+
+    def interrupted(size: int) -> float:
+        if next(calls) == call:
+            raise KeyboardInterrupt
+        return 1.0 if size >= 20 else 0.0
+
+    with pytest.raises(KeyboardInterrupt):
+        one_row(subject(interrupted))
+
+
+def test_a_stored_case_is_judged_again() -> None:
+    row = one_row(subject(from_size(5)))
+    assert row.shrunk is not None
+    again = judge_case(ZERO, Case.from_arrays(row.shrunk.case.to_arrays()), subject(from_size(5)))
+    assert (again.verdict, again.reason, again.measurement) == (Verdict.FAIL, row.shrunk.reason, row.shrunk.measurement)

@@ -1,0 +1,341 @@
+"""The named scenes: all of them solve, their options do what they say, and what is no scene has its line."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.names import parsed, unknown
+from contactverif.contract.subject import Subject
+from contactverif.mechanics import newton
+from contactverif.mechanics.newton import System
+from contactverif.mechanics.scene import Scene
+from contactverif.run.registry import load_formulation
+from contactverif.scenes import catalogue
+from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
+from contactverif.scenes.catalogue import BLOCKS, OPTIONS, SCENES, made, options_of, scene_named
+from contactverif.scenes.disk import disk_on_foundation
+
+every_name = pytest.mark.parametrize("name", BLOCKS)
+every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])
+
+
+def coordinates(scene: Scene) -> tuple[list[float], list[float]]:
+    """Along the interface, in the scene's own axes, ascending."""
+    interface = scene.interface
+    along = interface.nodes @ scene.bodies[0].frame[:, 0]
+    n = interface.n_slave_nodes
+    return sorted(along[:n].tolist()), sorted(along[n:].tolist())
+
+
+def printed(name: str) -> tuple[list[float], list[float]]:
+    """The nodes as the drawing has them."""
+    drawing = BLOCKS[name]
+    sides = ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
+    return tuple(
+        [start, *(start + total for total in itertools.accumulate(map(float, lengths)))] for start, lengths in sides
+    )  # type: ignore[return-value]
+
+
+# --- the scenes -------------------------------------------------------------------------------------------------
+
+
+@every_name
+@pytest.mark.parametrize("text", ["", ":refine=2", ":degrees=17.3,ratio=0.25", ":penalty=1e8,poisson=0"])
+def test_every_scene_solves(name: str, text: str) -> None:
+    """With a formulation that passes: the pressure is the one on top, in every body."""
+    scene = scene_named(name + text)
+    subject = load_formulation("vts-ppt-balanced")
+    assert isinstance(subject, Subject)
+    formulation = subject.on(scene.case())
+    trace = newton.solve(scene, formulation)
+    assert trace.converged
+    p = BLOCKS[name].pressure
+    system = System(scene, formulation)
+    matrix, floor = system.matrix(trace.solution, system.pair(trace.solution))
+    off = (
+        np.abs(np.linalg.inv(matrix)).sum(axis=1).max() * floor.max()
+    )  # of displacements, where the residual is roundoff
+    shortest = min(
+        body.nodes[body.cells][:, [0, 1, 2]].std(axis=1).max(axis=1).min() for body in scene.bodies if not body.rigid
+    )
+    for body, stresses in zip(scene.bodies, scene.stresses(trace.solution), strict=True):
+        if not body.rigid:
+            expected = [-p * body.poisson / (1 - body.poisson), -p, 0]
+            assert np.abs(stresses - expected).max() <= 2 * body.oedometer * off / shortest
+    assert np.abs(trace.solution - exact_unknowns(scene, p, scene.penalty)).max() <= 2 * off
+
+
+@every_name_of_the_paper
+def test_what_is_known_of_a_scene(name: str) -> None:
+    drawing, scene = BLOCKS[name], made(name)
+    assert scene.name == name
+    assert drawing.summary
+    assert drawing.source
+    assert drawing.chosen
+    assert coordinates(scene) == printed(name)
+    slave, master = coordinates(scene)
+    assert master[0] <= slave[0]
+    assert slave[-1] <= master[-1]
+    assert scene.bodies[1].rigid == drawing.rigid_master
+    assert scene.bodies[0].young == 1e4
+    assert scene.bodies[0].poisson == 0.3
+    assert scene.penalty == 10 * 1e4 / np.mean(drawing.slave)
+    case = scene.case()
+    assert is_uniform(case)
+    assert pressure_of(case, 123.0) == drawing.pressure
+
+
+def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
+    drawing, scene = BLOCKS["dead-zone"], made("dead-zone")
+    assert (drawing.source, scene.name) == ("", "dead-zone")
+    slave, master = coordinates(scene)
+    assert slave == pytest.approx([-6, -4.4, -2.1, -0.3, 1.9, 4, 6], abs=1e-15)
+    assert master == pytest.approx([-3.3, -1.6, 0.4, 2.2, 3.3], abs=1e-15)
+    assert overhangs(scene.case())
+    assert pressure_of(scene.case(), 123.0) == drawing.pressure
+    upper, lower = (body.load[:, 1].sum() for body in scene.bodies)
+    assert upper == pytest.approx(-drawing.pressure * 6.6, rel=1e-14)  # what the master is pressed with
+    assert lower == 0
+    assert not any(overhangs(made(name).case()) for name in BLOCKS if name != "dead-zone")
+
+
+def under(name: str, points: FloatArray) -> set[float]:
+    """Points that lie exactly on a master node."""
+    return set(points.tolist()) & set(printed(name)[1])
+
+
+@every_name_of_the_paper
+def test_where_areas_of_competence_lie(name: str) -> None:
+    """What the summaries say: over one master segment or across a master node, on a node or not."""
+    slave, master = map(np.array, printed(name))
+    halves = np.sort(np.concatenate([slave, (slave[1:] + slave[:-1]) / 2]))  # ends of areas of two virtual slave nodes
+    quarters = (halves[1:] + halves[:-1]) / 2
+    crossing = any(low < node < high for low, high in itertools.pairwise(halves) for node in master.tolist())
+    assert crossing == (name in ("c", "c-prime", "example-1bis"))
+    assert under(name, quarters) == ({9.0} if name == "c" else set())
+
+
+def test_the_punch_is_symmetrical() -> None:
+    for name in ("example-1", "example-1bis"):
+        for side in printed(name):
+            assert side == [-x for x in reversed(side)]
+
+
+@every_name
+@pytest.mark.parametrize("refine", [2, 3, 7])
+def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> None:
+    fine = made(name, refine=refine)
+    for here, there in zip(coordinates(fine), printed(name), strict=True):
+        assert here[::refine] == there
+        assert len(here) == refine * (len(there) - 1) + 1
+        gaps = np.diff(here).reshape(-1, refine)
+        assert np.abs(gaps - gaps.mean(axis=1, keepdims=True)).max() <= 4 * UNIT_ROUNDOFF * np.abs(there).max()
+    assert len(fine.bodies[0].cells) == 2 * refine * refine * len(BLOCKS[name].slave)
+    assert fine.penalty == pytest.approx(refine * made(name).penalty, rel=4 * UNIT_ROUNDOFF, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "turn"), [(90, [[0, -1], [1, 0]]), (180, [[-1, 0], [0, -1]]), (270, [[0, 1], [-1, 0]])]
+)
+def test_quarter_turns_are_exact(degrees: int, turn: list[list[int]]) -> None:
+    upright = made("c-prime")
+    for angle in (degrees, float(degrees), degrees - 360, degrees + 720):
+        turned = made("c-prime", degrees=angle)
+        for one, other in zip(turned.bodies, upright.bodies, strict=True):
+            assert np.array_equal(one.nodes, other.nodes @ np.transpose(turn))
+            assert np.array_equal(one.frame, turn)
+            assert np.array_equal(one.load, other.load)
+    assert np.array_equal(made("c-prime", degrees=360).bodies[0].nodes, upright.bodies[0].nodes)
+
+
+def test_any_other_turn() -> None:
+    angle = np.radians(17.3)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    upright, turned = made("b"), made("b", degrees=17.3)
+    for one, other in zip(turned.bodies, upright.bodies, strict=True):
+        assert np.abs(one.nodes - other.nodes @ turn.T).max() <= 4 * UNIT_ROUNDOFF * 12 * np.sqrt(2)
+        assert np.abs(one.frame - turn).max() <= UNIT_ROUNDOFF
+
+
+def test_the_disk() -> None:
+    """By name it is what `disk` makes, with the paper's numbers; no pressure is known of it."""
+    assert SCENES["example-2"].source
+    one, other = made("example-2"), disk_on_foundation()
+    for body, same in zip(one.bodies, other.bodies, strict=True):
+        assert np.array_equal(body.nodes, same.nodes)
+        assert (body.young, body.poisson) == (same.young, same.poisson)
+    assert one.penalty == other.penalty
+    assert one.name == "example-2"
+    assert not is_uniform(one.case())
+    stiffer = made("example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2)
+    assert [body.young for body in stiffer.bodies] == [2e8, 4e8]
+    assert [body.poisson for body in stiffer.bodies] == [0.25, 0.25]
+    assert (stiffer.penalty, stiffer.bodies[0].load.sum()) == (2e9, -3e6)
+    assert stiffer.bodies[0].start.tolist() == [0, -0.01]
+    assert len(stiffer.bodies[1].cells) == 4 * 160 * 30
+
+
+# --- options ----------------------------------------------------------------------------------------------------
+
+
+def test_options_from_text_are_those_of_python() -> None:
+    texts: dict[str, dict[str, Any]] = {
+        "c:refine=2": {"refine": 2},
+        "c:penalty=1e4": {"penalty": 1e4},
+        "c:penalty=10000": {"penalty": 1e4},
+        "c:young=2e3": {"young": 2e3},
+        "c:ratio=0.5": {"ratio": 0.5},
+        "c:poisson=-0.25": {"poisson": -0.25},
+        "c:pressure=7": {"pressure": 7},
+        "c:degrees=-45": {"degrees": -45},
+        "c:sides=free": {"sides": "free"},
+        "c:sides=rollers": {},
+        "c:lowered=0": {"lowered": 0},
+        "c:lowered=-0.5,refine=3": {"lowered": -0.5, "refine": 3},
+        "c": {},
+        "example-2:force=2e6,ratio=1": {"force": 2e6, "ratio": 1},
+    }
+    assert {option for options in texts.values() for option in options} == set(OPTIONS)
+    for text, options in texts.items():
+        one, other = scene_named(text).case().to_arrays(), made(text.partition(":")[0], **options).case().to_arrays()
+        assert all(np.array_equal(one[key], other[key]) for key in one), text
+
+
+def test_what_options_do() -> None:
+    plain = made("c")
+    assert made("c", young=2e4).penalty == 2 * plain.penalty
+    assert [body.young for body in made("c", young=2e3, ratio=0.5).bodies] == [2e3, 1e3]
+    assert [body.poisson for body in made("c", poisson=0.1).bodies] == [0.1, 0.1]
+    assert made("c", penalty=3.0).penalty == 3
+    assert made("c", pressure=7.0).bodies[0].load.sum() == -7 * 12
+    assert plain.bodies[0].start.tolist() == [0, -100 / plain.penalty]
+    assert made("c", lowered=0).bodies[0].start.tolist() == [0, 0]
+    assert made("c", lowered=0.5).bodies[0].start.tolist() == [0, -0.5]
+    assert plain.bodies[0].fixed[:, 0].sum() == 6
+    assert made("c", sides="free").bodies[0].fixed.sum() == 1
+    assert not is_uniform(made("c", sides="free").case())
+
+
+NAMES = "a1, a2-graded, a2-uniform, b, c, c-prime, dead-zone, example-1, example-1bis, example-2"
+FORM = "needed NAME or NAME:OPTION=VALUE,OPTION=VALUE"
+ALL_OPTIONS = "there are refine, penalty, young, ratio, poisson, pressure, degrees, sides, lowered"
+WRONG = {
+    "": f"--scene: found ''; {FORM}",
+    "c:": f"--scene: found '' in 'c:'; {FORM}",
+    ":refine=2": f"--scene: found ':refine=2'; {FORM}",
+    "c:refine": f"--scene: found 'refine' in 'c:refine'; {FORM}",
+    "c:refine=": f"--scene: found 'refine=' in 'c:refine='; {FORM}",
+    "c:=2": f"--scene: found '=2' in 'c:=2'; {FORM}",
+    "c:refine=2,": f"--scene: found '' in 'c:refine=2,'; {FORM}",
+    "c:refine=2,refine=2": "--scene: found refine twice in 'c:refine=2,refine=2'; needed each option once",
+    "zzz": f"--scene: found 'zzz'; needed one of {NAMES}",
+    "C": f"--scene: found 'C'; needed one of {NAMES}",
+    "c-prim": "--scene: found 'c-prim'; needed a name that exists; the nearest: c-prime",
+    "c:refin=2": "--scene: option of 'c:refin=2': found 'refin'; needed a name that exists; the nearest: refine; "
+    + ALL_OPTIONS,
+    "c:name=b": "--scene: option of 'c:name=b': found 'name'; needed one of degrees, lowered, penalty, poisson, "
+    f"pressure, ratio, refine, sides, young; {ALL_OPTIONS}",
+    **{
+        f"c:refine={value}": f"--scene: refine of 'c:refine={value}': found {said}; needed a whole number from 1 to 64"
+        for value, said in (("0", "0"), ("-1", "-1"), ("65", "65"), ("1.5", "1.5"), ("true", "True"), ("x", "'x'"))
+    },
+    **{
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {said}; needed a number > 0"
+        for option in ("penalty", "young", "ratio", "pressure")
+        for value, said in (("0", "0"), ("-1", "-1"), ("nan", "nan"), ("inf", "inf"))
+    },
+    **{
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {said}; needed a number"
+        for option in ("penalty", "young", "ratio", "pressure", "poisson", "degrees", "lowered")
+        for value, said in (("soft", "'soft'"), ("true", "True"))
+    },
+    **{
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {value}; needed a finite number"
+        for option in ("degrees", "lowered")
+        for value in ("nan", "inf", "-inf")
+    },
+    **{
+        f"c:poisson={value}": f"--scene: poisson of 'c:poisson={value}': found {value}; needed Poisson's ratio above "
+        "−1 and below 0.5"
+        for value in ("0.5", "-1.0", "2.0", "nan", "inf")
+    },
+    "c:sides=fre": "--scene: sides of 'c:sides=fre': found 'fre'; needed rollers or free",
+    "c:sides=1": "--scene: sides of 'c:sides=1': found 1; needed rollers or free",
+    "example-2:refine=5": "--scene: refine of 'example-2:refine=5': found 5; needed a whole number from 1 to 4",
+    "example-2:force=0": "--scene: force of 'example-2:force=0': found 0; needed a number > 0",
+    "example-2:sides=free": "--scene: option of 'example-2:sides=free': found 'sides'; needed one of force, lowered, "
+    "penalty, poisson, ratio, refine, young; there are refine, penalty, young, ratio, poisson, force, lowered",
+    f"c:young=1{'0' * 400}": f"--scene: young of 'c:young=1{'0' * 400}': found 1{'0' * 400}; needed a number > 0",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.items(), ids=lambda text: text[:24])
+def test_what_is_no_scene(text: str, message: str) -> None:
+    with pytest.raises(MisuseError) as error:
+        scene_named(text)
+    assert str(error.value) == message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("zzz", {}, f"scene: found 'zzz'; needed one of {NAMES}"),
+        ("c", {"sides": "fre"}, "sides of scene c: found 'fre'; needed rollers or free"),
+        ("c", {"refine": 1.5}, "refine of scene c: found 1.5; needed a whole number from 1 to 64"),
+        ("c", {"young": None}, "young of scene c: found None; needed a number"),
+        ("c", {"penalty": "1"}, "penalty of scene c: found '1'; needed a number"),
+        ("c", {"force": 1.0}, f"option of scene c: found 'force'; needed one of {', '.join(sorted(options_of('c')))}"),
+        ("example-2", {"force": None}, "force of scene example-2: found None; needed a number"),
+        ("c", {"lowered": float("nan")}, "lowered of scene c: found nan; needed a finite number"),
+    ],
+)
+def test_what_is_no_scene_in_python(name: str, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(MisuseError) as error:
+        made(name, **options)
+    assert str(error.value) == message
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    made("c", refine=np.int64(2), young=np.float32(8), degrees=np.int32(90))
+
+
+# --- names ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "options"),
+    [
+        ("nts", "nts", {}),
+        ("vts-me:n=4", "vts-me", {"n": 4}),
+        (
+            "a:b=1.5,c=1e4,d=true,e=false,f=word,g=-3",
+            "a",
+            {"b": 1.5, "c": 1e4, "d": True, "e": False, "f": "word", "g": -3},
+        ),
+        ("a:b=c=d", "a", {"b": "c=d"}),
+        ("a:b=x:y", "a", {"b": "x:y"}),
+        ("a:b=True", "a", {"b": "True"}),
+    ],
+)
+def test_names_with_options(text: str, name: str, options: dict[str, Any]) -> None:
+    found = parsed("formulation", text)
+    assert found == (name, options)
+    assert [type(value) for value in found[1].values()] == [type(value) for value in options.values()]
+
+
+def test_an_unknown_name_suggests_the_nearest_or_lists_all() -> None:
+    names = ["vts-ppt", "vts-me", "nts"]
+    assert str(unknown("formulation", "vts-pt", names)).startswith(
+        "formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt"
+    )
+    assert str(unknown("formulation", "xyz", names)) == "formulation: found 'xyz'; needed one of nts, vts-me, vts-ppt"
+    assert str(unknown("formulation", "xyz", [])) == "formulation: found 'xyz'; needed a name, but there is none"
+    assert unknown("formulation", "nts", ["nts-ar", "nts"]).found == "'nts'"
+    assert catalogue.MODERATE == 10

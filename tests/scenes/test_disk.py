@@ -1,0 +1,207 @@
+"""Example 2: what is given and chosen of its bodies, meshes that are well shaped, and how it solves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.body import Body
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.subject import Subject
+from contactverif.mechanics import newton
+from contactverif.mechanics.newton import End
+from contactverif.mechanics.scene import Scene
+from contactverif.run.registry import load_formulation
+from contactverif.scenes.catalogue import made
+from contactverif.scenes.disk import Problem, disk_mesh, disk_on_foundation, graded
+from contactverif_paper.disk_study import Pressed, difference, over_slopes, pressed
+
+PAPER = Problem()
+BASE = disk_on_foundation()
+PENALTY_METHODS = ("nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced")
+
+
+@pytest.fixture(scope="module")
+def solved() -> dict[str, Pressed]:
+    return {name: pressed(name) for name in PENALTY_METHODS}
+
+
+def corner_angles(body: Body) -> FloatArray:
+    """(n_cells, 4) in degrees."""
+    corners = body.nodes[body.cells]
+    to_next = np.roll(corners, -1, axis=1) - corners
+    back = -np.roll(to_next, 1, axis=1)
+    cross = to_next[..., 0] * back[..., 1] - to_next[..., 1] * back[..., 0]
+    angles: FloatArray = np.degrees(np.arctan2(cross, (to_next * back).sum(axis=-1)))
+    return angles
+
+
+# --- bodies -----------------------------------------------------------------------------------------------------
+
+
+def test_what_the_paper_gives() -> None:
+    disk, foundation = BASE.bodies
+    assert (disk.young, foundation.young, disk.poisson, foundation.poisson) == (1e8, 1e9, 0, 0)
+    assert BASE.penalty == 1e9
+    assert len(foundation.cells) == 160 * 30
+    loaded = np.flatnonzero((disk.load != 0).any(axis=1))
+    assert disk.nodes[loaded].tolist() == [[0, 20]]
+    assert disk.load[loaded].tolist() == [[0, -1e6]]
+    assert not foundation.load.any()
+
+
+def test_what_is_chosen() -> None:
+    disk, foundation = BASE.bodies
+    assert foundation.nodes.min(axis=0).tolist() == [-10, -10]
+    assert foundation.nodes.max(axis=0).tolist() == [10, 0]
+    bottom = foundation.nodes[:, 1] == -10
+    assert foundation.fixed[bottom].all()
+    assert not foundation.fixed[~bottom].any()
+    axis = disk.nodes[:, 0] == 0
+    assert axis.sum() > 50
+    assert disk.fixed[axis].tolist() == [[True, False]] * int(axis.sum())
+    assert not disk.fixed[~axis].any()
+    assert disk.nodes[:, 1].min() == 0
+
+
+def test_the_disk_is_round_and_symmetrical() -> None:
+    disk = BASE.bodies[0]
+    edges = np.sort(np.stack([disk.cells, np.roll(disk.cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    every, counts = np.unique(edges, axis=0, return_counts=True)
+    rim = disk.nodes[np.unique(every[counts == 1])]
+    assert np.abs(np.hypot(rim[:, 0], rim[:, 1] - 10) - 10).max() <= 40 * UNIT_ROUNDOFF * 10
+    corners = disk.nodes[disk.cells]
+    x, y = corners.transpose(2, 0, 1)
+    area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum() / 2
+    assert 0.99 <= area / (np.pi * 100) < 1  # of a polygon with 160 corners
+    mirrored, _ = cKDTree(disk.nodes).query(disk.nodes * [-1, 1])
+    assert mirrored.max() <= 16 * UNIT_ROUNDOFF * 20
+
+
+@pytest.mark.parametrize("refine", [1, 2, 3])
+@pytest.mark.parametrize(("slope", "angle", "aspect"), [(0.01, 28, 36), (0.0374, 38, 10), (0.19, 43, 6)])
+def test_cells_are_well_shaped(slope: float, angle: float, aspect: float, refine: int) -> None:
+    nodes, cells, contact = disk_mesh(10.0, 2 * slope * 10, refine)
+    angles = corner_angles(Body(nodes, cells, contact, fixed=np.ones(nodes.shape, bool)))
+    assert angle <= angles.min()
+    assert angles.max() <= 180 - angle
+    lengths = np.linalg.norm(nodes[cells] - nodes[np.roll(cells, -1, axis=1)], axis=-1)
+    assert (lengths.max(axis=1) / lengths.min(axis=1)).max() <= aspect
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+def test_segments_near_the_contact_are_even_and_do_not_match(refine: int) -> None:
+    scene, a = disk_on_foundation(refine=refine), PAPER.half_width
+    interface = scene.interface
+    slave = interface.slave.lengths(interface.nodes)
+    assert np.ptp(slave) <= 64 * UNIT_ROUNDOFF * 20
+    assert len(slave) == 60 * refine
+    master = interface.nodes[interface.n_slave_nodes :]
+    assert (master[:, 1] == 0).all()
+    x = np.sort(master[:, 0])
+    even = np.diff(x)[np.abs((x[1:] + x[:-1]) / 2) <= 0.6]
+    assert len(even) >= 60 * refine
+    assert np.ptp(even) <= 64 * UNIT_ROUNDOFF
+    assert np.median(slave) / even[0] == pytest.approx(5 / 4, rel=1e-3)
+    assert x[0] <= -2 * a
+    assert x[-1] >= 2 * a  # the disk overhangs nothing
+    assert np.abs(interface.nodes[: interface.n_slave_nodes, 0][:, None] - x).min() >= 1e-3 * even[0]
+
+
+def test_finer_meshes_are_finer_everywhere() -> None:
+    for index, body in enumerate(disk_on_foundation(refine=2).bodies):
+        assert len(body.cells) == 4 * len(BASE.bodies[index].cells)
+
+
+def test_graded_grids() -> None:
+    grid = graded(10.0, 0.02, 30, 30)
+    steps = np.diff(grid)
+    assert (grid[0], grid[-1], len(grid)) == (0, 10, 31)
+    assert steps[0] == pytest.approx(0.02, rel=1e-9)
+    assert np.ptp(steps[1:] / steps[:-1]) <= 1e-9
+    assert np.abs(graded(10.0, 0.02, 30, 60)[::2] - grid).max() <= 64 * UNIT_ROUNDOFF * 10
+    with pytest.raises(MisuseError, match=r"found 0\.5; needed more than 30 parts of 0\.02"):
+        graded(0.5, 0.02, 30, 30)
+
+
+def test_a_contact_that_the_meshes_are_not_made_for() -> None:
+    for problem, said in (
+        (replace(PAPER, penalty=1e6), "penalty: found 1e[+]06, with which the contact is 4.9.* wide; needed a stiffer"),
+        (replace(PAPER, penalty=1e7), "penalty: .* needed a stiffer one: the meshes are made for at most 1.35"),
+        (replace(PAPER, force=1e9), "force: found 1e[+]09, with which Hertz' contact is 23.7 wide; needed a contact"),
+        (replace(PAPER, force=1e-9), "force: found 1e-09, .*"),
+    ):
+        with pytest.raises(MisuseError, match=said):
+            disk_on_foundation(problem)
+
+
+# --- solutions --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PENALTY_METHODS)
+def test_the_papers_numbers(name: str, solved: dict[str, Pressed]) -> None:
+    """Fig. 38 ends at 1.61e6; the half-width is that on the layer, less the 1.6 % by which p/E compresses it."""
+    found = solved[name]
+    assert found.converged
+    assert found.iterations == 4
+    assert found.peak == pytest.approx(1.61e6, rel=0.03)
+    assert found.half_width == pytest.approx(PAPER.on_layer().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
+
+
+def test_what_transfer_to_the_master_changes(solved: dict[str, Pressed]) -> None:
+    """Fig. 39."""
+    x, differences = difference(solved["vts-ppt"], solved["vts-me"])
+    assert len(x) == 68
+    assert 0 < np.abs(differences).max() <= 2.5e3
+    assert differences.min() < 0 < differences.max()
+
+
+@pytest.mark.parametrize("name", PENALTY_METHODS)
+def test_the_other_half_is_symmetrical(name: str, solved: dict[str, Pressed]) -> None:
+    """But for the one element that is on one side alone, far away."""
+    found = solved[name]
+    assert np.abs(found.pressure - found.pressure[::-1]).max() <= 1e-5 * found.peak
+
+
+def test_nodal_forces_carry_the_load() -> None:
+    scene = made("example-2")
+    subject = load_formulation("vts-me")
+    assert isinstance(subject, Subject)
+    trace = newton.solve(scene, subject.on(scene.case()))
+    forces = scene.nodal_forces(trace.solution)
+    n_slave = scene.interface.n_slave_nodes
+    assert forces[:n_slave, 1].sum() == pytest.approx(1e6, rel=1e-9)
+    assert forces[n_slave:, 1].sum() == pytest.approx(-1e6, rel=1e-9)
+
+
+def test_what_is_left_of_the_difference_falls_with_the_mesh_and_is_the_current_length() -> None:
+    """With reference areas nothing is left but the mesh; with current ones what falls like the slope a/R."""
+    coarse, fine = (pressed("vts-me:area=reference", refine=refine).over_layer for refine in (1, 2))
+    assert 0 < fine < coarse / 2
+    assert coarse <= 1e-3
+    steep, flat = over_slopes(("vts-me",), (1.0, 0.5), refine=1)
+    left = [one.over_layer - coarse for one in (steep, flat)]
+    assert left[0] / left[1] == pytest.approx(2, rel=0.05)
+    assert left[0] == pytest.approx(PAPER.on_layer().peak / PAPER.young[0], rel=0.15)  # the surface's strain, p/E
+
+
+def test_how_it_begins() -> None:
+    """Lowered, or nothing holds the disk."""
+    subject = load_formulation("vts-me")
+    assert isinstance(subject, Subject)
+
+    def ended(scene: Scene) -> End:
+        return newton.solve(scene, subject.on(scene.case())).end
+
+    assert ended(replace_start(BASE, -1e-3)) is End.SINGULAR
+    assert ended(BASE) is End.CONVERGED
+    assert BASE.bodies[0].start.tolist() == [0, -(PAPER.on_layer().half_width ** 2) / 20]
+
+
+def replace_start(scene: Scene, lowered: float) -> Scene:
+    disk, foundation = scene.bodies
+    return replace(scene, bodies=(replace(disk, start=np.array([0.0, -lowered])), foundation))

@@ -1,0 +1,92 @@
+"""Hertz, and Hertz on a Winkler layer: the paper's numbers, the equation itself by quadrature, and both limits."""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF
+from contactverif.scenes import hertz
+from contactverif.scenes.hertz import on_layer
+
+FORCE, RADIUS, PENALTY = 1e6, 10.0, 1e9
+STIFFNESS = 1 / (1 / 1e8 + 1 / 1e9)
+SHORTFALLS = {0.01: 0.317, 0.03: 0.313, 0.1: 0.301}  # of the peak, over E*/(ε̂ a): computed apart from this code
+
+
+def test_hertz_of_example_2() -> None:
+    assert hertz.half_width(FORCE, RADIUS, STIFFNESS) == pytest.approx(0.3742, abs=5e-5)
+    assert hertz.peak(FORCE, RADIUS, STIFFNESS) == pytest.approx(1.701e6, abs=500)
+
+
+def test_the_pressure_of_hertz_carries_the_force() -> None:
+    a = hertz.half_width(FORCE, RADIUS, STIFFNESS)
+    angles, weights = np.polynomial.legendre.leggauss(40)
+    x = a * np.sin(np.pi / 2 * angles)  # dx takes away the square root at the edge
+    total = np.pi / 2 * a * weights @ (np.cos(np.pi / 2 * angles) * hertz.pressure(x, FORCE, RADIUS, STIFFNESS))
+    assert total == pytest.approx(FORCE, rel=1e-14)
+    assert hertz.pressure(np.array([-2 * a, 1.001 * a]), FORCE, RADIUS, STIFFNESS).tolist() == [0, 0]
+
+
+def test_the_layer_of_example_2() -> None:
+    found = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY)
+    assert found.peak == pytest.approx(1.586e6, abs=500)
+    assert found.half_width == pytest.approx(0.4291, abs=5e-5)
+    assert found.force == pytest.approx(FORCE, rel=1e-13)
+
+
+def test_the_layer_converges() -> None:
+    """Each half as many terms more: the peak settles like a high power, the half-width like a lower one."""
+    found = [on_layer(FORCE, RADIUS, STIFFNESS, PENALTY, terms) for terms in (12, 24, 48, 96)]
+    peaks, widths = (np.array([getattr(one, word) for one in found]) for word in ("peak", "half_width"))
+    assert (np.abs(np.diff(peaks))[1:] <= np.abs(np.diff(peaks))[:-1] / 20).all()
+    assert (np.abs(np.diff(widths))[1:] <= np.abs(np.diff(widths))[:-1] / 8).all()
+    assert abs(peaks[1] / peaks[-1] - 1) <= 1e-7  # what TERMS says
+    assert abs(widths[1] / widths[-1] - 1) <= 1e-5
+
+
+def test_the_equation_holds_between_the_collocation_points() -> None:
+    """p/ε̂ − (2/πE*) ∫ p ln|x − s| ds + x²/2R is the same at all x, by another quadrature."""
+    found = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY, 48)
+    a = found.half_width
+
+    def left(x: float) -> float:
+        def term(s: float) -> float:
+            return float(found.pressure(np.array(s))) * log(abs(x - s))
+
+        integral = float(quad(term, -a, x, epsrel=1e-11, limit=200)[0] + quad(term, x, a, epsrel=1e-11, limit=200)[0])
+        return float(found.pressure(np.array(x))) / PENALTY - 2 / (np.pi * STIFFNESS) * integral + x**2 / (2 * RADIUS)
+
+    values = np.array([left(x) for x in a * np.array([0.0, 0.21, 0.4, 0.77, 0.95])])
+    assert np.ptp(values) <= 1e-7 * a**2 / (2 * RADIUS)
+
+
+@pytest.mark.parametrize(("ratio", "shortfall"), SHORTFALLS.items())
+def test_a_stiff_layer_lowers_the_peak(ratio: float, shortfall: float) -> None:
+    a, p = hertz.half_width(FORCE, RADIUS, STIFFNESS), hertz.peak(FORCE, RADIUS, STIFFNESS)
+    found = on_layer(FORCE, RADIUS, STIFFNESS, STIFFNESS / (ratio * a), 48)
+    assert (1 - found.peak / p) / ratio == pytest.approx(shortfall, abs=1e-3)
+    assert found.half_width > a
+
+
+def test_a_soft_layer_is_alone() -> None:
+    """Its own contact is a parabola; the half-planes below add the less the softer it is."""
+    for over in (1e2, 1e4):
+        penalty = STIFFNESS / (over * hertz.half_width(FORCE, RADIUS, STIFFNESS))
+        a = hertz.layer_half_width(FORCE, RADIUS, penalty)
+        found = on_layer(FORCE, RADIUS, STIFFNESS, penalty)
+        assert abs(found.half_width / a - 1) <= over ** (-2 / 3)
+        assert abs(found.peak / (penalty * a**2 / (2 * RADIUS)) - 1) <= over ** (-2 / 3)
+
+
+@pytest.mark.parametrize(("length", "force"), [(2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**60)])
+def test_units_change_nothing(length: float, force: float) -> None:
+    """F is a force per length, E* and p are forces per length², ε̂ one per length³."""
+    plain = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY)
+    stress = force / length**2
+    other = on_layer(FORCE * force / length, RADIUS * length, STIFFNESS * stress, PENALTY * stress / length)
+    assert other.half_width / length == pytest.approx(plain.half_width, rel=1e4 * UNIT_ROUNDOFF)
+    assert other.peak / stress == pytest.approx(plain.peak, rel=1e5 * UNIT_ROUNDOFF)

@@ -1,0 +1,299 @@
+"""What is drawn is valid, simple when shrunk, exact on its lattice, and reaches every case of projection."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, find, given, settings
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.mechanics.scene import scene_of
+from contactverif.oracle import kink_margin, projection_cases, usual_places
+from contactverif.scenes.blocks import is_uniform, overhangs
+from contactverif.scenes.catalogue import named_scene
+from contactverif.scenes.named_states import NAMED, named_case
+from contactverif.strategies import flat_cases, general_cases, smooth_cases, tie_cases
+from contactverif.strategies.parts import lengths
+from contactverif.strategies.rings import Ring
+from contactverif.strategies.solids import block_cases, dead_zone_cases, variant_cases
+
+FIXED = settings(derandomize=True, database=None, deadline=None)
+
+
+def drawn(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
+    """Many cases, always the same."""
+    assert strategy is not None
+    cases: list[Case] = []
+
+    @settings(FIXED, max_examples=count, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
+    @given(strategy)
+    def collect(case: Case) -> None:
+        cases.append(case)
+
+    collect()
+    return cases
+
+
+@pytest.fixture(scope="module")
+def flat() -> list[Case]:
+    return drawn(flat_cases(), 400)
+
+
+@pytest.mark.parametrize("strategy", [flat_cases, general_cases, smooth_cases, tie_cases])
+def test_the_simplest_case_is_one_unit_segment_a_side(strategy: Callable[[], SearchStrategy[Case]]) -> None:
+    case = find(strategy(), lambda _: True, settings=FIXED)
+    assert case.interface.nodes.tolist() == [[0, 0], [1, 0], [1, 0], [0, 0]]
+    assert np.abs(case.positions[:, 0] - [0, 1, 1, 0]).max() <= 1 / 16
+    assert (case.penalty, case.seed, case.name) == (1.0, 0, "")
+
+
+def test_a_needed_offset_shrinks_to_the_least_one() -> None:
+    case = find(smooth_cases(), lambda _: True, settings=FIXED)
+    assert case.positions[0].tolist() == [1 / 7 / 16, -0.25 - 1 / 11 / 16]
+
+
+def test_slave_points_of_flat_cases_project_inside_the_master(flat: list[Case]) -> None:
+    for case in flat:
+        along, interface = case.parameters["along"], case.interface
+        chains = interface.master.segments[interface.master.chain_order]
+        previous, following = interface.master.neighbours[interface.master.chain_order].T
+        stretches = list(zip(along[chains[following < 0, 1]], along[chains[previous < 0, 0]], strict=True))
+        for low, high in along[interface.slave.segments]:
+            assert any(first <= low <= high <= last for first, last in stretches)
+
+
+def test_flat_cases_are_what_their_parameters_say(flat: list[Case]) -> None:
+    for case in flat:
+        direction = case.parameters["direction"]
+        normal = np.array([-direction[1], direction[0]])
+        places, count = case.positions - case.positions[0], case.interface.n_slave_nodes
+        roundoff = 16 * UNIT_ROUNDOFF * case.largest_coordinate
+        along = case.parameters["along"] - case.parameters["along"][0]
+        assert np.abs(places @ direction - along).max() <= roundoff
+        heights = np.concatenate([np.zeros(count), np.full(len(places) - count, case.parameter("penetration"))])
+        assert np.abs(places @ normal - heights).max() <= roundoff
+
+
+def test_penetrations_are_usual(flat: list[Case]) -> None:
+    shares = np.array([case.parameter("penetration") / case.shortest_segment for case in flat])
+    slack = 1e-6
+    assert 2.0**-10 * (1 - slack) <= shares.min() <= 2.0**-8
+    assert 1 <= shares.max() <= 2 * (1 + slack)
+
+
+def test_lattice_coordinates_are_exact(flat: list[Case]) -> None:
+    on_lattice = [case for case in flat if _depth_of_fraction(case) <= 40]
+    assert len(on_lattice) > len(flat) / 4  # the others moved by sevenths
+
+
+def _depth_of_fraction(case: Case) -> int:
+    """Binary digits between the largest and the smallest one of all lengths along."""
+    places = [Fraction(place) for place in case.parameters["along"].tolist()]
+    finest = max(place.denominator for place in places)
+    return max(int(abs(place) * finest).bit_length() for place in places)
+
+
+def test_ratios_of_neighbours_reach_2_to_the_20(flat: list[Case]) -> None:
+    steepest, crowded = 0.0, 0
+    for case in flat:
+        for side in (case.interface.slave, case.interface.master):
+            size = np.log2(side.lengths(case.interface.nodes))
+            following = side.neighbours[:, 1]
+            steepest = max(steepest, np.abs(size[following] - size)[following >= 0].max(initial=0.0))
+        along = case.parameters["along"]
+        middles = along[case.interface.master.segments].mean(axis=1)
+        for low, high in along[case.interface.slave.segments]:
+            crowded = max(crowded, int(((middles > low) & (middles < high)).sum()))
+    print(f"\nneighbours' lengths up to 2^{steepest:.1f}, up to {crowded} master segments under one slave segment")
+    assert steepest >= 20
+    assert crowded >= 50
+
+
+def test_typical_meshes_are_small(flat: list[Case]) -> None:
+    cases = flat + drawn(general_cases(), 200)
+    assert np.median([case.n_segments for case in cases]) <= 12
+
+
+def test_every_case_of_projection_is_reached() -> None:
+    total: Counter[str] = Counter()
+    for case in drawn(general_cases(), 300) + drawn(tie_cases(), 150):
+        total.update(projection_cases(case.interface, case.z))
+    print("\n" + "\n".join(f"{count:6} {name}" for name, count in total.most_common()))
+    wanted = "one segment,first,intermediate,last,node exactly hit,beyond an end,convex vertex,concave vertex,edge-on"
+    assert all(total[name] >= 5 for name in wanted.split(","))
+
+
+def test_smooth_cases_are_away_from_kinks() -> None:
+    margins = np.array([_relative_margin(case) for case in drawn(smooth_cases(), 2000)])
+    share, wide = (margins > 1e-7).mean(), (margins > 1e-5).mean()
+    print(f"\nfurther from a kink than 1e-7 ℓ: {share:.2%}, than 1e-5 ℓ: {wide:.2%}")
+    assert share >= 0.98
+    assert wide >= 0.95
+
+
+def _relative_margin(case: Case) -> float:
+    return kink_margin(case.interface, case.z, *usual_places(case.interface)) / case.shortest_segment
+
+
+def test_ties_are_at_kinks() -> None:
+    margins = np.array([_relative_margin(case) for case in drawn(tie_cases(), 300)])
+    assert (margins < 1e-12).mean() >= 0.9
+
+
+def test_shapes_and_states_of_all_kinds_occur() -> None:
+    seen: Counter[str] = Counter()
+    for case in drawn(general_cases(), 400):
+        master, slave = case.interface.master, case.interface.slave
+        seen["closed chain"] += bool((master.neighbours >= 0).all())
+        seen["several chains"] += int((slave.neighbours[:, 0] < 0).sum()) > 1
+        seen["moved"] += bool(np.abs(case.positions - case.interface.nodes).max() > 2 * case.shortest_segment)
+        normals = np.diff(case.positions[master.segments], axis=1)[:, 0]
+        seen["bent"] += bool(np.linalg.matrix_rank(normals, rtol=1e-6) > 1)
+    print("\n", seen)
+    assert all(seen[kind] >= 10 for kind in ("closed chain", "several chains", "moved", "bent"))
+
+
+def test_impossible_arguments_are_refused() -> None:
+    with pytest.raises(MisuseError, match="most"):
+        lengths(most=0)
+
+
+@pytest.fixture(scope="module")
+def dead_zones() -> list[Case]:
+    return drawn(dead_zone_cases(), 300)
+
+
+def test_the_simplest_dead_zone_is_one_segment_a_side() -> None:
+    strategy = dead_zone_cases()
+    assert strategy is not None
+    case = find(strategy, lambda _: True, settings=FIXED)
+    assert case.parameters["along"].tolist() == [0, 1, 0.25, 1]
+    assert [(body.young, body.poisson, len(body.cells)) for body in scene_of(case).bodies] == [(1, 0, 1), (1, 0, 1)]
+    assert scene_of(case).bodies[0].axis.tolist() == [1, 0]
+    assert case.penalty == 10
+
+
+def test_in_a_dead_zone_the_master_ends_inside_a_slave_segment(dead_zones: list[Case]) -> None:
+    seen: Counter[str] = Counter()
+    for case in dead_zones:
+        slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+        ends = {"left": master.min(), "right": master.max()}
+        overhang = {"left": slave.min() < master.min(), "right": master.max() < slave.max()}
+        assert overhangs(case)
+        assert is_uniform(case)
+        assert slave.min() < ends["right"]
+        assert ends["left"] < slave.max()
+        for side, over in overhang.items():
+            assert not over or ends[side] not in slave
+        both = all(overhang.values())
+        seen["both"] += both
+        seen["in one segment"] += both and not ((slave > ends["left"]) & (slave < ends["right"])).any()
+        seen["the master overhangs on the other side"] += bool(master.min() < slave.min() or slave.max() < master.max())
+        seen["a whole slave segment touches nothing"] += bool((np.sort(slave)[1:-1] < ends["left"]).any())
+        seen["turned"] += scene_of(case).bodies[0].axis.tolist() != [1, 0]
+    print("\n", seen)
+    assert len(seen) == 5
+    assert min(seen.values()) >= 20
+
+
+def test_a_scene_is_asked_where_its_overhang_belongs() -> None:
+    """The dead zone is nothing for who promises the patch test on an interface that is covered, nor the other way."""
+    covered, overhanging, bent = map(named_scene, ("c", "dead-zone", "dead-zone:sides=free"))
+    for strategy in (block_cases, variant_cases):
+        assert strategy(overhanging) is None
+        assert drawn(strategy(covered), 2)[0] is covered
+    assert dead_zone_cases(covered) is None
+    assert dead_zone_cases(bent) is None
+    assert dead_zone_cases(named_case("c")) is None
+    assert drawn(dead_zone_cases(overhanging), 2)[0] is overhanging
+
+
+# Interfaces that somebody gives
+
+
+def test_flat_cases_of_a_given_interface_have_the_penetration_they_say() -> None:
+    turn = np.array([[0.6, 0.8], [-0.8, 0.6]])
+    interface = named_case("c").interface.at(named_case("c").interface.nodes @ turn + [3.0, -7.0])
+    strategy = flat_cases(interface)
+    assert strategy is not None
+    for case in drawn(strategy, 30):
+        assert case.interface is interface
+        normal = np.array([-case.parameters["direction"][1], case.parameters["direction"][0]])
+        heights = case.positions @ normal
+        count = interface.n_slave_nodes
+        roundoff = 64 * UNIT_ROUNDOFF * case.largest_coordinate
+        assert np.abs(heights[:count] - heights[-1] + case.parameter("penetration")).max() <= roundoff
+        assert 2.0**-10 <= case.parameter("penetration") / case.shortest_segment <= 0.5 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "interface",
+    [
+        named_case("tilted").interface,
+        named_case("a1").interface.swapped().at([[0, 0], [4, 1], [4, 0], [2, 0], [0, 0]]),
+        Interface.from_chains([(0, 0), (4, 0)], [(3, 0), (0, 0)]),
+        Interface.from_chains([(0, 0), (4, 0)], [(0, 0), (4, 0)]),
+        Interface.from_chains([(0, 0), (2, 0), (4, 0)], [(4, 0), (2, -1), (0, 0)]),
+    ],
+    ids=["tilted", "tilted master", "overhanging", "back to back", "bent"],
+)
+def test_what_is_not_flat_has_no_flat_cases(interface: Interface) -> None:
+    assert flat_cases(interface) is None
+
+
+@pytest.mark.parametrize("strategy", [general_cases, smooth_cases])
+def test_states_of_a_given_interface_touch(strategy: Callable[[Interface], SearchStrategy[Case]]) -> None:
+    ring = next(case.interface for case in drawn(general_cases(), 200) if (case.interface.master.neighbours >= 0).all())
+    for interface in (named_case("c").interface, named_case("tilted").interface, ring):
+        cases = drawn(strategy(interface), 30)
+        assert all(case.interface is interface for case in cases)
+        assert len({case.z.tobytes() for case in cases}) > 10
+        least = min(np.abs(case.positions - interface.nodes).max() for case in cases)
+        assert least > 0
+
+
+# Named cases
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_cases_bear_their_name(name: str) -> None:
+    case = named_case(name)
+    assert case.name == name
+    assert Case.from_arrays(case.to_arrays()).name == name
+
+
+@pytest.mark.parametrize("name", ["tilted", "offset-c"])
+def test_witnesses_are_off_kinks(name: str) -> None:
+    assert _relative_margin(named_case(name)) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["a1", "a2", "b", "c", "c-prime"])
+def test_the_papers_cases_have_unit_pressure(name: str) -> None:
+    case = named_case(name)
+    assert case.penalty * case.parameter("penetration") == 1
+
+
+def test_an_unknown_name_gets_near_ones() -> None:
+    with pytest.raises(MisuseError, match="'c-prime'"):
+        named_case("c prim")
+
+
+@pytest.mark.parametrize("strategy", [flat_cases, general_cases, smooth_cases, tie_cases])
+def test_no_segment_has_shrunk_to_a_point(strategy: Callable[[], SearchStrategy[Case]]) -> None:
+    for case in drawn(strategy(), 1000):
+        assert case.shortest_segment > 0
+
+
+@pytest.mark.parametrize(("inner_slave", "quarters"), [(False, 4), (True, -4)])
+def test_neither_a_hole_nor_a_disc_shrinks_to_a_point(inner_slave: bool, quarters: int) -> None:
+    """Found by 20,000 examples: four radii of penetration, or of gap, took all nodes to the centre."""
+    ring = Ring([1, 1, 1], [1, 1, 1], 180, inner_slave=inner_slave, quarters=[quarters], unit=1.0)
+    assert np.ptp(ring([0]).slave, axis=0).min() > 1

@@ -1,0 +1,182 @@
+"""What is handed over to be drawn is what was solved; what a plugin does wrong is a line, not a traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import Scene
+from contactverif.run.driver import draw_cases
+from contactverif.run.one_case import forces_on
+from contactverif.run.registry import load_formulation
+from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.named_states import named_case
+from contactverif.strategies.solids import block_cases
+from contactverif.studies.solved_scenes import solved
+
+FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
+
+
+def installed(name: str) -> Subject:
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject)
+    return subject
+
+
+class Springs:
+    """Nodal springs against the plane y = 0 on both sides, of the given sign."""
+
+    def __init__(self, stiffness: float) -> None:
+        self.stiffness = stiffness
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.zeros_like(z)
+        forces[..., 1::2] = self.stiffness * z[..., 1::2]
+        return forces
+
+
+def raising(*, penalty: float) -> Any:
+    class Raising(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            raise RuntimeError("no licence\nleft")
+
+    return Raising(penalty)
+
+
+def without_points(*, penalty: float) -> Any:
+    class Bad(Springs):
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return "none"
+
+    return Bad(penalty)
+
+
+def to_infinity(*, penalty: float) -> Any:
+    class Wrong(Springs):
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return -1e4 * np.eye(z.size)
+
+    return Wrong(penalty)
+
+
+@pytest.mark.parametrize("text", ["c", "b:degrees=30", "a2-graded", "example-1", "example-1bis:degrees=90,refine=2"])
+def test_a_formulation_that_is_right_shows_the_exact_pressure_everywhere(text: str) -> None:
+    scene = scene_named(text)
+    found = solved(scene.case(), [installed("vts-ppt")])
+    (one,) = found.solutions
+    assert not found.failures
+    assert one.pressure == scene.case().parameter("pressure")
+    pressures = found.node_pressures(one)
+    assert np.isfinite(pressures).sum() >= len(scene.interface.slave) + 3
+    np.testing.assert_allclose(pressures[np.isfinite(pressures)], one.pressure, rtol=1e-9)
+    assert one.points is not None
+    np.testing.assert_allclose(one.points.pressure, one.pressure, rtol=1e-9)
+    assert one.stress_error < 1e-9
+    for body, stresses in zip(scene.bodies, one.stresses, strict=True):
+        normal = body.frame[:, 1]
+        tensors = stresses[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
+        np.testing.assert_allclose(tensors @ normal, np.tile(-one.pressure * normal, (len(tensors), 1)), atol=1e-6)
+
+
+def test_under_an_imposed_approach_multipliers_carry_more_than_a_penalty() -> None:
+    """Each is held against its own exact pressure: a penalty gives way."""
+    names = ["sts", "mortar", "mortar-lm", "two-pass/nts-lm"]
+    (case, *_) = draw_cases(block_cases(), seed="pictures", examples=3).cases[1:]
+    found = solved(case, [installed(name) for name in names])
+    assert [one.formulation for one in found.solutions] == names
+    assert max(one.stress_error for one in found.solutions) < 1e-9
+    soft, rigid = found.pressures
+    assert soft < rigid
+    assert [one.pressure for one in found.solutions] == [soft, soft, rigid, rigid]
+
+
+@pytest.mark.parametrize("name", ["nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm"])
+def test_forces_of_multipliers_that_no_case_holds_are_not_drawn(name: str) -> None:
+    assert forces_on(named_case("c"), installed(name)) is None
+    assert forces_on(named_case("c"), installed("nts")) is not None
+
+
+def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
+    found = solved(scene_named("c").case(), [installed("nts"), installed("vts-ppt")])
+    wrong, right = found.solutions
+    assert wrong.points is None  # a nodal method has forces, not pressures
+    assert np.ptp(found.node_pressures(wrong)) > 1
+    assert wrong.stress_error > 0.01 > right.stress_error
+
+
+def test_it_is_the_trace_that_is_drawn() -> None:
+    scene = scene_named(FIG_30)
+    names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
+    found = solved(scene.case(), [installed(name) for name in names])
+    assert [one.formulation for one in found.solutions] == names
+    assert np.isnan(found.solutions[0].pressure)
+    for one in found.solutions:
+        trace = solve(scene, installed(one.formulation).on(scene.case()))
+        assert (one.end, one.n_iterations, one.converged) == ("converged", trace.n_iterations, True)
+        np.testing.assert_array_equal(one.residuals, trace.residuals)
+        np.testing.assert_array_equal(one.energies, trace.energies)
+        np.testing.assert_array_equal(one.z, trace.z)
+        np.testing.assert_array_equal(one.displacements[1], scene.displacements(trace.solution)[1])
+        assert np.isnan(one.stress_error)
+        np.testing.assert_allclose(one.forces[: scene.interface.n_slave_nodes, 1].sum(), 1200, rtol=1e-9)
+    iterations = [one.n_iterations for one in found.solutions]
+    assert iterations[1] > 2 * max(iterations[0], iterations[2])  # an approximate tangent, as Fig. 30 has it
+
+
+def test_the_interface_knows_whose_its_nodes_are() -> None:
+    scene = scene_named("c:refine=2,degrees=20")
+    found = solved(scene.case(), [installed("vts-ppt")])
+    for body, on, moved in zip(found.bodies, found.on_interface, found.solutions[0].displacements, strict=True):
+        np.testing.assert_array_equal(found.case.interface.nodes[on], body.nodes[body.contact_nodes])
+        at = found.solutions[0].z.reshape(-1, 2)[on]
+        np.testing.assert_allclose(at, (body.nodes + moved)[body.contact_nodes], atol=1e-12)
+
+
+def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
+    near = scene_named("c")
+    far = two_blocks([100, 101], [0, 1], [100, 101], [-1, 0], young=(1e4, 1e4), approach=0.0, penalty=1e4).bodies[1]
+    scene = Scene((*near.bodies, far), (0,), (1, 2), near.penalty, near.facts, "c and another")
+    found = solved(scene.case(), [installed("vts-ppt")])
+    assert found.sides == ["slave", "master", ""]
+    assert found.solutions[0].stress_error < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("make", "end", "remark"),
+    [
+        (without_points, "", "contact_points: returned a str; needed ContactPoints"),
+        (to_infinity, "diverged", "drawn: "),
+    ],
+)
+def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., Any], end: str, remark: str) -> None:
+    (one,) = solved(scene_named("c").case(), [Subject("mine", make)]).solutions
+    assert end in one.end
+    assert one.converged == (not end)
+    assert one.remark.startswith(remark)
+    assert np.isfinite(one.z).all()
+    assert all(np.isfinite(u).all() for u in one.displacements)
+
+
+def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
+    bad = Subject("raising", raising)
+    found = solved(scene_named("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), installed("vts-ppt")])
+    assert [one.formulation for one in found.solutions] == ["vts-ppt"]
+    assert found.failures == {
+        "raising": "residual: RuntimeError: no licence\nleft",
+        "absent": "not loaded: ModuleNotFoundError",
+    }
+
+
+def test_an_interface_alone_cannot_be_solved() -> None:
+    case = scene_named("c").case()
+    with pytest.raises(MisuseError, match="an interface without bodies"):
+        solved(Case(case.interface, case.z), [installed("vts-ppt")])
