@@ -29,12 +29,12 @@ class Room:
 
     Attributes
     ----------
-    rooms : tuple of str
-        Other folders of the house.
-    others : tuple of str
-        Third-party packages, with all that is below them.
-    never : frozenset of str
-        Modules of the standard library and builtins that are not used here.
+    rooms : tuple[str, ...]
+        Tuple of str Other folders of the house.
+    others : tuple[str, ...]
+        Tuple of str Third-party packages, with all that is below them.
+    never : frozenset[str]
+        Frozenset of str Modules of the standard library and builtins that are not used here.
     """
 
     rooms: tuple[str, ...] = ()

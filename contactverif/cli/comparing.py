@@ -64,7 +64,8 @@ def reports_in(names: Sequence[str]) -> list[Path]:
 
     Raises
     ------
-    MisuseError : if the names are both kinds, or not two reports.
+    MisuseError
+        If the names are both kinds, or not two reports.
     """
     installed = formulation_names()
     files = [name for name in names if name.lower().endswith(".nc") or (name not in installed and Path(name).is_file())]
@@ -83,7 +84,8 @@ def compare_reports(paths: Sequence[Path], globs: Sequence[str], html: Path | No
 
     Raises
     ------
-    MisuseError : for a file that is no report of this schema, or if the two have nothing in common.
+    MisuseError
+        For a file that is no report of this schema, or if the two have nothing in common.
     """
     for entry in fields(asked):
         if getattr(asked, entry.name) is not None:
@@ -115,7 +117,8 @@ def compare_formulations(names: Sequence[str], globs: Sequence[str], html: Path 
 
     Raises
     ------
-    MisuseError : for what cannot be asked or written.
+    MisuseError
+        For what cannot be asked or written.
     """
     if asked.against is None:
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")

@@ -82,8 +82,10 @@ def errors_table(found: Comparison, *, with_worst: bool = True, with_counts: boo
 
     Parameters
     ----------
-    with_worst : the number that went furthest too, for which there is no room in 80 columns.
-    with_counts : numbers of cases that are better, equal and worse.
+    with_worst : bool
+        The number that went furthest too, for which there is no room in 80 columns.
+    with_counts : bool
+        Numbers of cases that are better, equal and worse.
     """
     table = plain_table(f"error over tolerance, above 1 fails; ratio and numbers of cases beside {found.reference}")
     table.add_column("", overflow="fold", min_width=NAMES)

@@ -34,7 +34,8 @@ class Targets:
 
     Raises
     ------
-    MisuseError : for a file that cannot be written, before anything is solved.
+    MisuseError
+        For a file that cannot be written, before anything is solved.
     """
 
     out: Path | None
@@ -52,7 +53,8 @@ def draw(report: Path | None, case_id: str | None, scene: str | None, names: Seq
 
     Raises
     ------
-    MisuseError : if it is not said what to draw, or what is said does not go together.
+    MisuseError
+        If it is not said what to draw, or what is said does not go together.
     """
     if len(set(names)) < len(names):
         twice = next(name for name in names if list(names).count(name) > 1)
@@ -84,7 +86,8 @@ def draw_case(subject: Subject, question: Property, outcome: Outcome, path: Path
 
     Raises
     ------
-    MisuseError : if the file cannot be written.
+    MisuseError
+        If the file cannot be written.
     """
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
     try:

@@ -24,23 +24,37 @@ class Body:
 
     Attributes
     ----------
-    nodes : (n_nodes, 2) reference positions, a length each.
-    cells : (n_cells, 3 or 4) node numbers, counter-clockwise; (0, …) for a rigid body.
-    contact : (n_segments, 2) edges that may touch another body, each with the body on its left.
-    young : E > 0, force per length squared; ignored if rigid.
-    poisson : −1 < ν < 1/2; ignored if rigid.
-    fixed : (n_nodes, 2) components of the displacement that are imposed, in the body's axes.
-    imposed : (n_nodes, 2) what is imposed there, a length each; 0 elsewhere.
-    load : (n_nodes, 2) nodal forces in the body's axes, per unit of thickness.
-    axis : (2,) unit vector of the body's first axis; the second is a quarter turn counter-clockwise from it.
-    start : (2,) displacement, in the body's axes, of all that is free in the first guess of a solution.
-    name : for messages and drawings.
-    contact_nodes : (n_contact,) the numbers of the nodes on the contact boundary, ascending.
-    frame : (2, 2) the rotation from the body's axes to the global ones: its columns are the axes.
+    nodes : FloatArray, shape (n_nodes, 2)
+        Reference positions, a length each.
+    cells : IntArray, shape (n_cells, 3 or 4)
+        Node numbers, counter-clockwise; (0, …) for a rigid body.
+    contact : IntArray, shape (n_segments, 2)
+        Edges that may touch another body, each with the body on its left.
+    young : float
+        E > 0, force per length squared; ignored if rigid.
+    poisson : float
+        −1 < ν < 1/2; ignored if rigid.
+    fixed : BoolArray, shape (n_nodes, 2)
+        Components of the displacement that are imposed, in the body's axes.
+    imposed : FloatArray, shape (n_nodes, 2)
+        What is imposed there, a length each; 0 elsewhere.
+    load : FloatArray, shape (n_nodes, 2)
+        Nodal forces in the body's axes, per unit of thickness.
+    axis : FloatArray, shape (2,)
+        Unit vector of the body's first axis; the second is a quarter turn counter-clockwise from it.
+    start : FloatArray, shape (2,)
+        Displacement, in the body's axes, of all that is free in the first guess of a solution.
+    name : str
+        For messages and drawings.
+    contact_nodes : IntArray, shape (n_contact,)
+        The numbers of the nodes on the contact boundary, ascending.
+    frame : FloatArray, shape (2, 2)
+        The rotation from the body's axes to the global ones: its columns are the axes.
 
     Raises
     ------
-    MisuseError : for anything that no body can have, by the attribute's name.
+    MisuseError
+        For anything that no body can have, by the attribute's name.
     """
 
     nodes: FloatArray
@@ -184,19 +198,29 @@ def block(
 
     Parameters
     ----------
-    x, y : ascending coordinates of the grid lines, before rotation and translation.
-    contact : "bottom" or "top", the side that may touch something; the opposite side is loaded or held.
-    pressure : on the opposite side, towards the contact; that side is free then. Also on what `over` leaves.
-    approach : instead, a displacement of the opposite side towards the contact, 0 to hold it.
-    tilt : by how much more than in the middle the last node of that side approaches, and the first less.
-    lowered : towards the contact, the first guess of what is free.
-    free_sides : the vertical sides strain freely; the first node opposite the contact is held from sliding.
-    over : (from, to) where on the contact side somebody else presses; the pressure acts on the rest of that side too.
-    axis, shift, scale : where the block lies: points become scale × (x along axis, y across it, + shift).
+    x, y : ArrayLike
+        Ascending coordinates of the grid lines, before rotation and translation.
+    contact : str
+        "bottom" or "top", the side that may touch something; the opposite side is loaded or held.
+    pressure : float
+        On the opposite side, towards the contact; that side is free then. Also on what `over` leaves.
+    approach : float | None
+        Instead, a displacement of the opposite side towards the contact, 0 to hold it.
+    tilt : float
+        By how much more than in the middle the last node of that side approaches, and the first less.
+    lowered : float
+        Towards the contact, the first guess of what is free.
+    free_sides : bool
+        The vertical sides strain freely; the first node opposite the contact is held from sliding.
+    over : tuple[float, float] | None, shape (from, to)
+        Where on the contact side somebody else presses; the pressure acts on the rest of that side too.
+    axis, shift, scale : ArrayLike or float
+        Where the block lies: points become scale × (x along axis, y across it, + shift).
 
     Raises
     ------
-    MisuseError : as `Body` does, and for grid lines that do not ascend.
+    MisuseError
+        As `Body` does, and for grid lines that do not ascend.
     """
     x, y = _floats(f"{name}: x", x, (-1,)), _floats(f"{name}: y", y, (-1,))
     axis, shift = _floats(f"{name}: axis", axis, (2,)), _floats(f"{name}: shift", shift, (2,))

@@ -21,14 +21,21 @@ class Case:
 
     Attributes
     ----------
-    interface : the two meshes in their reference configuration.
-    z : (n_unknowns,) current positions, a length each, flat: slave nodes first. Behind them the multipliers, if any.
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation is given
+    interface : Interface
+        The two meshes in their reference configuration.
+    z : FloatArray, shape (n_unknowns,)
+        Current positions, a length each, flat: slave nodes first. Behind them the multipliers, if any.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation is given
         ε̂ × the mean slave segment.
-    parameters : what else the property that made the case needs to know, arrays of floats by name.
-    seed : of anything random that the property does with the case (directions of a derivative).
-    name : of a case that has one ("C", "C′"), else empty.
-    n_multipliers : how many of the entries of z are multipliers. A case that is drawn or stored has none; those of a
+    parameters : Mapping[str, FloatArray]
+        What else the property that made the case needs to know, arrays of floats by name.
+    seed : int
+        Of anything random that the property does with the case (directions of a derivative).
+    name : str
+        Of a case that has one ("C", "C′"), else empty.
+    n_multipliers : int
+        How many of the entries of z are multipliers. A case that is drawn or stored has none; those of a
         formulation are put behind its positions when it is asked.
     """
 

@@ -12,9 +12,12 @@ class MisuseError(ContactverifError, ValueError):
 
     Parameters
     ----------
-    argument : the name of the argument, as the caller wrote it.
-    found : what was there.
-    needed : what would have been right.
+    argument : str
+        The name of the argument, as the caller wrote it.
+    found : str
+        What was there.
+    needed : str
+        What would have been right.
     """
 
     def __init__(self, argument: str, found: str, needed: str) -> None:

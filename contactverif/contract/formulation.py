@@ -35,7 +35,8 @@ class Pairing(Mapping[str, NDArray[Any]]):
 
     Raises
     ------
-    ContractError : if a value is no array of integers or booleans, or a name is no string.
+    ContractError
+        If a value is no array of integers or booleans, or a name is no string.
     """
 
     __slots__ = ("_arrays",)
@@ -75,7 +76,8 @@ class Pairing(Mapping[str, NDArray[Any]]):
 
         Raises
         ------
-        ContractError : if a value is below −1 or above the sizes of the problem.
+        ContractError
+            If a value is below −1 or above the sizes of the problem.
         """
         pattern = max((values.size for values in self._arrays.values()), default=0)
         most = max(interface.n_unknowns, pattern)
@@ -114,31 +116,47 @@ class Traits:
 
     Attributes
     ----------
-    passes_flat_patch : transmits a uniform pressure exactly across any flat interface that it covers; one by penalty
-        the pressure ε̂ |g|, so a law that is not linear promises nothing here.
-    covers_overhang : does so too where the slave overhangs the master inside a slave segment.
-    tangent : "exact" is the derivative of the residual on a frozen pairing; "approximate" is not.
-    symmetric : the tangent is symmetric.
-    conserves_force, conserves_moment : slave and master forces balance at any tilt and curvature.
-    continuity : how smooth the forces are while a node slides over the vertices of a master that no line along the
+    passes_flat_patch : bool | None
+        Transmits a uniform pressure exactly across any flat interface that it covers; one by penalty the
+        pressure ε̂ |g|, so a law that is not linear promises nothing here.
+    covers_overhang : bool | None
+        Does so too where the slave overhangs the master inside a slave segment.
+    tangent : Literal['exact', 'approximate'] | None
+        "exact" is the derivative of the residual on a frozen pairing; "approximate" is not.
+    symmetric : bool | None
+        The tangent is symmetric.
+    conserves_force, conserves_moment : bool | None
+        Slave and master forces balance at any tilt and curvature.
+    continuity : Literal['C0', 'C1'] | None
+        How smooth the forces are while a node slides over the vertices of a master that no line along the
         normal meets twice, "C0" or "C1".
-    area : the configuration in which areas of competence are measured; they add up to the slave's length, so that a
-        uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
-    penalty : "nodal" (force per length) or "distributed" (force per length per length of penetration); of a multiplier,
-        whether it is a nodal force or a pressure.
-    enforcement : how contact is enforced.
-    independent_multipliers : the constraints are independent on any mesh, so that the multipliers are unique.
-    dimensions : numbers of coordinates that it can do.
-    batched : `residual` takes a batch of states, z (..., n_unknowns).
-    takes_complex : `residual` takes complex positions, so that a complex step works.
-    witnesses : {property id: name of a case} for each promise "does not"; the case always runs. The beginning of an id
-        stands for all below it: "patch" is the witness of "patch.flat.solve" too. A property that solves bodies takes
-        the scene of that name ("c-prime", or with options "c-prime:penalty=1e4").
-    source : where the formulation is published.
+    area : Literal['reference', 'current'] | None
+        The configuration in which areas of competence are measured; they add up to the slave's length, so that
+        a uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
+    penalty : Literal['nodal', 'distributed'] | None
+        "nodal" (force per length) or "distributed" (force per length per length of penetration); of a
+        multiplier, whether it is a nodal force or a pressure.
+    enforcement : Literal['penalty', 'multiplier', 'barrier']
+        How contact is enforced.
+    independent_multipliers : bool | None
+        The constraints are independent on any mesh, so that the multipliers are unique.
+    dimensions : tuple[int, ...]
+        Numbers of coordinates that it can do.
+    batched : bool
+        `residual` takes a batch of states, z (..., n_unknowns).
+    takes_complex : bool
+        `residual` takes complex positions, so that a complex step works.
+    witnesses : Mapping[str, str]
+        {property id: name of a case} for each promise "does not"; the case always runs. The beginning of an id
+        stands for all below it: "patch" is the witness of "patch.flat.solve" too. A property that solves bodies
+        takes the scene of that name ("c-prime", or with options "c-prime:penalty=1e4").
+    source : str
+        Where the formulation is published.
 
     Raises
     ------
-    ContractError : for a word that is none of these, such as a misspelt promise.
+    ContractError
+        For a word that is none of these, such as a misspelt promise.
     """
 
     passes_flat_patch: bool | None = None
@@ -183,16 +201,26 @@ class ContactPoints:
 
     Attributes
     ----------
-    slave_segment : (n_points,) the slave segment that carries the point.
-    c : (n_points,) where on it, −1 at its first node, +1 at its second.
-    master_segment : (n_points,) the segment that it is measured against.
-    xi : (n_points,) foot on the master segment, 0 at its first node, 1 at its second, unclipped.
-    position, normal : (n_points, dim) a length; a unit vector out of the master body.
-    gap : (n_points,) a length, negative in penetration.
-    pressure : (n_points,) force per length of the interface, ≥ 0 (a nodal method: the force).
-    weight : (n_points,) a length, the area of competence (a nodal method: 1).
-    active : (n_points,) in contact.
-    area_from, area_to : (n_points,) the ends of the area of competence on the slave segment, as `c`.
+    slave_segment : IntArray, shape (n_points,)
+        The slave segment that carries the point.
+    c : FloatArray, shape (n_points,)
+        Where on it, −1 at its first node, +1 at its second.
+    master_segment : IntArray, shape (n_points,)
+        The segment that it is measured against.
+    xi : FloatArray, shape (n_points,)
+        Foot on the master segment, 0 at its first node, 1 at its second, unclipped.
+    position, normal : FloatArray, shape (n_points, dim)
+        A length; a unit vector out of the master body.
+    gap : FloatArray, shape (n_points,)
+        A length, negative in penetration.
+    pressure : FloatArray, shape (n_points,)
+        Force per length of the interface, ≥ 0 (a nodal method: the force).
+    weight : FloatArray, shape (n_points,)
+        A length, the area of competence (a nodal method: 1).
+    active : BoolArray, shape (n_points,)
+        In contact.
+    area_from, area_to : FloatArray, shape (n_points,)
+        The ends of the area of competence on the slave segment, as `c`.
     """
 
     slave_segment: IntArray

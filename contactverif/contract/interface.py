@@ -21,14 +21,18 @@ class Surface:
 
     Attributes
     ----------
-    segments : (n_segments, 2) node numbers, first and second node of each segment.
-    neighbours : (n_segments, 2) the previous and the next segment of the chain, −1 at a free end.
-    chain_order : (n_segments,) the segments as one meets them walking along the chains.
+    segments : IntArray, shape (n_segments, 2)
+        Node numbers, first and second node of each segment.
+    neighbours : IntArray, shape (n_segments, 2)
+        The previous and the next segment of the chain, −1 at a free end.
+    chain_order : IntArray, shape (n_segments,)
+        The segments as one meets them walking along the chains.
 
     Raises
     ------
-    MisuseError : if the segments are no chains: a node that begins or ends two of them, or a segment that
-        begins where it ends.
+    MisuseError
+        If the segments are no chains: a node that begins or ends two of them, or a segment that begins where it
+        ends.
     """
 
     segments: IntArray
@@ -86,13 +90,16 @@ class Interface:
 
     Attributes
     ----------
-    nodes : (n_nodes, dim) reference positions, a length each; slave nodes first, then master nodes.
-    slave, master : the two surfaces, bodies on the left: where they face each other they run in opposite directions.
+    nodes : FloatArray, shape (n_nodes, dim)
+        Reference positions, a length each; slave nodes first, then master nodes.
+    slave, master : Surface
+        The two surfaces, bodies on the left: where they face each other they run in opposite directions.
 
     Raises
     ------
-    MisuseError : on NaN or infinity, zero-length segments, two nodes of one surface in one place, a node of both
-        surfaces or of none, or nodes out of order.
+    MisuseError
+        On NaN or infinity, zero-length segments, two nodes of one surface in one place, a node of both surfaces
+        or of none, or nodes out of order.
     """
 
     nodes: FloatArray

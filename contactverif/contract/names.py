@@ -25,7 +25,8 @@ def parsed(
 
     Raises
     ------
-    MisuseError : if the text does not have that form, or names an option twice.
+    MisuseError
+        If the text does not have that form, or names an option twice.
     """
     name, colon, rest = text.partition(":")
     if not name:

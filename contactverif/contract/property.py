@@ -40,11 +40,16 @@ class Quantity:
 
     Attributes
     ----------
-    name : short, in words.
-    unit : "1" for a ratio.
-    tolerance : the formula, as it is printed; its symbols are those of verification: u, X, S, g, ℓ, N.
-    reason : why that formula.
-    sense : whether the number must be at most or at least the tolerance.
+    name : str
+        Short, in words.
+    unit : str
+        "1" for a ratio.
+    tolerance : str
+        The formula, as it is printed; its symbols are those of verification: u, X, S, g, ℓ, N.
+    reason : str
+        Why that formula.
+    sense : Literal['at most', 'at least']
+        Whether the number must be at most or at least the tolerance.
     """
 
     name: str
@@ -60,12 +65,18 @@ class Measurement:
 
     Attributes
     ----------
-    values, tolerances : {quantity: number}, the same names; a NaN value is a failure.
-    undecided : empty, or why a failure would not be the formulation's fault (roundoff, a kink).
-    broken : empty, or a breach that no number tells, in words.
-    details : further numbers worth keeping, {name: number}.
-    series : numbers by iterate, {name: (n_iterates,)}; those that the property declares.
-    idle : nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
+    values, tolerances : Mapping[str, float]
+        {quantity: number}, the same names; a NaN value is a failure.
+    undecided : str
+        Empty, or why a failure would not be the formulation's fault (roundoff, a kink).
+    broken : str
+        Empty, or a breach that no number tells, in words.
+    details : Mapping[str, float]
+        Further numbers worth keeping, {name: number}.
+    series : Mapping[str, FloatArray]
+        Numbers by iterate, {name: (n_iterates,)}; those that the property declares.
+    idle : bool
+        Nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
     """
 
     values: Mapping[str, float]
@@ -83,19 +94,33 @@ class Property:
 
     Attributes
     ----------
-    id : dotted, `patch.flat.transmission`.
-    family : the group of a report that it belongs to.
-    summary : what is asked, in one line.
-    quantities : what is measured.
-    cases : makes a hypothesis strategy of `Case`; given an interface, random states on that one, or None where the
-        property cannot be asked of it. Where the property is one of bodies, it is given the case of a scene instead.
-    measure : numbers from a case; raises what the plugin raises.
-    needs : parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
-    promise : what the traits say: True passes, False does not (with a witness), None nothing.
-    applicable : empty, or why the question makes no sense for these traits.
-    series : {name: unit} of the numbers by iterate that it keeps of each case.
-    bodies : the cases are scenes, solved; else they are states of an interface alone.
-    exact : where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for pictures.
+    id : str
+        Dotted, `patch.flat.transmission`.
+    family : str
+        The group of a report that it belongs to.
+    summary : str
+        What is asked, in one line.
+    quantities : tuple[Quantity, ...]
+        What is measured.
+    cases : Callable[[Any], Any]
+        Makes a hypothesis strategy of `Case`; given an interface, random states on that one, or None where the
+        property cannot be asked of it. Where the property is one of bodies, it is given the case of a scene
+        instead.
+    measure : Callable[[Case, Subject], Measurement]
+        Numbers from a case; raises what the plugin raises.
+    needs : frozenset[str]
+        Parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
+    promise : Callable[[Traits], bool | None]
+        What the traits say: True passes, False does not (with a witness), None nothing.
+    applicable : Callable[[Traits], str]
+        Empty, or why the question makes no sense for these traits.
+    series : Mapping[str, str]
+        {name: unit} of the numbers by iterate that it keeps of each case.
+    bodies : bool
+        The cases are scenes, solved; else they are states of an interface alone.
+    exact : Callable[[Case], FloatArray] | None
+        Where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for
+        pictures.
     """
 
     id: str
@@ -118,11 +143,16 @@ class Outcome:
 
     Attributes
     ----------
-    case : what was judged.
-    verdict, reason : how it came out, and why it is no pass.
-    measurement : the numbers, None where the plugin gave none.
-    seconds : spent measuring and judging.
-    breach : the plugin broke the contract or returned NaN: a failure that nobody can have promised.
+    case : Case
+        What was judged.
+    verdict, reason : Verdict or str
+        How it came out, and why it is no pass.
+    measurement : Measurement | None
+        The numbers, None where the plugin gave none.
+    seconds : float
+        Spent measuring and judging.
+    breach : bool
+        The plugin broke the contract or returned NaN: a failure that nobody can have promised.
     """
 
     case: Case

@@ -16,17 +16,28 @@ class Row:
 
     Attributes
     ----------
-    formulation : name on the command line, with options.
-    question : the property.
-    verdict : over all cases: crashed and fail first, then not judged, then pass.
-    promise : True promised, False said to fail, None nothing said.
-    known : why a failure is known, empty if it is not.
-    reason : why the verdict is no pass, of the worst case.
-    planned : number of random cases asked for.
-    outcomes : of the random cases, in order.
-    witness : outcome of the named case of a promise "does not".
-    shrunk : the worst case after shrinking, None where nothing failed.
-    seconds : spent judging, shrinking excluded.
+    formulation : str
+        Name on the command line, with options.
+    question : Property
+        The property.
+    verdict : Verdict
+        Over all cases: crashed and fail first, then not judged, then pass.
+    promise : bool | None
+        True promised, False said to fail, None nothing said.
+    known : str
+        Why a failure is known, empty if it is not.
+    reason : str
+        Why the verdict is no pass, of the worst case.
+    planned : int
+        Number of random cases asked for.
+    outcomes : tuple[Outcome, ...]
+        Of the random cases, in order.
+    witness : Outcome | None
+        Outcome of the named case of a promise "does not".
+    shrunk : Outcome | None
+        The worst case after shrinking, None where nothing failed.
+    seconds : float
+        Spent judging, shrinking excluded.
     """
 
     formulation: str
@@ -85,10 +96,14 @@ class Run:
 
     Attributes
     ----------
-    rows : formulation by formulation, property by property.
-    not_loaded : plugins that did not load.
-    provided : {formulation: {part of the contract: provided}}.
-    provenance : root attributes of a report: versions, seed, profile, command, …
+    rows : tuple[Row, ...]
+        Formulation by formulation, property by property.
+    not_loaded : tuple[NotLoaded, ...]
+        Plugins that did not load.
+    provided : Mapping[str, Mapping[str, bool]]
+        {formulation: {part of the contract: provided}}.
+    provenance : Mapping[str, str]
+        Root attributes of a report: versions, seed, profile, command, ….
     """
 
     rows: tuple[Row, ...]

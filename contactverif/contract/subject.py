@@ -26,12 +26,15 @@ class Subject:
 
     Parameters
     ----------
-    name : as on the command line, with options.
-    make : `make(penalty=…)` gives the formulation.
+    name : str
+        As on the command line, with options.
+    make : Callable[..., Any]
+        `make(penalty=…)` gives the formulation.
 
     Raises
     ------
-    PluginError, ContractError : if the factory raises, or what it makes has no `residual`.
+    PluginError, ContractError
+        If the factory raises, or what it makes has no `residual`.
     """
 
     def __init__(self, name: str, make: Callable[..., Any]) -> None:
@@ -70,10 +73,14 @@ class CheckedFormulation:
 
     Raises
     ------
-    PluginError : from any verb, if the plugin raises.
-    ContractError : if an answer is of the wrong kind, shape or dtype, or a pairing holds what it must not.
-    NonFiniteError : if an answer holds NaN or infinity.
-    MisuseError : if z has not as many numbers as there are positions and multipliers.
+    PluginError
+        From any verb, if the plugin raises.
+    ContractError
+        If an answer is of the wrong kind, shape or dtype, or a pairing holds what it must not.
+    NonFiniteError
+        If an answer holds NaN or infinity.
+    MisuseError
+        If z has not as many numbers as there are positions and multipliers.
     """
 
     def __init__(self, plugin: Any, traits: Traits, provides: frozenset[str]) -> None:

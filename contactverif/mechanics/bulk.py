@@ -37,10 +37,14 @@ class Condensed:
 
     Attributes
     ----------
-    body : whose.
-    unknowns : (n,) free components on the contact boundary, 2 × node + component in the body's axes.
-    stiffness : (n, n) S, symmetric.
-    load : (n,) g, of nodal forces and of imposed displacements.
+    body : Body
+        Whose.
+    unknowns : IntArray, shape (n,)
+        Free components on the contact boundary, 2 × node + component in the body's axes.
+    stiffness : FloatArray, shape (n, n)
+        S, symmetric.
+    load : FloatArray, shape (n,)
+        g, of nodal forces and of imposed displacements.
     """
 
     body: Body
@@ -131,7 +135,8 @@ def condense(body: Body) -> Condensed:
 
     Raises
     ------
-    MisuseError : if a part of the body hangs on nothing even while its contact boundary is held.
+    MisuseError
+        If a part of the body hangs on nothing even while its contact boundary is held.
     """
     unknowns = free_on_contact(body)
     free = ~body.fixed.reshape(-1)
@@ -222,15 +227,21 @@ def body_from_mesh(
 
     Parameters
     ----------
-    mesh : `skfem.MeshTri` or `skfem.MeshQuad`.
-    contact : the boundary that may touch something.
-    supports : {boundary: which components are fixed}, "along" the x-axis, "across" it, or both.
-    moved : {boundary of supports: displacement (2,)} where it is not 0.
-    pressures : {boundary: pressure}, towards the body.
+    mesh : Any
+        `skfem.MeshTri` or `skfem.MeshQuad`.
+    contact : str
+        The boundary that may touch something.
+    supports : Mapping[str, Literal['along', 'across', 'both']]
+        {boundary: which components are fixed}, "along" the x-axis, "across" it, or both.
+    moved : Mapping[str, tuple[float, float]] | None
+        {boundary of supports: displacement (2,)} where it is not 0.
+    pressures : Mapping[str, float] | None
+        {boundary: pressure}, towards the body.
 
     Raises
     ------
-    MisuseError : if the mesh has no such boundary, or as `Body` does.
+    MisuseError
+        If the mesh has no such boundary, or as `Body` does.
     """
     if getattr(mesh, "elem", None) not in (skfem.ElementTriP1, skfem.ElementQuad1):
         raise MisuseError("mesh", f"a {type(mesh).__name__}", "a MeshTri or a MeshQuad of first order")

@@ -25,10 +25,13 @@ class Step:
 
     Attributes
     ----------
-    change : (n,) the step, None where the matrix has no inverse in floats.
-    condition : estimate of 1/cond of the matrix, rows and columns of multipliers scaled; 0 where it has no inverse,
+    change : FloatArray | None, shape (n,)
+        The step, None where the matrix has no inverse in floats.
+    condition : float
+        Estimate of 1/cond of the matrix, rows and columns of multipliers scaled; 0 where it has no inverse,
         also where multipliers are not unique and there is a step all the same.
-    deficiency : how many of the multipliers are not unique.
+    deficiency : int
+        How many of the multipliers are not unique.
     """
 
     change: FloatArray | None
@@ -41,9 +44,12 @@ def solved(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray |
 
     Parameters
     ----------
-    matrix : (n, n), dense or sparse.
-    n_positions : how many of the unknowns are positions; behind them are multipliers.
-    floor : (n,) what roundoff makes of `right`. Constraints that depend on one another must not contradict one another
+    matrix : Any, shape (n, n)
+        Dense or sparse.
+    n_positions : int
+        How many of the unknowns are positions; behind them are multipliers.
+    floor : FloatArray | None, shape (n,)
+        What roundoff makes of `right`. Constraints that depend on one another must not contradict one another
         by more; zero by default.
     """
     if n_positions == len(right):

@@ -68,21 +68,31 @@ class Trace:
 
     Attributes
     ----------
-    scene : what was solved.
-    end : how it ended.
-    u : (n_iterates, n_free + n_multipliers) unknowns: those of the scene, and multipliers behind them.
-    factors : (n_iterates,) share of loads and imposed displacements, 1 at the last load step.
-    residuals : (n_iterates,) largest entry of S q − g + R, a force; where there are multipliers, of the constraint rows
-        too, each with the factor that makes it comparable (`linear.scales`).
-    energies : (n_iterates,) |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
-    floors : (n_iterates,) what roundoff alone makes of the residual, a force.
-    roundings : (n_iterates,) largest entry of the residual over what roundoff makes of that entry; up to 1 is
-        converged.
-    changes : (n_iterates,) entries of the pairing that differ from the iterate before; −1 where there is no pairing
-        or none before.
-    conditions : (n_iterates,) estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last.
-    deficiencies : (n_iterates,) how many multipliers were not unique in the step from there, 0 where none was taken.
-    seconds : {"pair", "residual", "tangent", "solve"}: time spent in each.
+    scene : Scene
+        What was solved.
+    end : End
+        How it ended.
+    u : FloatArray, shape (n_iterates, n_free + n_multipliers)
+        Unknowns: those of the scene, and multipliers behind them.
+    factors : FloatArray, shape (n_iterates,)
+        Share of loads and imposed displacements, 1 at the last load step.
+    residuals : FloatArray, shape (n_iterates,)
+        Largest entry of S q − g + R, a force; where there are multipliers, of the constraint rows too, each
+        with the factor that makes it comparable (`linear.scales`).
+    energies : FloatArray, shape (n_iterates,)
+        |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
+    floors : FloatArray, shape (n_iterates,)
+        What roundoff alone makes of the residual, a force.
+    roundings : FloatArray, shape (n_iterates,)
+        Largest entry of the residual over what roundoff makes of that entry; up to 1 is converged.
+    changes : IntArray, shape (n_iterates,)
+        Entries of the pairing that differ from the iterate before; −1 where there is no pairing or none before.
+    conditions : FloatArray, shape (n_iterates,)
+        Estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last.
+    deficiencies : IntArray, shape (n_iterates,)
+        How many multipliers were not unique in the step from there, 0 where none was taken.
+    seconds : dict[str, float]
+        {"pair", "residual", "tangent", "solve"}: time spent in each.
     """
 
     scene: Scene
@@ -252,15 +262,21 @@ def solve(
 
     Parameters
     ----------
-    formulation : with its penalty, `subject.on(case)` or `subject.with_penalty(…)`.
-    start : (n_free,) first iterate, or (n_free + n_multipliers,); the scene's own by default, and no multipliers.
-    load_steps : loads and imposed displacements grow in that many equal steps, each solved from the one before.
-    iterations : linear systems solved at most, in each load step.
-    own_tangent : the formulation's, if it has one; else its residual is differentiated on the frozen pairing.
+    formulation : CheckedFormulation
+        With its penalty, `subject.on(case)` or `subject.with_penalty(…)`.
+    start : FloatArray | None, shape (n_free,)
+        First iterate, or (n_free + n_multipliers,); the scene's own by default, and no multipliers.
+    load_steps : int
+        Loads and imposed displacements grow in that many equal steps, each solved from the one before.
+    iterations : int
+        Linear systems solved at most, in each load step.
+    own_tangent : bool
+        The formulation's, if it has one; else its residual is differentiated on the frozen pairing.
 
     Raises
     ------
-    ContractError : what the plugin raises or breaks.
+    ContractError
+        What the plugin raises or breaks.
     """
     if load_steps < 1 or iterations < 1:
         name, number = ("load_steps", load_steps) if load_steps < 1 else ("iterations", iterations)

@@ -31,15 +31,21 @@ class Scene:
 
     Attributes
     ----------
-    bodies : all of them, those out of reach too.
-    slave, master : indices of bodies; every body is one or the other.
-    penalty : ε̂ that the scene is solved with unless somebody says otherwise.
-    facts : what is known exactly, arrays by name; they become parameters of a case.
-    name : of the scene on the command line, empty if it is a random one.
+    bodies : tuple[Body, ...]
+        All of them, those out of reach too.
+    slave, master : tuple[int, ...]
+        Indices of bodies; every body is one or the other.
+    penalty : float
+        Ε̂ that the scene is solved with unless somebody says otherwise.
+    facts : Mapping[str, FloatArray]
+        What is known exactly, arrays by name; they become parameters of a case.
+    name : str
+        Of the scene on the command line, empty if it is a random one.
 
     Raises
     ------
-    MisuseError : if a body is neither or both, or can move as a rigid one though nothing resists.
+    MisuseError
+        If a body is neither or both, or can move as a rigid one though nothing resists.
     """
 
     bodies: tuple[Body, ...]
@@ -213,7 +219,8 @@ def scene_of(case: Case) -> Scene:
 
     Raises
     ------
-    MisuseError : if the case holds none.
+    MisuseError
+        If the case holds none.
     """
     if not has_bodies(case):
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")

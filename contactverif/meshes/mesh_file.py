@@ -34,13 +34,17 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
     Parameters
     ----------
-    path : a file that meshio reads.
-    slave, master : a group each, by its name or its number.
-    flip : exchange the orientation: turn the chains that no cell told, or all where cells told every one.
+    path : str | Path
+        A file that meshio reads.
+    slave, master : str
+        A group each, by its name or its number.
+    flip : bool
+        Exchange the orientation: turn the chains that no cell told, or all where cells told every one.
 
     Raises
     ------
-    MisuseError : if the file, a group, its lines or the way in which the two face each other cannot be used.
+    MisuseError
+        If the file, a group, its lines or the way in which the two face each other cannot be used.
     """
     if slave == master:
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
@@ -68,7 +72,8 @@ def check_facing(interface: Interface) -> None:
 
     Raises
     ------
-    MisuseError : if the mean normals, weighted by length, do not oppose each other.
+    MisuseError
+        If the mean normals, weighted by length, do not oppose each other.
     """
     slave, master = (_mean_normal(surface, interface.nodes) for surface in (interface.slave, interface.master))
     # The normals of a closed chain sum to zero whichever way it runs: a surface without an open chain tells nothing.

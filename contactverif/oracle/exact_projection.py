@@ -23,12 +23,18 @@ class Projection:
 
     Attributes
     ----------
-    segment : the master segment that is nearest.
-    xi : foot on it, 0 at its first node, 1 at its second, unclipped.
-    squared_distance : to the closed segment, a length squared.
-    signed_squared_gap : square of the distance to the segment's line, a length squared, negative in penetration.
-    tied : all segments at that distance.
-    undecided : those of them that the least overshoot does not tell apart either; more than one is a kink.
+    segment : int
+        The master segment that is nearest.
+    xi : Fraction
+        Foot on it, 0 at its first node, 1 at its second, unclipped.
+    squared_distance : Fraction
+        To the closed segment, a length squared.
+    signed_squared_gap : Fraction
+        Square of the distance to the segment's line, a length squared, negative in penetration.
+    tied : tuple[int, ...]
+        All segments at that distance.
+    undecided : tuple[int, ...]
+        Those of them that the least overshoot does not tell apart either; more than one is a kink.
     """
 
     segment: int

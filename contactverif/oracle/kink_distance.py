@@ -39,10 +39,13 @@ def kink_margin(
 
     Parameters
     ----------
-    z : (n_unknowns,) current positions, flat.
-    slave_segment, c : (n_points,) the contact points; −1 or NaN is no point.
-    area_from, area_to : (n_points,) ends of their areas of competence, as `c`; NaN or None where there is none. One
-        exactly at the node where the walk must stop was cut there by the formulation, which is no decision.
+    z : FloatArray, shape (n_unknowns,)
+        Current positions, flat.
+    slave_segment, c : ArrayLike, shape (n_points,)
+        The contact points; −1 or NaN is no point.
+    area_from, area_to : ArrayLike | None, shape (n_points,)
+        Ends of their areas of competence, as `c`; NaN or None where there is none. One exactly at the node
+        where the walk must stop was cut there by the formulation, which is no decision.
 
     Returns
     -------

@@ -32,8 +32,10 @@ class Drawn:
 
     Attributes
     ----------
-    cases : in the order in which they were drawn.
-    exhausted : there are no others, so fewer than asked are all there are.
+    cases : tuple[Case, ...]
+        In the order in which they were drawn.
+    exhausted : bool
+        There are no others, so fewer than asked are all there are.
     """
 
     cases: tuple[Case, ...]

@@ -17,7 +17,8 @@ def the_formulation(name: str) -> Subject:
 
     Raises
     ------
-    MisuseError : if there is none, or it does not load.
+    MisuseError
+        If there is none, or it does not load.
     """
     subject = load_formulation(name)
     if isinstance(subject, NotLoaded):
@@ -30,7 +31,8 @@ def the_property(property_id: str) -> Property:
 
     Raises
     ------
-    MisuseError : if there is none, or it does not load.
+    MisuseError
+        If there is none, or it does not load.
     """
     (question,) = load_properties([property_id])
     if isinstance(question, NotLoaded):

@@ -15,9 +15,12 @@ class Profile:
 
     Attributes
     ----------
-    name : on the command line.
-    examples : planned cases of a property.
-    seed : of all cases; None is a fresh one each run.
+    name : str
+        On the command line.
+    examples : int
+        Planned cases of a property.
+    seed : int | None
+        Of all cases; None is a fresh one each run.
     """
 
     name: str
@@ -36,7 +39,8 @@ class Profile:
 
         Raises
         ------
-        MisuseError : if there is less than one example, or the seed is negative.
+        MisuseError
+            If there is less than one example, or the seed is negative.
         """
         examples = self.examples if examples is None else examples
         seed = self.seed if seed is None else seed

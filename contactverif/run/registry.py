@@ -58,7 +58,8 @@ def load_formulation(text: str) -> Subject | NotLoaded:
 
     Raises
     ------
-    MisuseError : if the text is malformed, no such formulation is installed, or it has no such option or value.
+    MisuseError
+        If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
     make = _factory(text)
     return make if isinstance(make, NotLoaded) else subject_of(text, make)
@@ -69,7 +70,8 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
 
     Raises
     ------
-    MisuseError : if the factory raises one, which it does for the value of an option.
+    MisuseError
+        If the factory raises one, which it does for the value of an option.
     """
     try:
         return Subject(name, make)
@@ -89,7 +91,8 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
 
     Raises
     ------
-    MisuseError : if a pattern matches nothing.
+    MisuseError
+        If a pattern matches nothing.
     """
     names = property_ids()
     for glob in globs:

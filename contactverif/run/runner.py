@@ -56,17 +56,24 @@ def run(
 
     Parameters
     ----------
-    subjects, properties : as the registry loads them; what did not load is reported and fails the run.
-    profile, examples, seed : how much is asked; examples and seed overrule the profile.
-    interface : ask everything on this one, with random states, instead of on random interfaces.
-    scene : ask what needs bodies of this one alone, and all else on its interface. That it passes there breaks no
+    subjects, properties : Sequence[Subject | NotLoaded] or Sequence[Property | NotLoaded]
+        As the registry loads them; what did not load is reported and fails the run.
+    profile, examples, seed : Profile | str or int | None
+        How much is asked; examples and seed overrule the profile.
+    interface : Interface | None
+        Ask everything on this one, with random states, instead of on random interfaces.
+    scene : Case | None
+        Ask what needs bodies of this one alone, and all else on its interface. That it passes there breaks no
         promise to fail.
-    known : {property id: why its failure is known}.
-    progress : called after every case.
+    known : Mapping[str, str] | None
+        {property id: why its failure is known}.
+    progress : Callable[[Progress], None] | None
+        Called after every case.
 
     Raises
     ------
-    MisuseError : if a known failure names no property of this run, or something is asked twice.
+    MisuseError
+        If a known failure names no property of this run, or something is asked twice.
     """
     known = known or {}
     questions = [question for question in properties if isinstance(question, Property)]
@@ -102,7 +109,8 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
 
     Raises
     ------
-    Exception : from the harness itself or the property, whose mistake it then is, with the case as a note.
+    Exception
+        From the harness itself or the property, whose mistake it then is, with the case as a note.
     """
     start = perf_counter()
 

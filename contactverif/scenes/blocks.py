@@ -49,20 +49,28 @@ def two_blocks(
 
     Parameters
     ----------
-    slave_x, slave_y, master_x, master_y : ascending grid lines; the slave's lowest and the master's highest y agree.
-        Where one block is wider, and a pressure is given, the pressure acts beside the other one too, so that all
-        stays uniform.
-    young, poisson : of slave and master.
-    penalty : ε̂, also for the depth of the first guess.
-    pressure : on top of the slave, or
-    approach : of its top, a displacement; with `tilt` nothing is uniform any more, and no exact pressure is known.
-    lowered : how deep the slave is pushed in the first guess; by default `approach`, or p/ε̂.
-    free_sides : of both blocks; then the gap is not known exactly, since areas change.
-    rigid_master : the master's top alone, held.
+    slave_x, slave_y, master_x, master_y : ArrayLike
+        Ascending grid lines; the slave's lowest and the master's highest y agree. Where one block is wider, and
+        a pressure is given, the pressure acts beside the other one too, so that all stays uniform.
+    young, poisson : Sequence[float]
+        Of slave and master.
+    penalty : float
+        Ε̂, also for the depth of the first guess.
+    pressure : float | None
+        On top of the slave, or.
+    approach : float | None
+        Of its top, a displacement; with `tilt` nothing is uniform any more, and no exact pressure is known.
+    lowered : float | None
+        How deep the slave is pushed in the first guess; by default `approach`, or p/ε̂.
+    free_sides : bool
+        Of both blocks; then the gap is not known exactly, since areas change.
+    rigid_master : bool
+        The master's top alone, held.
 
     Raises
     ------
-    MisuseError : as `Body` and `Scene` do.
+    MisuseError
+        As `Body` and `Scene` do.
     """
     slave_x, slave_y, master_x, master_y = (
         np.asarray(values, dtype=np.float64) for values in (slave_x, slave_y, master_x, master_y)

@@ -36,9 +36,12 @@ class NamedScene:
 
     Attributes
     ----------
-    summary : what it is, in one line.
-    source : where in the paper; empty if it is ours.
-    chosen : what the paper does not print; of a scene of ours, why it is as it is.
+    summary : str
+        What it is, in one line.
+    source : str
+        Where in the paper; empty if it is ours.
+    chosen : str
+        What the paper does not print; of a scene of ours, why it is as it is.
     """
 
     summary: str
@@ -52,11 +55,16 @@ class NamedBlocks(NamedScene):
 
     Attributes
     ----------
-    slave, master : lengths of the segments from left to right.
-    slave_from, master_from : where they begin.
-    height : of each block.
-    pressure : on top.
-    rigid_master : a rigid floor.
+    slave, master : Sequence[float]
+        Lengths of the segments from left to right.
+    slave_from, master_from : float
+        Where they begin.
+    height : float
+        Of each block.
+    pressure : float
+        On top.
+    rigid_master : bool
+        A rigid floor.
     """
 
     slave: Sequence[float]
@@ -160,7 +168,8 @@ def named_scene(text: str) -> Case:
 
     Raises
     ------
-    MisuseError : as `scene_named`.
+    MisuseError
+        As `scene_named`.
     """
     return scene_named(text, "scene").case()
 
@@ -170,7 +179,8 @@ def scene_named(text: str, argument: str = "--scene") -> Scene:
 
     Raises
     ------
-    MisuseError : for a name, an option or a value that is none.
+    MisuseError
+        For a name, an option or a value that is none.
     """
     name, options = parsed(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
     if name not in SCENES:
@@ -190,7 +200,8 @@ def made(name: str, **options: Any) -> Scene:
 
     Raises
     ------
-    MisuseError : for a name or an option that is none, and for a value that cannot be.
+    MisuseError
+        For a name or an option that is none, and for a value that cannot be.
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
@@ -227,17 +238,24 @@ def disk(
 
     Parameters
     ----------
-    refine : parts that each side of each cell is divided into.
-    penalty : ε̂.
-    young, poisson : E of the disk, ν of both.
-    ratio : E of the foundation over E of the disk.
-    force : on top of the disk, per unit of thickness.
-    lowered : how deep the disk is pushed in the first guess; by default so deep that the contact is about as wide as in
-        the solution.
+    refine : int
+        Parts that each side of each cell is divided into.
+    penalty : float
+        Ε̂.
+    young, poisson : float
+        E of the disk, ν of both.
+    ratio : float
+        E of the foundation over E of the disk.
+    force : float
+        On top of the disk, per unit of thickness.
+    lowered : float | None
+        How deep the disk is pushed in the first guess; by default so deep that the contact is about as wide as
+        in the solution.
 
     Raises
     ------
-    MisuseError : for a force so large or a penalty so soft that the contact is wider than the meshes are fine.
+    MisuseError
+        For a force so large or a penalty so soft that the contact is wider than the meshes are fine.
     """
     problem = Problem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
     return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
@@ -260,14 +278,22 @@ def blocks(
 
     Parameters
     ----------
-    refine : parts that each segment and each layer is divided into.
-    penalty : ε̂; 10 E/h with the mean slave segment h by default.
-    young, poisson : E of the slave, ν of both.
-    ratio : E of the master over E of the slave.
-    pressure : on top; the scene's own by default.
-    degrees : by which all of it is turned, counter-clockwise.
-    sides : on rollers, or free to strain, so that the contact area changes.
-    lowered : how deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default.
+    refine : int
+        Parts that each segment and each layer is divided into.
+    penalty : float | None
+        Ε̂; 10 E/h with the mean slave segment h by default.
+    young, poisson : float
+        E of the slave, ν of both.
+    ratio : float
+        E of the master over E of the slave.
+    pressure : float | None
+        On top; the scene's own by default.
+    degrees : float
+        By which all of it is turned, counter-clockwise.
+    sides : Literal['rollers', 'free']
+        On rollers, or free to strain, so that the contact area changes.
+    lowered : float | None
+        How deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default.
     """
     drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure

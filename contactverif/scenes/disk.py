@@ -44,12 +44,18 @@ class Problem:
 
     Attributes
     ----------
-    radius : R, a length.
-    young : of disk and foundation, force per length squared.
-    poisson : of both.
-    force : F on top of the disk, per unit of thickness.
-    penalty : ε̂, force per length of the interface, per length of penetration.
-    width, depth : of the foundation, lengths; 2R and R by default.
+    radius : float
+        R, a length.
+    young : tuple[float, float]
+        Of disk and foundation, force per length squared.
+    poisson : float
+        Of both.
+    force : float
+        F on top of the disk, per unit of thickness.
+    penalty : float
+        Ε̂, force per length of the interface, per length of penetration.
+    width, depth : float
+        Of the foundation, lengths; 2R and R by default.
     """
 
     radius: float = 10.0
@@ -91,13 +97,16 @@ def disk_on_foundation(
 
     Parameters
     ----------
-    refine : parts that each side of each cell is divided into.
-    lowered : of the first guess, how deep the disk is pushed; by default a²/2R with the half-width a that Hertz on a
+    refine : int
+        Parts that each side of each cell is divided into.
+    lowered : float | None
+        Of the first guess, how deep the disk is pushed; by default a²/2R with the half-width a that Hertz on a
         Winkler layer has, so that what is in contact hardly changes afterwards.
 
     Raises
     ------
-    MisuseError : if the contact is wider, or very much narrower, than the meshes are made for.
+    MisuseError
+        If the contact is wider, or very much narrower, than the meshes are made for.
     """
     a = problem.half_width
     low, high = SLOPES[0] * problem.radius, SLOPES[1] * problem.radius
@@ -166,8 +175,10 @@ def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, 
 
     Parameters
     ----------
-    fine : segments within |x| ≤ fine are equally long, and are the contact edges; so are those of the block above.
-    refine : parts that each side of each cell is divided into.
+    fine : float
+        Segments within |x| ≤ fine are equally long, and are the contact edges; so are those of the block above.
+    refine : int
+        Parts that each side of each cell is divided into.
     """
     columns, rows, _ = (count * refine for count in SEGMENTS)
     arc = asin(fine / radius)
@@ -222,7 +233,8 @@ def graded(length: float, first: float, parts: int, steps: int) -> FloatArray:
 
     Raises
     ------
-    MisuseError : if parts as long as the first are too many for the length.
+    MisuseError
+        If parts as long as the first are too many for the length.
     """
     if not first * parts < length:
         raise MisuseError("graded: length", f"{length:g}", f"more than {parts} parts of {first:g}")

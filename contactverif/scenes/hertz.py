@@ -50,9 +50,11 @@ class Layered:
 
     Attributes
     ----------
-    half_width : of the contact, a length.
-    coefficients : (n,) of the pressure in Legendre polynomials of x over the half-width, force per length; even ones
-        alone are not 0.
+    half_width : float
+        Of the contact, a length.
+    coefficients : FloatArray, shape (n,)
+        Of the pressure in Legendre polynomials of x over the half-width, force per length; even ones alone are
+        not 0.
     """
 
     half_width: float
@@ -83,9 +85,12 @@ def on_layer(force: float, radius: float, stiffness: float, penalty: float, term
 
     Parameters
     ----------
-    force : F > 0, per unit of thickness.
-    radius, stiffness, penalty : R, E* and ε̂.
-    terms : polynomials.
+    force : float
+        F > 0, per unit of thickness.
+    radius, stiffness, penalty : float
+        R, E* and ε̂.
+    terms : int
+        Polynomials.
     """
     widest = _WIDEST * max(half_width(force, radius, stiffness), layer_half_width(force, radius, penalty))
 

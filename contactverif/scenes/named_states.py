@@ -31,7 +31,8 @@ def named_case(name: str) -> Case:
 
     Raises
     ------
-    MisuseError : if there is none; says which names are near.
+    MisuseError
+        If there is none; says which names are near.
     """
     if name in _FLAT:
         return _flat(name, *_FLAT[name])

@@ -38,7 +38,8 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
 
     Parameters
     ----------
-    interface : random meshes if None; else states of this one, moved along its normal.
+    interface : Interface | None
+        Random meshes if None; else states of this one, moved along its normal.
 
     Returns
     -------

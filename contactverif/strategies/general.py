@@ -46,7 +46,8 @@ def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 
     Parameters
     ----------
-    interface : random meshes if None; else random states of this one.
+    interface : Interface | None
+        Random meshes if None; else random states of this one.
     """
     return _general_cases(smooth=False) if interface is None else given_interface.states(interface, smooth=False)
 
@@ -76,13 +77,20 @@ class Broken:
 
     Attributes
     ----------
-    steps : of the master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
-    bend : the steepness of a rise of 1; walls are steep anyway.
-    slave : lengths along of the slave segments.
-    start : x of the slave's first node; the master's is at 0.
-    tilt : slope of the slave against the master, turned about its middle, flatter for long chains.
-    quarters, unit : penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
-    upright : walls do not lean.
+    steps : Sequence[tuple[float, int, int]]
+        Of the master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
+    bend : float
+        The steepness of a rise of 1; walls are steep anyway.
+    slave : Sequence[float]
+        Lengths along of the slave segments.
+    start : int
+        X of the slave's first node; the master's is at 0.
+    tilt : float
+        Slope of the slave against the master, turned about its middle, flatter for long chains.
+    quarters, unit : Sequence[int] or float
+        Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
+    upright : bool
+        Walls do not lean.
     """
 
     steps: Sequence[tuple[float, int, int]]

@@ -20,10 +20,13 @@ class Panel:
 
     Attributes
     ----------
-    slave, master : (n, 2) current positions in walking order, the body on the left: in +x and in −x if they are open
-        and the slave is on top.
-    reference : (n, 2) reference positions of the slave; the master is where it was.
-    closed : each chain's last point is joined to its first.
+    slave, master : FloatArray, shape (n, 2)
+        Current positions in walking order, the body on the left: in +x and in −x if they are open and the slave
+        is on top.
+    reference : FloatArray, shape (n, 2)
+        Reference positions of the slave; the master is where it was.
+    closed : bool
+        Each chain's last point is joined to its first.
     """
 
     slave: FloatArray
@@ -53,7 +56,8 @@ def assembled(panels: Sequence[Panel], motion: Motion, shuffle: int = 0) -> tupl
 
     Parameters
     ----------
-    shuffle : 0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
+    shuffle : int
+        0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
 
     Returns
     -------

@@ -68,9 +68,12 @@ class Motion:
 
     Attributes
     ----------
-    degrees : of the rotation Q, counter-clockwise; quarter turns are exact.
-    shift : in units of the lattice.
-    exponent : k.
+    degrees : int
+        Of the rotation Q, counter-clockwise; quarter turns are exact.
+    shift : tuple[int, int]
+        In units of the lattice.
+    exponent : int
+        k.
     """
 
     degrees: int = 0

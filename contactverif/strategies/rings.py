@@ -22,10 +22,14 @@ class Ring:
 
     Attributes
     ----------
-    slave, master : weights by which the segments share the angle.
-    degrees : the angle; 360 is closed.
-    inner_slave : the slave is the disc, else the hole around it.
-    quarters, unit : as of `Broken`, measured along the radius.
+    slave, master : Sequence[int]
+        Weights by which the segments share the angle.
+    degrees : int
+        The angle; 360 is closed.
+    inner_slave : bool
+        The slave is the disc, else the hole around it.
+    quarters, unit : Sequence[int] or float
+        As of `Broken`, measured along the radius.
     """
 
     slave: Sequence[int]

@@ -27,10 +27,14 @@ class Study:
 
     Attributes
     ----------
-    run : as `verify` would have found it, reference and candidates.
-    comparison : its numbers side by side.
-    differing : a case a property, the largest difference first.
-    costs : of an evaluation.
+    run : Run
+        As `verify` would have found it, reference and candidates.
+    comparison : Comparison
+        Its numbers side by side.
+    differing : tuple[Differing, ...]
+        A case a property, the largest difference first.
+    costs : tuple[Cost, ...]
+        Of an evaluation.
     """
 
     run: Run
@@ -55,11 +59,13 @@ def compared(
 
     Parameters
     ----------
-    profile, examples, seed, interface, scene, progress : as of `contactverif.run.runner.run`.
+    profile, examples, seed, interface, scene, progress
+        As of `contactverif.run.runner.run`.
 
     Raises
     ------
-    MisuseError : if the reference is a candidate too, or there is no candidate; and as `run`.
+    MisuseError
+        If the reference is a candidate too, or there is no candidate; and as `run`.
     """
     if not candidates:
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")

@@ -31,8 +31,10 @@ def measured(subjects: Sequence[Subject], cases: Sequence[Case] | None = None, t
 
     Parameters
     ----------
-    cases : the states; by default flat interfaces of `SEGMENTS` slave segments on three quarters as many.
-    turns : timed at least, behind one that is not. Who begins changes from turn to turn.
+    cases : Sequence[Case] | None
+        The states; by default flat interfaces of `SEGMENTS` slave segments on three quarters as many.
+    turns : int
+        Timed at least, behind one that is not. Who begins changes from turn to turn.
     """
     found: list[Cost] = []
     for case in cases if cases is not None else [state(n) for n in SEGMENTS]:

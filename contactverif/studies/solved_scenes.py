@@ -30,7 +30,8 @@ def solved(case: Case, subjects: Sequence[Subject | NotLoaded]) -> Solved:
 
     Raises
     ------
-    MisuseError : if the case holds no scene.
+    MisuseError
+        If the case holds no scene.
     """
     scene = scene_of(case)
     solutions, failures = [], {}

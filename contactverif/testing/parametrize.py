@@ -60,11 +60,15 @@ def parametrize_with_properties(
 
     Parameters
     ----------
-    formulations : names as on the command line, or factories `make(*, penalty)`.
-    properties : patterns of ids.
-    examples, seed, profile : how much is asked; `--contactverif-examples` and so on overrule them. The profile is
-        `dev` unless said otherwise.
-    known : {property id: why its failure is known}; an id that is not asked is an error, and so is one that passes.
+    formulations
+        Names as on the command line, or factories `make(*, penalty)`.
+    properties : Sequence[str]
+        Patterns of ids.
+    examples, seed, profile : int | None or str | None
+        How much is asked; `--contactverif-examples` and so on overrule them. The profile is `dev` unless said
+        otherwise.
+    known : Mapping[str, str] | None
+        {property id: why its failure is known}; an id that is not asked is an error, and so is one that passes.
     """
     if not formulations or not all(isinstance(one, str) or callable(one) for one in formulations):
         raise MisuseError("formulations", repr(formulations), "names or factories, at least one")
@@ -81,7 +85,8 @@ class Check:
 
     Attributes
     ----------
-    row : what was found, None before the call.
+    row : Row | None
+        What was found, None before the call.
     """
 
     subject: Subject | NotLoaded
@@ -109,7 +114,8 @@ class Check:
 
         Raises
         ------
-        AssertionError : if a promise is broken, something crashed, was not judged or did not load.
+        AssertionError
+            If a promise is broken, something crashed, was not judged or did not load.
         """
         __tracebackhide__ = True
         for part in (self.subject, self.question):
@@ -137,7 +143,8 @@ def checks(asked: Asked, options: Any, fresh_seed: int) -> list[Check]:
 
     Raises
     ------
-    MisuseError : on an unknown formulation, option, property, profile, or a known failure of no property asked.
+    MisuseError
+        On an unknown formulation, option, property, profile, or a known failure of no property asked.
     """
     questions = load_properties(asked.properties)
     ids = [_id(question) for question in questions]

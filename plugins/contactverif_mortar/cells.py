@@ -39,9 +39,12 @@ class Cells:
 
     Attributes
     ----------
-    slave, master : (n_cells,) the segments.
-    cut_low, cut_high : (n_cells,) a master node cuts the lower end (the second node) and the upper end (the first).
-    before, behind : (n_slave_segments,) the segments with which normals at the two ends are averaged, −1 none.
+    slave, master : IntArray, shape (n_cells,)
+        The segments.
+    cut_low, cut_high : BoolArray, shape (n_cells,)
+        A master node cuts the lower end (the second node) and the upper end (the first).
+    before, behind : IntArray, shape (n_slave_segments,)
+        The segments with which normals at the two ends are averaged, −1 none.
     """
 
     slave: IntArray
@@ -114,8 +117,10 @@ class Quadrature:
 
     Attributes
     ----------
-    places, weights : (n_q,) on [−1, 1], weights that add up to 1.
-    current : lengths are those of the current configuration, else of the reference.
+    places, weights : FloatArray, shape (n_q,)
+        On [−1, 1], weights that add up to 1.
+    current : bool
+        Lengths are those of the current configuration, else of the reference.
     """
 
     places: FloatArray

@@ -34,8 +34,10 @@ class ChenHisada:
 
     Attributes
     ----------
-    quadrature : the points on a cell, and where their lengths are measured.
-    tau : how far past a free end of the master a node's foot still counts, in lengths of its segment.
+    quadrature : Quadrature
+        The points on a cell, and where their lengths are measured.
+    tau : float
+        How far past a free end of the master a node's foot still counts, in lengths of its segment.
     """
 
     traits: Traits
@@ -159,9 +161,12 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : "current" or "reference", where lengths are measured.
-    tau : how far past a free end of the master the foot of a node still counts, in lengths of its segment.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    area : str
+        "current" or "reference", where lengths are measured.
+    tau : float
+        How far past a free end of the master the foot of a node still counts, in lengths of its segment.
     """
     current = chosen("area", area, AREAS)
     return ChenHisada(

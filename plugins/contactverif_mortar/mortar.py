@@ -73,7 +73,8 @@ class MortarMultipliers:
 
     Attributes
     ----------
-    penalty : c of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
+    penalty : float
+        C of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
     """
 
     traits: Traits
@@ -131,10 +132,13 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : "current" or "reference", where lengths are measured.
-    normals : "segment" (default), or "averaged" at slave nodes and interpolated in between, which is smoother and fails
-        the patch test on a kinked surface.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    area : str
+        "current" or "reference", where lengths are measured.
+    normals : str
+        "segment" (default), or "averaged" at slave nodes and interpolated in between, which is smoother and
+        fails the patch test on a kinked surface.
     """
     return Mortar(_traits(area, normals, False), check_penalty(penalty), _weighting(area, normals, False))
 
@@ -152,8 +156,10 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
 
     Parameters
     ----------
-    penalty : c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length; the solution does not depend on it.
-    area, normals : as for `mortar`.
+    penalty : float
+        c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length; the solution does not depend on it.
+    area, normals : str
+        As for `mortar`.
     """
     traits = _by_multipliers(_traits(area, normals, False))
     return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, False))

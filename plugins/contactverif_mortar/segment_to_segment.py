@@ -25,7 +25,8 @@ class SegmentToSegment:
 
     Attributes
     ----------
-    quadrature : the points on a cell, and where their lengths are measured.
+    quadrature : Quadrature
+        The points on a cell, and where their lengths are measured.
     """
 
     traits: Traits
@@ -78,8 +79,10 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : "current" or "reference", where lengths are measured.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    area : str
+        "current" or "reference", where lengths are measured.
     """
     return SegmentToSegment(
         Traits(

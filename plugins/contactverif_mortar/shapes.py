@@ -32,11 +32,16 @@ class Shapes:
 
     Attributes
     ----------
-    values : (n_states, n_points, 2) of the nodes A and B of the slave segment that a point is on.
-    slope : (n_states, n_points) Δ of the second for each unit of c; that of the first is the opposite.
-    by_mean, by_variance : (n_states, n_points) likewise for each unit of c̄ and v of the segment; zero if not dual.
-    centred, extent : (n_states, n_points) c − c̄, and ∫1 of the segment; dual only.
-    variance : (n_states, n_points) v.
+    values : Array, shape (n_states, n_points, 2)
+        Of the nodes A and B of the slave segment that a point is on.
+    slope : Array, shape (n_states, n_points)
+        Δ of the second for each unit of c; that of the first is the opposite.
+    by_mean, by_variance : Array, shape (n_states, n_points)
+        Likewise for each unit of c̄ and v of the segment; zero if not dual.
+    centred, extent : Array, shape (n_states, n_points)
+        C − c̄, and ∫1 of the segment; dual only.
+    variance : Array, shape (n_states, n_points)
+        v.
     """
 
     values: Array
@@ -103,10 +108,14 @@ class Rows:
 
     Attributes
     ----------
-    gains : (n_points, 5, n_local, 2), of `Quadrature.gains`.
-    shapes, points : of that one state, without the leading axis (n_states,).
-    segment, ends : (n_points,) and (n_points, 2) slave segment and slave nodes of each point.
-    nodes : (n_cells, n_local) of `Cells.local_nodes`.
+    gains : FloatArray, shape (n_points, 5, n_local, 2)
+        Of `Quadrature.gains`.
+    shapes, points : Shapes or FloatArray
+        Of that one state, without the leading axis (n_states,).
+    segment, ends : IntArray, shape (n_points,)
+        And (n_points, 2) slave segment and slave nodes of each point.
+    nodes : IntArray, shape (n_cells, n_local)
+        Of `Cells.local_nodes`.
     """
 
     gains: FloatArray

@@ -35,10 +35,14 @@ class Weighted:
 
     Attributes
     ----------
-    points : (n_states, n_points, 6), of `Quadrature.points`.
-    ends, segment : (n_points, 2) and (n_points,) slave nodes and slave segment of each.
-    nodes : (n_cells, n_local), of `Cells.local_nodes`.
-    areas, with_gap : (n_states, n_slave_nodes) ∫φ_j and ∫φ_j g.
+    points : Array, shape (n_states, n_points, 6)
+        Of `Quadrature.points`.
+    ends, segment : IntArray, shape (n_points, 2)
+        And (n_points,) slave nodes and slave segment of each.
+    nodes : IntArray, shape (n_cells, n_local)
+        Of `Cells.local_nodes`.
+    areas, with_gap : Array, shape (n_states, n_slave_nodes)
+        ∫φ_j and ∫φ_j g.
     """
 
     cells: Cells
@@ -61,9 +65,12 @@ class Weighting:
 
     Attributes
     ----------
-    averaged : normals are averaged at the slave nodes, else those of the segments.
-    dual : shapes are biorthogonal, else standard.
-    quadrature : the points on a cell, and where their lengths are measured.
+    averaged : bool
+        Normals are averaged at the slave nodes, else those of the segments.
+    dual : bool
+        Shapes are biorthogonal, else standard.
+    quadrature : Quadrature
+        The points on a cell, and where their lengths are measured.
     """
 
     averaged: bool

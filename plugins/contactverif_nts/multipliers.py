@@ -26,8 +26,10 @@ def nts_lm(*, penalty: float, tau: float = 1e-2) -> PointContact:
 
     Parameters
     ----------
-    penalty : scale c > 0 of the decision λ − c g ≥ 0, force per length.
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Scale c > 0 of the decision λ − c g ≥ 0, force per length.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     held = nts(penalty=penalty, tau=tau)
     witnesses = {**held.traits.witnesses, "patch": "b"}  # on A1 and A2 nodal forces are free to be the right ones
@@ -40,8 +42,10 @@ def vts_me_lm(*, penalty: float, n: int = 2, area: str = "current", tau: float =
 
     Parameters
     ----------
-    penalty : scale c > 0 of the decision λ − c g ≥ 0, force per length per length.
-    n, area, tau : as for `vts_me`.
+    penalty : float
+        Scale c > 0 of the decision λ − c g ≥ 0, force per length per length.
+    n, area, tau : int or str or float
+        As for `vts_me`.
     """
     held = vts_me(penalty=penalty, n=n, area=area, tau=tau)
     return replace(held, traits=_of_virtual_slave_nodes(held.traits, n))
@@ -58,9 +62,12 @@ def vts_ppt_lm(
 
     Parameters
     ----------
-    penalty : scale c > 0 of the decision λ − c g ≥ 0, force per length per length.
-    transmission : "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
-    n, free_end, tau : as for `vts_ppt` or `vts_ppt_balanced`, free_end with the default of the one chosen.
+    penalty : float
+        Scale c > 0 of the decision λ − c g ≥ 0, force per length per length.
+    transmission : str
+        "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
+    n, free_end, tau : int or str or float
+        As for `vts_ppt` or `vts_ppt_balanced`, free_end with the default of the one chosen.
     """
     springs = chosen("transmission", transmission, {"printed": vts_ppt, "balanced": vts_ppt_balanced})
     held = springs(penalty=penalty, n=n, tau=tau, **({"free_end": free_end} if free_end else {}))

@@ -19,7 +19,8 @@ def chosen(option: str, value: str, choices: Mapping[str, _Choice]) -> _Choice:
 
     Raises
     ------
-    MisuseError : if the word is none of the choices.
+    MisuseError
+        If the word is none of the choices.
     """
     if value not in choices:
         raise MisuseError(option, repr(value), " or ".join(map(repr, choices)))

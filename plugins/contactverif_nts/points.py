@@ -34,11 +34,16 @@ class PointContact:
 
     Attributes
     ----------
-    c, weight : (n_slots,) places on a slave segment in [−1, 1], and their shares of its length.
-    penalty : stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
-    at_nodes : the points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
-    area_from : eq6.NODAL, CURRENT or REFERENCE.
-    free_end : τ, how far past a free end of the master a foot still counts, in lengths of the segment.
+    c, weight : FloatArray, shape (n_slots,)
+        Places on a slave segment in [−1, 1], and their shares of its length.
+    penalty : float
+        Stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
+    at_nodes : bool
+        The points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
+    area_from : int
+        Eq6.NODAL, CURRENT or REFERENCE.
+    free_end : float
+        Τ, how far past a free end of the master a foot still counts, in lengths of the segment.
     """
 
     traits: Traits
@@ -148,8 +153,10 @@ def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
 
     Parameters
     ----------
-    penalty : nodal stiffness ε > 0, force per length.
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Nodal stiffness ε > 0, force per length.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     traits = _traits(False, "a1", "nodal", None, symmetric=True)
     return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, eq6.NODAL, at_nodes=True)
@@ -160,9 +167,12 @@ def nts_ar(*, penalty: float, area: str = "current", tau: float = 1e-2) -> Point
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : "current" or "reference", where lengths are measured.
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    area : str
+        "current" or "reference", where lengths are measured.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     area_from = chosen("area", area, AREAS)
     traits = _traits(False, "b", "distributed", area_from)
@@ -174,10 +184,14 @@ def vts_g(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e-
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : number of Gauss points a slave segment, ≥ 1.
-    area : "current" or "reference", where lengths are measured.
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    n : int
+        Number of Gauss points a slave segment, ≥ 1.
+    area : str
+        "current" or "reference", where lengths are measured.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     c, weights = np.polynomial.legendre.leggauss(check_count(n))
     area_from = chosen("area", area, AREAS)
@@ -190,10 +204,14 @@ def vts_me(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : number of virtual slave nodes a slave segment, ≥ 1; 2 are the quarter points.
-    area : "current" or "reference", where lengths are measured.
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    n : int
+        Number of virtual slave nodes a slave segment, ≥ 1; 2 are the quarter points.
+    area : str
+        "current" or "reference", where lengths are measured.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     n = check_count(n)
     area_from = chosen("area", area, AREAS)

@@ -52,12 +52,18 @@ class PatchTestPassing:
 
     Attributes
     ----------
-    penalty : stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
-    transmission : box3.PRINTED or box3.BALANCED.
-    consistent : the tangent is exact; else that of VTS-ME.
-    current_area : areas of competence are measured in the current configuration, else in the reference.
-    free_end : walk.TRUNCATE, EXTEND or COVER.
-    tau : how far past a free end of the master a foot still counts, in lengths of the segment.
+    penalty : float
+        Stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
+    transmission : int
+        Box3.PRINTED or box3.BALANCED.
+    consistent : bool
+        The tangent is exact; else that of VTS-ME.
+    current_area : bool
+        Areas of competence are measured in the current configuration, else in the reference.
+    free_end : int
+        Walk.TRUNCATE, EXTEND or COVER.
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of the segment.
     """
 
     traits: Traits
@@ -157,10 +163,14 @@ def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: floa
 
     Parameters
     ----------
-    penalty : distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : number of virtual slave nodes on a slave segment, ≥ 1; the paper has 2.
-    free_end : "truncate" (default), "extend" (Box 3 literally) or "cover".
-    tau : how far past a free end of the master a foot still counts, in lengths of its segment.
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    n : int
+        Number of virtual slave nodes on a slave segment, ≥ 1; the paper has 2.
+    free_end : str
+        "truncate" (default), "extend" (Box 3 literally) or "cover".
+    tau : float
+        How far past a free end of the master a foot still counts, in lengths of its segment.
     """
     return PatchTestPassing(
         traits=replace(_PRINTED, covers_overhang=free_end == "cover"),
@@ -192,8 +202,10 @@ def vts_ppt_balanced(
 
     Parameters
     ----------
-    area : "current" or "reference", where areas of competence are measured.
-    penalty, n, free_end, tau : as for `vts_ppt`; free_end is "cover" by default.
+    area : str
+        "current" or "reference", where areas of competence are measured.
+    penalty, n, free_end, tau : float or int or str
+        As for `vts_ppt`; free_end is "cover" by default.
     """
     current = chosen("area", area, AREAS) == CURRENT
     covers = free_end == "cover" or None  # else an overhang breaks the balance, and nothing is promised of it

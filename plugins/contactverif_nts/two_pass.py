@@ -30,9 +30,12 @@ class Pass:
 
     Attributes
     ----------
-    interface : with the roles that it has here.
-    places : (n_unknowns + n_multipliers of this pass,) where its unknowns are in z.
-    name : before the names of its pairing.
+    interface : Interface
+        With the roles that it has here.
+    places : IntArray, shape (n_unknowns + n_multipliers of this pass,)
+        Where its unknowns are in z.
+    name : str
+        Before the names of its pairing.
     """
 
     interface: Interface
@@ -136,8 +139,10 @@ def two_pass(*, penalty: float, inner: Callable[..., Any]) -> TwoPass:
 
     Parameters
     ----------
-    penalty : of both passes, in the formulation's own kind.
-    inner : factory `make(*, penalty)` of the formulation.
+    penalty : float
+        Of both passes, in the formulation's own kind.
+    inner : Callable[..., Any]
+        Factory `make(*, penalty)` of the formulation.
     """
     return TwoPass(Subject("inner", inner), penalty)
 

@@ -26,7 +26,8 @@ def excuse(
 
     Parameters
     ----------
-    errors : {"forces" or "tangent": largest error of an entry}, of what failed.
+    errors : dict[str, float]
+        {"forces" or "tangent": largest error of an entry}, of what failed.
     """
     directions = np.random.default_rng(case.seed).uniform(-1, 1, (4, case.z.size))
     directions /= np.abs(directions).max(axis=1, keepdims=True)
@@ -44,7 +45,8 @@ def jump(case: Case, formulation: CheckedFormulation, reach: float, directions: 
 
     Parameters
     ----------
-    directions : (n, n_unknowns), the largest entry of each 1.
+    directions : FloatArray, shape (n, n_unknowns)
+        The largest entry of each 1.
 
     Returns
     -------
@@ -79,7 +81,8 @@ def kink_within(
 
     Parameters
     ----------
-    direction : (n_unknowns,) largest entry 1, along which one-sided differences are taken if need be.
+    direction : FloatArray, shape (n_unknowns,)
+        Largest entry 1, along which one-sided differences are taken if need be.
     """
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, pairing, case.z)

@@ -29,8 +29,10 @@ def compute(told: Callable[[str], None] = lambda _: None, *, with_study: bool = 
 
     Parameters
     ----------
-    told : is told what comes next, a few words, `steps()` times.
-    with_study : of Example 2 on finer meshes, which takes most of the time.
+    told : Callable[[str], None]
+        Is told what comes next, a few words, `steps()` times.
+    with_study : bool
+        Of Example 2 on finer meshes, which takes most of the time.
     """
     told("force tables")
     tables = forces.tables()

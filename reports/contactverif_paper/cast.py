@@ -51,7 +51,8 @@ def subject(member: Member) -> Subject:
 
     Raises
     ------
-    MisuseError : if it does not load.
+    MisuseError
+        If it does not load.
     """
     found = load_formulation(member.formulation)
     if isinstance(found, NotLoaded):

@@ -32,12 +32,18 @@ class Pressed:
 
     Attributes
     ----------
-    formulation : as typed on the command line.
-    problem : of what.
-    converged : whether it is a solution.
-    iterations : linear systems solved, from the disk lowered to roundoff.
-    x, pressure : (n_points,) of the contact points from left to right; a length, and force per length.
-    half_width : of the contact, where the gap changes its sign, a length; NaN where it does not.
+    formulation : str
+        As typed on the command line.
+    problem : Problem
+        Of what.
+    converged : bool
+        Whether it is a solution.
+    iterations : int
+        Linear systems solved, from the disk lowered to roundoff.
+    x, pressure : FloatArray, shape (n_points,)
+        Of the contact points from left to right; a length, and force per length.
+    half_width : float
+        Of the contact, where the gap changes its sign, a length; NaN where it does not.
     """
 
     formulation: str
@@ -64,12 +70,15 @@ def pressed(formulation: str, problem: Problem = PAPER, refine: int = 1, lowered
 
     Parameters
     ----------
-    refine : how many times finer than the base meshes.
-    lowered : how deep the disk is pushed in the first guess, over what is about right.
+    refine : int
+        How many times finer than the base meshes.
+    lowered : float
+        How deep the disk is pushed in the first guess, over what is about right.
 
     Raises
     ------
-    MisuseError : if the formulation cannot be loaded, or as `disk_on_foundation` does.
+    MisuseError
+        If the formulation cannot be loaded, or as `disk_on_foundation` does.
     """
     subject = load_formulation(formulation)
     if not isinstance(subject, Subject):
@@ -110,7 +119,8 @@ def over_slopes(formulations: Sequence[str], slopes: Sequence[float], refine: in
 
     Parameters
     ----------
-    slopes : a/R, over that of the paper.
+    slopes : Sequence[float]
+        a/R, over that of the paper.
     """
     return [
         pressed(name, Problem(radius=PAPER.radius / slope, force=PAPER.force * slope), refine)
@@ -124,7 +134,8 @@ def difference(one: Pressed, other: Pressed) -> tuple[FloatArray, FloatArray]:
 
     Raises
     ------
-    MisuseError : if the two have not the same points.
+    MisuseError
+        If the two have not the same points.
     """
     if one.x.shape != other.x.shape:
         found = f"{len(one.x)} points of {one.formulation} and {len(other.x)} of {other.formulation}"

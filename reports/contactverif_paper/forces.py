@@ -64,8 +64,9 @@ def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple
 
     Raises
     ------
-    ArithmeticError : if a float is further from every rational with a small denominator than rounding explains:
-        256 units of roundoff of the largest force, since a force is the sum of a few dozen terms.
+    ArithmeticError
+        If a float is further from every rational with a small denominator than rounding explains: 256 units of
+        roundoff of the largest force, since a force is the sum of a few dozen terms.
     """
     floats = [float(value) for value in values]
     found = tuple(Fraction(value).limit_denominator(_LARGEST_DENOMINATOR) for value in floats)

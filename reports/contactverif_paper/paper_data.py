@@ -47,10 +47,14 @@ class Forces:
 
     Attributes
     ----------
-    slave, master : on the nodes from left to right, as they are transferred to the other surface.
-    points : at the virtual slave nodes, empty where the formulation says none.
-    rounding : largest difference of a computed float from its rational.
-    printed : what the paper prints for the master, empty where it is silent.
+    slave, master : tuple[Fraction, ...]
+        On the nodes from left to right, as they are transferred to the other surface.
+    points : tuple[Fraction, ...]
+        At the virtual slave nodes, empty where the formulation says none.
+    rounding : float
+        Largest difference of a computed float from its rational.
+    printed : tuple[Fraction, ...]
+        What the paper prints for the master, empty where it is silent.
     """
 
     member: Member
@@ -80,9 +84,12 @@ class Curve:
 
     Attributes
     ----------
-    x : (n_points,) reference coordinates, a length.
-    pressure : (n_points,) over the exact pressure.
-    at_points : at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
+    x : FloatArray, shape (n_points,)
+        Reference coordinates, a length.
+    pressure : FloatArray, shape (n_points,)
+        Over the exact pressure.
+    at_points : bool
+        At the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
     """
 
     member: Member
@@ -103,12 +110,18 @@ class Patch:
 
     Attributes
     ----------
-    scene : name of the scene on the command line.
-    pressures, meshes : numbers of the paper's figures.
-    printed : lower and upper end of the pressure axis that the paper prints.
-    close_up : the same of its close-up, None where there is none.
-    stiffness : ε̂ over E, per unit of length.
-    exact : the exact pressure, force per length.
+    scene : str
+        Name of the scene on the command line.
+    pressures, meshes : str
+        Numbers of the paper's figures.
+    printed : tuple[float, float]
+        Lower and upper end of the pressure axis that the paper prints.
+    close_up : tuple[float, float] | None
+        The same of its close-up, None where there is none.
+    stiffness : float
+        Ε̂ over E, per unit of length.
+    exact : float
+        The exact pressure, force per length.
     """
 
     scene: str
@@ -129,11 +142,16 @@ class PassTable:
 
     Attributes
     ----------
-    errors : (n_members, n_scenes); NaN where Newton did not end at a solution.
-    tolerances : (n_scenes,) of roundoff.
-    fails : errors above this are failures; nothing should lie between.
-    said : (n_members, n_scenes) 1 where the paper says that it passes, 0 where it says that it fails, −1 silent.
-    unequal : error and tolerance of VTS-PPT on Example 1bis with a foundation UNEQUAL times as stiff as the punch.
+    errors : FloatArray, shape (n_members, n_scenes)
+        ; NaN where Newton did not end at a solution.
+    tolerances : FloatArray, shape (n_scenes,)
+        Of roundoff.
+    fails : float
+        Errors above this are failures; nothing should lie between.
+    said : IntArray, shape (n_members, n_scenes)
+        1 where the paper says that it passes, 0 where it says that it fails, −1 silent.
+    unequal : tuple[float, float]
+        Error and tolerance of VTS-PPT on Example 1bis with a foundation UNEQUAL times as stiff as the punch.
     """
 
     members: tuple[Member, ...]
@@ -178,10 +196,14 @@ class Convergence:
 
     Attributes
     ----------
-    ratios : (n_ratios,) E of the master over E of the slave; histories[i] are those of ratios[i].
-    stiffness : (n_penalties,) ε̂ over E, times a unit of length.
-    radius : (n_penalties,) spectral radius of I − K_basic⁻¹ K_consistent at the solution.
-    rate : (n_penalties,) ratio of successive residuals that Newton's method shows.
+    ratios : FloatArray, shape (n_ratios,)
+        E of the master over E of the slave; histories[i] are those of ratios[i].
+    stiffness : FloatArray, shape (n_penalties,)
+        Ε̂ over E, times a unit of length.
+    radius : FloatArray, shape (n_penalties,)
+        Spectral radius of I − K_basic⁻¹ K_consistent at the solution.
+    rate : FloatArray, shape (n_penalties,)
+        Ratio of successive residuals that Newton's method shows.
     """
 
     scene: str
@@ -198,10 +220,14 @@ class Tangents:
 
     Attributes
     ----------
-    error : largest difference of K d from a complex step along d, over the largest entry of K d, over random d.
-    asymmetry : largest entry of K − Kᵀ over that of K.
-    order : of one Newton step towards the solution; infinite where one step is exact, NaN where nothing decides.
-    iterations : linear systems solved from the slave just touching to roundoff.
+    error : FloatArray
+        Largest difference of K d from a complex step along d, over the largest entry of K d, over random d.
+    asymmetry : FloatArray
+        Largest entry of K − Kᵀ over that of K.
+    order : FloatArray
+        Of one Newton step towards the solution; infinite where one step is exact, NaN where nothing decides.
+    iterations : IntArray
+        Linear systems solved from the slave just touching to roundoff.
     """
 
     scene: str
@@ -231,12 +257,17 @@ class Defects:
 
     Attributes
     ----------
-    force, moment : over the tilt (rad): |ΣR| over the slave's force, |Σ x×R| over that times the slave's length.
-    shift, sliding : over the position of the end of an area of competence past a master node (over the slave's
-        length), at a tilt of `sliding_tilt`: the force on the master over that on the slave.
-    jump : over the tilt (rad): largest jump of a nodal force there, over the slave's force.
-    jump_known : (n_tilts,) the same by formula, of the printed algorithm in that configuration.
-    free_end : over the part of a slave segment that overhangs: largest error of a stress over the pressure.
+    force, moment : Series
+        Over the tilt (rad): |ΣR| over the slave's force, |Σ x×R| over that times the slave's length.
+    shift, sliding : Series
+        Over the position of the end of an area of competence past a master node (over the slave's length), at a
+        tilt of `sliding_tilt`: the force on the master over that on the slave.
+    jump : Series
+        Over the tilt (rad): largest jump of a nodal force there, over the slave's force.
+    jump_known : FloatArray, shape (n_tilts,)
+        The same by formula, of the printed algorithm in that configuration.
+    free_end : Series
+        Over the part of a slave segment that overhangs: largest error of a stress over the pressure.
     """
 
     force: Series
@@ -254,11 +285,16 @@ class MultiplierRow:
 
     Attributes
     ----------
-    low, high : of the pressures λ (a nodal method: λ over the length that the node stands for) over the exact one.
-    deficiency : number of vanishing singular values of the last matrix.
-    error : of the stress, over the pressure; NaN without a solution.
-    stress, uniform : whether stress and multipliers are exact up to roundoff.
-    said : what the paper says of the stress: 1 passes, 0 fails, −1 silent.
+    low, high : float
+        Of the pressures λ (a nodal method: λ over the length that the node stands for) over the exact one.
+    deficiency : int
+        Number of vanishing singular values of the last matrix.
+    error : float
+        Of the stress, over the pressure; NaN without a solution.
+    stress, uniform : bool
+        Whether stress and multipliers are exact up to roundoff.
+    said : int
+        What the paper says of the stress: 1 passes, 0 fails, −1 silent.
     """
 
     member: Member
@@ -288,8 +324,10 @@ class DiskCurve:
 
     Attributes
     ----------
-    iterations : linear systems solved from a disk that is lowered about as far as it ends; −1 without a solution.
-    from_touching : the same from one that has hardly been lowered.
+    iterations : int
+        Linear systems solved from a disk that is lowered about as far as it ends; −1 without a solution.
+    from_touching : int
+        The same from one that has hardly been lowered.
     """
 
     member: Member
@@ -307,11 +345,16 @@ class DiskStudy:
 
     Attributes
     ----------
-    size : (n_meshes,) of an element in the middle, a length.
-    largest, half_width, iterations : (n_members, n_meshes).
-    slopes : over a/R, over that of the paper: largest pressure over that of Hertz on springs, less 1.
-    sizes : over the size of the foundation, over the one chosen: the same.
-    difference_x, difference : (n_points,) VTS-PPT minus VTS-ME on the second mesh.
+    size : FloatArray, shape (n_meshes,)
+        Of an element in the middle, a length.
+    largest, half_width, iterations : FloatArray or IntArray, shape (n_members, n_meshes)
+        .
+    slopes : Series
+        Over a/R, over that of the paper: largest pressure over that of Hertz on springs, less 1.
+    sizes : Series
+        Over the size of the foundation, over the one chosen: the same.
+    difference_x, difference : FloatArray, shape (n_points,)
+        VTS-PPT minus VTS-ME on the second mesh.
     """
 
     members: tuple[Member, ...]
@@ -331,7 +374,8 @@ class Disk:
 
     Attributes
     ----------
-    difference : (n_points,) VTS-PPT minus VTS-ME at `difference_x`.
+    difference : FloatArray, shape (n_points,)
+        VTS-PPT minus VTS-ME at `difference_x`.
     """
 
     scene: str
@@ -351,10 +395,14 @@ class Statement:
 
     Attributes
     ----------
-    figure : where in the paper.
-    says, found : in words.
-    verdict : how the two agree.
-    drawing : file name, without its suffix, of the figure here that shows it; empty if none does.
+    figure : str
+        Where in the paper.
+    says, found : str
+        In words.
+    verdict : Said
+        How the two agree.
+    drawing : str
+        File name, without its suffix, of the figure here that shows it; empty if none does.
     """
 
     figure: str

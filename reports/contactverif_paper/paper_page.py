@@ -55,7 +55,8 @@ def check_folder(folder: Path, argument: str = "--out") -> None:
 
     Raises
     ------
-    MisuseError : if it cannot be made or written to.
+    MisuseError
+        If it cannot be made or written to.
     """
     made_folder(folder, argument)
     for name in (NUMBERS, PAGE):
@@ -69,7 +70,8 @@ def write(
 
     Raises
     ------
-    MisuseError : as `check_folder`.
+    MisuseError
+        As `check_folder`.
     """
     check_folder(folder, argument)
     written = [folder / NUMBERS]

@@ -16,7 +16,8 @@ def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument
 
     Raises
     ------
-    MisuseError : if it does not.
+    MisuseError
+        If it does not.
     """
     target = Path(path)
     if target.suffix.lower() not in suffixes:
@@ -29,12 +30,15 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--report", for
 
     Parameters
     ----------
-    argument : how the caller calls the path.
-    form : what a name of such a file looks like.
+    argument : str
+        How the caller calls the path.
+    form : str
+        What a name of such a file looks like.
 
     Raises
     ------
-    MisuseError : if there is no such folder, nothing may be written there, or the path is no ordinary file.
+    MisuseError
+        If there is no such folder, nothing may be written there, or the path is no ordinary file.
     """
     found = os.fspath(path)
     target = Path(path).resolve()
@@ -63,7 +67,8 @@ def made_folder(folder: Path, argument: str) -> None:
 
     Raises
     ------
-    MisuseError : if it cannot be made.
+    MisuseError
+        If it cannot be made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

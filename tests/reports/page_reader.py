@@ -22,10 +22,14 @@ class Page(HTMLParser):
 
     Attributes
     ----------
-    errors : what is not nested as it was opened.
-    ids : in their order, twice if they are there twice.
-    links : targets of every `href`, `src` and `url(…)`.
-    text : of the page, style sheets left out, spaces made one.
+    errors
+        What is not nested as it was opened.
+    ids
+        In their order, twice if they are there twice.
+    links
+        Targets of every `href`, `src` and `url(…)`.
+    text
+        Of the page, style sheets left out, spaces made one.
     """
 
     def __init__(self, html: str) -> None:

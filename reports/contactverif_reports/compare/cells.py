@@ -27,17 +27,26 @@ class Cell:
 
     Attributes
     ----------
-    formulation, property_id : as typed on the command line.
-    verdict, promise, unexpected, reason, planned : as of `contactverif.contract.result.Row`.
-    verdicts : (n_cases,) of the random cases, codes of `Verdict`.
-    margins : (n_cases,) the quantity that went furthest towards its tolerance or beyond, over it (the inverse where it
-        must be at least that): above 1 fails. Infinite where it fails without such a number (a crash, a NaN, a breach);
+    formulation, property_id : str
+        As typed on the command line.
+    verdict, promise, unexpected, reason, planned : Verdict or bool | None or str or int
+        As of `contactverif.contract.result.Row`.
+    verdicts : IntArray, shape (n_cases,)
+        Of the random cases, codes of `Verdict`.
+    margins : FloatArray, shape (n_cases,)
+        The quantity that went furthest towards its tolerance or beyond, over it (the inverse where it must be
+        at least that): above 1 fails. Infinite where it fails without such a number (a crash, a NaN, a breach);
         NaN where nothing was decided or measured.
-    orders : (n_cases,) order of one Newton step; empty where the property measures none.
-    details : {name: (n_cases,)} further numbers.
-    worst_value, worst_quantity : the number with the largest margin, in its own unit; NaN and empty if there is none.
-    kinds : (n_cases, 5) numbers of segments, penalty, largest coordinate, shortest segment: equal for equal cases.
-    seconds : median of what judging a case took, so that the first one, in which kernels compile, does not count.
+    orders : FloatArray, shape (n_cases,)
+        Order of one Newton step; empty where the property measures none.
+    details : Mapping[str, FloatArray]
+        {name: (n_cases,)} further numbers.
+    worst_value, worst_quantity : float or str
+        The number with the largest margin, in its own unit; NaN and empty if there is none.
+    kinds : FloatArray, shape (n_cases, 5)
+        Numbers of segments, penalty, largest coordinate, shortest segment: equal for equal cases.
+    seconds : float
+        Median of what judging a case took, so that the first one, in which kernels compile, does not count.
     """
 
     formulation: str
@@ -161,12 +170,16 @@ class Paired:
 
     Attributes
     ----------
-    n, better, equal, worse : numbers of cases.
-    ratio : median over the cases of the one's margin over the other's, where one within its tolerance counts as at it:
-        below it all is roundoff. NaN where there is none.
-    decades : (n_cases,) how many powers of ten beyond the tolerance the one is further than the other; within it counts
-        as at it. Negative where the other is further, NaN where one of them is undecided.
-    apart : (n_cases,) one passes and the other does not.
+    n, better, equal, worse : int
+        Numbers of cases.
+    ratio : float
+        Median over the cases of the one's margin over the other's, where one within its tolerance counts as at
+        it: below it all is roundoff. NaN where there is none.
+    decades : FloatArray, shape (n_cases,)
+        How many powers of ten beyond the tolerance the one is further than the other; within it counts as at
+        it. Negative where the other is further, NaN where one of them is undecided.
+    apart : BoolArray, shape (n_cases,)
+        One passes and the other does not.
     """
 
     n: int

@@ -28,11 +28,16 @@ class Iterations:
 
     Attributes
     ----------
-    what : empty, or which of several solutions of a case.
-    solved, converged : numbers of cases.
-    median, most : of the iterations of those that converged; NaN where none did.
-    fewer, same, more : numbers of cases, of those where the reference converged too, against it.
-    order : median order of one step, NaN where it was not measured.
+    what : str
+        Empty, or which of several solutions of a case.
+    solved, converged : int
+        Numbers of cases.
+    median, most : float
+        Of the iterations of those that converged; NaN where none did.
+    fewer, same, more : int
+        Numbers of cases, of those where the reference converged too, against it.
+    order : float
+        Median order of one step, NaN where it was not measured.
     """
 
     formulation: str
@@ -59,14 +64,22 @@ class Comparison:
 
     Attributes
     ----------
-    reference : the formulation that the others are held against.
-    formulations : all of them, the reference first.
-    properties : ids, in the order of the run.
-    cells : by (formulation, property).
-    paired : by (candidate, property), where both decided some case.
-    iterations : of Newton's method, property by property.
-    not_loaded : {name: reason} of what could not be asked.
-    provenance : of the run.
+    reference : str
+        The formulation that the others are held against.
+    formulations : tuple[str, ...]
+        All of them, the reference first.
+    properties : tuple[str, ...]
+        Ids, in the order of the run.
+    cells : Mapping[tuple[str, str], Cell]
+        By (formulation, property).
+    paired : Mapping[tuple[str, str], Paired]
+        By (candidate, property), where both decided some case.
+    iterations : tuple[Iterations, ...]
+        Of Newton's method, property by property.
+    not_loaded : Mapping[str, str]
+        {name: reason} of what could not be asked.
+    provenance : Mapping[str, str]
+        Of the run.
     """
 
     reference: str
@@ -120,9 +133,12 @@ class Cost:
 
     Attributes
     ----------
-    n_segments : of the slave.
-    seconds : {"pair", "residual", "tangent"}.
-    failed : empty, or why it could not be timed.
+    n_segments : int
+        Of the slave.
+    seconds : dict[str, float]
+        {"pair", "residual", "tangent"}.
+    failed : str
+        Empty, or why it could not be timed.
     """
 
     formulation: str
@@ -143,14 +159,21 @@ class Differing:
 
     Attributes
     ----------
-    question : the property.
-    formulation : the candidate.
-    number : of the case in the run.
-    apart : one passes and the other does not.
-    decades : powers of ten beyond the tolerance that the candidate is further than the reference; negative where the
+    question : Property
+        The property.
+    formulation : str
+        The candidate.
+    number : int
+        Of the case in the run.
+    apart : bool
+        One passes and the other does not.
+    decades : float
+        Powers of ten beyond the tolerance that the candidate is further than the reference; negative where the
         reference is further.
-    margin, reference_margin : how far each went, over its tolerance.
-    outcome, reference_outcome : of the case.
+    margin, reference_margin : float
+        How far each went, over its tolerance.
+    outcome, reference_outcome : Outcome
+        Of the case.
     """
 
     question: Property

@@ -50,10 +50,14 @@ class Change:
 
     Attributes
     ----------
-    old, new : what was found.
-    paired : the new beside the old, case by case; None where the cases are not the same.
-    regressions : in words; empty where nothing got worse.
-    noteworthy : in words, what is worth a look and no regression.
+    old, new : Cell
+        What was found.
+    paired : Paired | None
+        The new beside the old, case by case; None where the cases are not the same.
+    regressions : tuple[str, ...]
+        In words; empty where nothing got worse.
+    noteworthy : tuple[str, ...]
+        In words, what is worth a look and no regression.
     """
 
     old: Cell
@@ -79,9 +83,12 @@ class Changes:
 
     Attributes
     ----------
-    changes : rows that both have.
-    gone, added : what only the old, only the new report asked: names of formulations, ids of properties, or rows.
-    lost : {name: reason} of what the old report asked, and the new one could not load.
+    changes : tuple[Change, ...]
+        Rows that both have.
+    gone, added : tuple[str, ...]
+        What only the old, only the new report asked: names of formulations, ids of properties, or rows.
+    lost : Mapping[str, str]
+        {name: reason} of what the old report asked, and the new one could not load.
     """
 
     old: StoredCells

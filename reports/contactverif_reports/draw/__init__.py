@@ -25,15 +25,20 @@ def figure(
 
     Parameters
     ----------
-    case : what to draw.
-    path : file to write, replaced if it is there.
-    title : above the picture, wrapped.
-    forces, exact : nodal forces (n_nodes, 2) or (n_unknowns,) as they act on the nodes (minus the residual), found
-        and right; drawn as arrows of one scale.
+    case : Case
+        What to draw.
+    path : str | os.PathLike[str]
+        File to write, replaced if it is there.
+    title : str
+        Above the picture, wrapped.
+    forces, exact : FloatArray | None
+        Nodal forces (n_nodes, 2) or (n_unknowns,) as they act on the nodes (minus the residual), found and
+        right; drawn as arrows of one scale.
 
     Raises
     ------
-    MisuseError : if the file cannot be written, or is to be of another kind.
+    MisuseError
+        If the file cannot be written, or is to be of another kind.
     """
     from contactverif_reports.draw.case_figure import draw  # matplotlib takes its time
 

@@ -121,7 +121,8 @@ def save(figure: Figure, target: Path) -> None:
 
     Raises
     ------
-    MisuseError : if the file cannot be written.
+    MisuseError
+        If the file cannot be written.
     """
     suffix = target.suffix.lower()
     metadata = {"Date": None} if suffix == ".svg" else {"Software": None}

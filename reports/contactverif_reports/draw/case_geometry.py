@@ -22,11 +22,16 @@ class Course:
 
     Attributes
     ----------
-    direction : (2,) unit vector along which the slave runs, with its body on the left.
-    along, above : (n_nodes,) coordinates of the nodes along it and to its left, a length each.
-    rise : largest difference of `above` within a surface, a length.
-    roundoff : below which a length is rounding of the coordinates.
-    straight : whether each slave segment runs along `direction` and each master segment against it.
+    direction : FloatArray, shape (2,)
+        Unit vector along which the slave runs, with its body on the left.
+    along, above : FloatArray, shape (n_nodes,)
+        Coordinates of the nodes along it and to its left, a length each.
+    rise : float
+        Largest difference of `above` within a surface, a length.
+    roundoff : float
+        Below which a length is rounding of the coordinates.
+    straight : bool
+        Whether each slave segment runs along `direction` and each master segment against it.
     """
 
     direction: FloatArray
@@ -82,9 +87,12 @@ class Gaps:
 
     Attributes
     ----------
-    gap : (n_slave_nodes,) a length, negative in penetration.
-    normal : (n_slave_nodes, 2) of that segment, out of the master.
-    facing : (n_slave_nodes,) False where the node lies beyond an end of the master surface.
+    gap : FloatArray, shape (n_slave_nodes,)
+        A length, negative in penetration.
+    normal : FloatArray, shape (n_slave_nodes, 2)
+        Of that segment, out of the master.
+    facing : BoolArray, shape (n_slave_nodes,)
+        False where the node lies beyond an end of the master surface.
     """
 
     gap: FloatArray

@@ -40,13 +40,17 @@ def draw_solved(solved: Solved, path: str | os.PathLike[str], *, title: str = ""
 
     Parameters
     ----------
-    solved : with at least one solution.
-    path : file to write, replaced if it is there.
-    title : above the picture, wrapped.
+    solved : Solved
+        With at least one solution.
+    path : str | os.PathLike[str]
+        File to write, replaced if it is there.
+    title : str
+        Above the picture, wrapped.
 
     Raises
     ------
-    MisuseError : if the file cannot be written, or is to be of another kind.
+    MisuseError
+        If the file cannot be written, or is to be of another kind.
     """
     target = checked_name(path, SUFFIXES)
     with matplotlib.rc_context(_SMALL):

@@ -25,10 +25,14 @@ class PointPressures:
 
     Attributes
     ----------
-    segment : (n_points,) the slave segment that carries the point.
-    c : (n_points,) where on it, −1 at its first node, +1 at its second.
-    area : (n_points, 2) the ends of the area of competence, as `c`; NaN where the plugin does not say.
-    pressure : (n_points,) force per length, ≥ 0; NaN where there is none.
+    segment : IntArray, shape (n_points,)
+        The slave segment that carries the point.
+    c : FloatArray, shape (n_points,)
+        Where on it, −1 at its first node, +1 at its second.
+    area : FloatArray, shape (n_points, 2)
+        The ends of the area of competence, as `c`; NaN where the plugin does not say.
+    pressure : FloatArray, shape (n_points,)
+        Force per length, ≥ 0; NaN where there is none.
     """
 
     segment: IntArray
@@ -43,19 +47,31 @@ class Solution:
 
     Attributes
     ----------
-    formulation : as typed on the command line.
-    end : how the solution ended, in a few words: "converged", "2-cycle", …
-    converged : whether the last iterate is a solution.
-    displacements : of the nodes of each body (n_nodes, 2), global axes, a length.
-    stresses : of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per length².
-    z : (n_unknowns,) positions of the interface, flat.
-    forces : (n_nodes, 2) contact forces on the nodes of the interface; NaN where the plugin gives none.
-    residuals, energies, floors, factors : (n_iterates,) as in a trace: the largest force that is not in balance, the
-        energy of the step from there (NaN at the last), the residual's own roundoff, and the share of the loads.
-    points : None where the plugin does not provide them or gives forces instead of pressures.
-    pressure : the exact contact pressure p; NaN where it is not known or not the same everywhere.
-    stress_error : largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
-    remark : what did not come out as it should, empty if all did.
+    formulation : str
+        As typed on the command line.
+    end : str
+        How the solution ended, in a few words: "converged", "2-cycle", ….
+    converged : bool
+        Whether the last iterate is a solution.
+    displacements : tuple[FloatArray, ...]
+        Of the nodes of each body (n_nodes, 2), global axes, a length.
+    stresses : tuple[FloatArray, ...]
+        Of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per length².
+    z : FloatArray, shape (n_unknowns,)
+        Positions of the interface, flat.
+    forces : FloatArray, shape (n_nodes, 2)
+        Contact forces on the nodes of the interface; NaN where the plugin gives none.
+    residuals, energies, floors, factors : FloatArray, shape (n_iterates,)
+        As in a trace: the largest force that is not in balance, the energy of the step from there (NaN at the
+        last), the residual's own roundoff, and the share of the loads.
+    points : PointPressures | None
+        None where the plugin does not provide them or gives forces instead of pressures.
+    pressure : float
+        The exact contact pressure p; NaN where it is not known or not the same everywhere.
+    stress_error : float
+        Largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
+    remark : str
+        What did not come out as it should, empty if all did.
     """
 
     formulation: str
@@ -86,12 +102,17 @@ class Solved:
 
     Attributes
     ----------
-    case : the interface, before it is solved.
-    bodies : all of them.
-    on_interface : for each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can
-        touch nothing.
-    solutions : at least one.
-    failures : {formulation: why there is no solution}, a line each.
+    case : Case
+        The interface, before it is solved.
+    bodies : tuple[Body, ...]
+        All of them.
+    on_interface : tuple[IntArray, ...]
+        For each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can touch
+        nothing.
+    solutions : tuple[Solution, ...]
+        At least one.
+    failures : Mapping[str, str]
+        {formulation: why there is no solution}, a line each.
     """
 
     case: Case

@@ -27,7 +27,8 @@ def write_vtu(solved: Solved, solution: Solution, path: str | os.PathLike[str]) 
 
     Raises
     ------
-    MisuseError : if the file cannot be written, or its name ends otherwise.
+    MisuseError
+        If the file cannot be written, or its name ends otherwise.
     """
     import meshio
 

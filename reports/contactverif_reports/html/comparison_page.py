@@ -30,9 +30,12 @@ class Drawing:
 
     Attributes
     ----------
-    candidate, reference : nodal forces (n_nodes, 2) that they find.
-    exact : the exact ones.
-    solved : a case with bodies, solved by both; it is drawn instead of the forces at its first guess.
+    candidate, reference : FloatArray | None
+        Nodal forces (n_nodes, 2) that they find.
+    exact : FloatArray | None
+        The exact ones.
+    solved : Solved | None
+        A case with bodies, solved by both; it is drawn instead of the forces at its first guess.
     """
 
     candidate: FloatArray | None = None

@@ -56,7 +56,8 @@ def check_page(path: str | os.PathLike[str], argument: str = "--html") -> None:
 
     Raises
     ------
-    MisuseError : as `write_page`.
+    MisuseError
+        As `write_page`.
     """
     checked_name(path, SUFFIXES, argument)
     check_writable(path, argument, "FILE.html")
@@ -67,11 +68,13 @@ def write_page(path: str | os.PathLike[str], html: str, argument: str = "--html"
 
     Parameters
     ----------
-    argument : how the caller calls the path.
+    argument : str
+        How the caller calls the path.
 
     Raises
     ------
-    MisuseError : if the name is no page's, or the file cannot be written.
+    MisuseError
+        If the name is no page's, or the file cannot be written.
     """
     check_page(path, argument)
     try:
@@ -89,7 +92,8 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
 
     Parameters
     ----------
-    label : what a reader hears who does not see it; without one the figure is decoration beside its caption.
+    label : str
+        What a reader hears who does not see it; without one the figure is decoration beside its caption.
     """
     import matplotlib
 

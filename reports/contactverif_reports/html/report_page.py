@@ -30,12 +30,18 @@ class Example:
 
     Attributes
     ----------
-    id, stored : of the report.
-    unexpected : why it makes the run fail, empty if it does not.
-    figure : empty where `text` draws it.
-    numbers : against their tolerances.
-    reason : why it fails, where the numbers do not say it.
-    replay : the command that judges it again.
+    id, stored : str or StoredCase
+        Of the report.
+    unexpected : str
+        Why it makes the run fail, empty if it does not.
+    figure : Markup
+        Empty where `text` draws it.
+    numbers : tuple[Held, ...]
+        Against their tolerances.
+    reason : str
+        Why it fails, where the numbers do not say it.
+    replay : str
+        The command that judges it again.
     """
 
     id: str
@@ -67,9 +73,12 @@ class Section:
 
     Attributes
     ----------
-    number : from 1, for anchors.
-    open : shown without being asked for.
-    missing : parts of the contract that it does not provide.
+    number : int
+        From 1, for anchors.
+    open : bool
+        Shown without being asked for.
+    missing : tuple[str, ...]
+        Parts of the contract that it does not provide.
     """
 
     formulation: str

@@ -28,10 +28,14 @@ class StoredCase:
 
     Attributes
     ----------
-    case : equal to the one that was judged, bit by bit.
-    formulation, property_id : as typed on the command line.
-    verdict, reason : what was found then.
-    values, tolerances : {quantity: number}, in the units of the property; empty where nothing was measured.
+    case : Case
+        Equal to the one that was judged, bit by bit.
+    formulation, property_id : str
+        As typed on the command line.
+    verdict, reason : Verdict or str
+        What was found then.
+    values, tolerances : Mapping[str, float]
+        {quantity: number}, in the units of the property; empty where nothing was measured.
     """
 
     case: Case
@@ -48,7 +52,8 @@ def case_ids(path: str | os.PathLike[str]) -> list[str]:
 
     Raises
     ------
-    MisuseError : if the file is not there, no netCDF file, or no report of this schema.
+    MisuseError
+        If the file is not there, no netCDF file, or no report of this schema.
     """
     with opened(path) as report:
         return list(_group(report, schema.COUNTEREXAMPLES, path).groups)
@@ -59,7 +64,8 @@ def read_case(path: str | os.PathLike[str], case_id: str) -> StoredCase:
 
     Raises
     ------
-    MisuseError : as `case_ids`, and if there is no such id.
+    MisuseError
+        As `case_ids`, and if there is no such id.
     """
     with opened(path) as report:
         groups = _group(report, schema.COUNTEREXAMPLES, path).groups
@@ -73,7 +79,8 @@ def read_cases(path: str | os.PathLike[str]) -> dict[str, StoredCase]:
 
     Raises
     ------
-    MisuseError : as `case_ids`.
+    MisuseError
+        As `case_ids`.
     """
     with opened(path) as report:
         groups = _group(report, schema.COUNTEREXAMPLES, path).groups
@@ -102,7 +109,8 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
 
     Raises
     ------
-    MisuseError : if the file is not there, no netCDF file, or no report of this schema; and if something is missing or
+    MisuseError
+        If the file is not there, no netCDF file, or no report of this schema; and if something is missing or
         damaged in what is read of it within the block.
     """
     import netCDF4

@@ -28,9 +28,12 @@ class StoredProperty:
 
     Attributes
     ----------
-    id : as typed with --property.
-    summary : what is asked.
-    quantities : what is measured, with units, formulas and their reasons.
+    id : str
+        As typed with --property.
+    summary : str
+        What is asked.
+    quantities : tuple[Quantity, ...]
+        What is measured, with units, formulas and their reasons.
     """
 
     id: str
@@ -63,9 +66,12 @@ class StoredWitness:
 
     Attributes
     ----------
-    name : of the case.
-    verdict, reason : how it came out.
-    numbers : what was measured.
+    name : str
+        Of the case.
+    verdict, reason : Verdict or str
+        How it came out.
+    numbers : tuple[Held, ...]
+        What was measured.
     """
 
     name: str
@@ -80,13 +86,21 @@ class StoredRow:
 
     Attributes
     ----------
-    cell : verdicts and margins by case, and the verdict over all.
-    known : why a failure is known, empty if it is not.
-    worst : the number that went furthest towards its tolerance among the random cases; None where nothing was measured.
-    silences : {reason: number of cases} of the cases that were not decided.
-    witness : None where the promise names none.
-    seconds : spent judging, shrinking excluded; NaN where the report does not say.
-    n_quantities : how many the property has.
+    cell : Cell
+        Verdicts and margins by case, and the verdict over all.
+    known : str
+        Why a failure is known, empty if it is not.
+    worst : Held | None
+        The number that went furthest towards its tolerance among the random cases; None where nothing was
+        measured.
+    silences : Mapping[str, int]
+        {reason: number of cases} of the cases that were not decided.
+    witness : StoredWitness | None
+        None where the promise names none.
+    seconds : float
+        Spent judging, shrinking excluded; NaN where the report does not say.
+    n_quantities : int
+        How many the property has.
     """
 
     cell: Cell
@@ -115,15 +129,24 @@ class StoredReport:
 
     Attributes
     ----------
-    path : as the caller wrote it.
-    passed : whether every promise was kept and every property judged.
-    formulations : in the order of the run.
-    properties : by id, in the order of the run.
-    rows : by (formulation, property), those that were asked.
-    provided : {formulation: {part of the contract: provided}}.
-    not_loaded : {name: reason} of plugins that did not load.
-    examples : {id: counterexample}.
-    provenance : the other root attributes: versions, seed, commit, …
+    path : str
+        As the caller wrote it.
+    passed : bool
+        Whether every promise was kept and every property judged.
+    formulations : tuple[str, ...]
+        In the order of the run.
+    properties : Mapping[str, StoredProperty]
+        By id, in the order of the run.
+    rows : Mapping[tuple[str, str], StoredRow]
+        By (formulation, property), those that were asked.
+    provided : Mapping[str, Mapping[str, bool]]
+        {formulation: {part of the contract: provided}}.
+    not_loaded : Mapping[str, str]
+        {name: reason} of plugins that did not load.
+    examples : Mapping[str, StoredCase]
+        {id: counterexample}.
+    provenance : Mapping[str, str]
+        The other root attributes: versions, seed, commit, ….
     """
 
     path: str
@@ -151,7 +174,8 @@ def read_report(path: str | os.PathLike[str]) -> StoredReport:
 
     Raises
     ------
-    MisuseError : if the file is not there, no netCDF file, no report of this schema, or damaged.
+    MisuseError
+        If the file is not there, no netCDF file, no report of this schema, or damaged.
     """
     found = os.fspath(path)
     cells = read_cells(path)

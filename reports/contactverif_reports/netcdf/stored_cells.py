@@ -26,11 +26,16 @@ class StoredCells:
 
     Attributes
     ----------
-    path : as the caller wrote it.
-    cells : by (formulation, property), those that were asked.
-    formulations, properties : in the order of the report.
-    not_loaded : {name: reason}.
-    provenance : root attributes.
+    path : str
+        As the caller wrote it.
+    cells : Mapping[tuple[str, str], Cell]
+        By (formulation, property), those that were asked.
+    formulations, properties : tuple[str, ...]
+        In the order of the report.
+    not_loaded : Mapping[str, str]
+        {name: reason}.
+    provenance : Mapping[str, str]
+        Root attributes.
     """
 
     path: str
@@ -54,7 +59,8 @@ def read_cells(path: str | os.PathLike[str]) -> StoredCells:
 
     Raises
     ------
-    MisuseError : if the file is not there, no netCDF file, no report of this schema, or damaged.
+    MisuseError
+        If the file is not there, no netCDF file, no report of this schema, or damaged.
     """
     found = os.fspath(path)
     with opened(path) as report:

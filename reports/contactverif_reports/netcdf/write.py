@@ -15,7 +15,8 @@ def write(run: Run, path: str | os.PathLike[str]) -> None:
 
     Raises
     ------
-    MisuseError : if the path cannot be written; the same as `check_writable`.
+    MisuseError
+        If the path cannot be written; the same as `check_writable`.
     """
     from contactverif_reports.netcdf.tree import tree_of
 
