@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from contactverif.mechanics.scene import Scene
     from contactverif.meshes.mesh_file import read_interface
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import judge_case, run
+    from contactverif.run.runner import judge_case
+    from contactverif.run.runner import run as verify
     from contactverif.scenes.catalogue import scene_named
 
 __version__ = "0.1.0"
@@ -42,9 +43,10 @@ _HOMES = {
     "mechanics.scene": ("Scene",),
     "meshes.mesh_file": ("read_interface",),
     "run.registry": ("load_formulation", "load_properties"),
-    "run.runner": ("judge_case", "run"),
+    "run.runner": ("judge_case", "verify"),
     "scenes.catalogue": ("scene_named",),
 }
+_NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
@@ -77,16 +79,16 @@ __all__ = [
     "load_formulation",
     "load_properties",
     "read_interface",
-    "run",
     "scene_named",
     "solve",
+    "verify",
 ]
 
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_OF[name]), name)
+    return getattr(import_module(_MODULE_OF[name]), _NAMES_AT_HOME.get(name, name))
 
 
 def __dir__() -> list[str]:
