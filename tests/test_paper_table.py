@@ -18,6 +18,7 @@ from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 
 FAILS = 1e-2  # of the pressure
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")
@@ -45,26 +46,20 @@ PRINTED = [name for name, drawing in catalogue.BLOCKS.items() if drawing.source]
 GROUPS = (ELASTIC_A, ("b", "example-1"), ("c", "c-prime", "example-1bis"))
 
 
-def roundoff(name: str) -> float:
-    """Of a stress over the pressure: 1e-11 + 1e-13 ε̂h/E + 5e-15 over the smallest ratio of segments."""
-    drawing = catalogue.BLOCKS[name]
-    lengths = [*drawing.slave, *drawing.master]
-    return 1e-11 + 1e-13 * catalogue.MODERATE + 5e-15 * max(lengths) / min(lengths)
+def tolerance_of(name: str) -> float:
+    """Return what roundoff may make of the stress in a named scene, over the pressure."""
+    scene = catalogue.made(name)
+    return condition_tolerance(scene, scene.penalty)
 
 
-def stress_error(formulation: str, name: str) -> float:
-    """Largest error of a stress at a Gauss point, over the pressure."""
+def error_of(formulation: str, name: str) -> float:
+    """Return the largest error of a stress at a Gauss point, over the pressure."""
     scene = catalogue.made(name)
     subject = load_formulation(formulation)
     assert isinstance(subject, Subject)
     trace = newton.solve(scene, subject.on(scene.case()))
     assert trace.converged
-    p, worst = float(scene.facts["pressure"]), 0.0
-    for body, stresses in zip(scene.bodies, scene.stresses(trace.solution), strict=True):
-        if not body.rigid:
-            exact = [-p * body.poisson / (1 - body.poisson), -p, 0.0]
-            worst = max(worst, float(np.abs(stresses - exact).max()) / p)
-    return worst
+    return stress_error(scene, scene.stresses(trace.solution))
 
 
 def test_the_table_is_whole() -> None:
@@ -76,9 +71,9 @@ def test_the_table_is_whole() -> None:
 @pytest.mark.parametrize("formulation", TABLE)
 def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
     passes = next(said for group, said in zip(GROUPS, TABLE[formulation], strict=True) if name in group)
-    error = stress_error(formulation, name)
+    error = error_of(formulation, name)
     if passes:
-        assert error <= roundoff(name)
+        assert error <= tolerance_of(name)
     else:
         assert error > FAILS
 
@@ -95,7 +90,7 @@ def multipliers(formulation: str, name: str) -> FloatArray:
 @pytest.mark.parametrize("name", ["b", "c", "c-prime", "example-1", "example-1bis"])
 @pytest.mark.parametrize("formulation", ["vts-ppt-lm", "mortar-lm", "mortar-dual-lm"])
 def test_who_passes_has_uniform_multipliers(formulation: str, name: str) -> None:
-    assert np.abs(multipliers(formulation, name) - 1).max() <= 100 * roundoff(name)
+    assert np.abs(multipliers(formulation, name) - 1).max() <= 100 * tolerance_of(name)
 
 
 @pytest.mark.parametrize(("name", "least", "most"), [("c", 0, 2), ("c-prime", 13 / 45, 77 / 45)])
@@ -103,7 +98,7 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
     name: str, least: float, most: float
 ) -> None:
     """There are forces that it transmits exactly, by multipliers that are not uniform."""
-    assert stress_error("vts-me-lm", name) <= roundoff(name)
+    assert error_of("vts-me-lm", name) <= tolerance_of(name)
     found = multipliers("vts-me-lm", name)
     assert found.min() == pytest.approx(least, abs=1e-10)
     assert found.max() == pytest.approx(most, abs=1e-10)

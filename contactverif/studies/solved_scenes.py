@@ -16,10 +16,10 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.bulk import elasticity
 from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import is_uniform, pressure_of
+from contactverif.scenes.uniform_stress import stress_error
 from contactverif_reports.draw.solved_scene import PointPressures, Solution, Solved
 
 _FAR = 1e3  # times the scene; iterates that went further are not drawn
@@ -83,7 +83,7 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
         factors=trace.factors,
         points=points,
         pressure=pressure,
-        stress_error=_stress_error(scene, pressure, at_gauss_points),
+        stress_error=stress_error(scene, at_gauss_points, pressure),
         remark=remark,
     )
 
@@ -131,15 +131,3 @@ def _exact_pressure(case: Case, subject: Subject) -> float:
     if not is_uniform(case):
         return np.nan
     return pressure_of(case, np.inf if subject.traits.enforcement == "multiplier" else case.penalty)
-
-
-def _stress_error(scene: Scene, pressure: float, stresses: Sequence[FloatArray]) -> float:
-    """Largest |σ − σ_exact| / p of the bodies within reach; NaN where nothing is known exactly."""
-    errors = [0.0]
-    for index in scene.reached:
-        body = scene.bodies[index]
-        if not body.rigid:
-            stiffness = elasticity(body)
-            exact = -pressure / stiffness[1, 1] * stiffness[:, 1]  # nothing strains along the interface
-            errors.append(float(np.abs(stresses[index] - exact).max()))
-    return max(errors) / pressure

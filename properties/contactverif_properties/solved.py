@@ -20,6 +20,12 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEARLY, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import exact_unknowns, overhangs, pressure_of
+from contactverif.scenes.uniform_stress import (
+    PRESSURE_TOLERANCE,
+    STRESS_TOLERANCE,
+    stress_error,
+    uniform_tolerances,
+)
 from contactverif.strategies.solids import block_cases, variant_cases
 from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.multipliers import nearest_solution, right_multipliers
@@ -30,22 +36,20 @@ ITERATIONS = 25  # a method that transmits a uniform pressure needs one; one tha
 SLOPE = "slope over penalties (−1 if it locks)"
 NEAR = 2.0**-10  # × the penetration: less far from the exact solution, it is the same one
 
-TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂ + M U/ℓ)/p"
 REASON = (
     "κ, the greater of ε̂h and the stiffer body's E over the softer one's, is the matrix's condition; r is the ratio of "
     "the shortest segment to the longest; a gap p/ε̂ is a difference of positions X, and a nodal force is in balance to "
     "8 roundoffs of its 8 springs × X; displacements U are rounded, and make stresses M U/ℓ on the shortest segment"
 )
-PRESSURE_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂/r + M U/ℓ)/p"
 PRESSURE_REASON = f"{REASON}; the shortest segment carries what the force of the longest one lacks"
-GAP_TOLERANCE = f"({TOLERANCE}) (1 + ε̂ ΣH/M)"
+GAP_TOLERANCE = f"({STRESS_TOLERANCE}) (1 + ε̂ ΣH/M)"
 GAP_REASON = (
     f"{REASON}; where no spring sees a height, the bodies hold it, which give way by ΣH/M under a unit pressure"
 )
 QUANTITIES = (
-    Quantity("stress", "1", TOLERANCE, REASON),
-    Quantity("slave forces", "1", TOLERANCE, REASON),
-    Quantity("master forces", "1", TOLERANCE, REASON),
+    Quantity("stress", "1", STRESS_TOLERANCE, REASON),
+    Quantity("slave forces", "1", STRESS_TOLERANCE, REASON),
+    Quantity("master forces", "1", STRESS_TOLERANCE, REASON),
     Quantity("gap", "1", GAP_TOLERANCE, GAP_REASON),
     Quantity("pressure", "1", PRESSURE_TOLERANCE, PRESSURE_REASON),
 )
@@ -53,7 +57,7 @@ HIGH_QUANTITIES = tuple(replace(quantity, name=f"{quantity.name}, high penalty")
 MULTIPLIERS = Quantity(
     "multipliers",
     "1",
-    f"({TOLERANCE})/s",
+    f"({STRESS_TOLERANCE})/s",
     f"{REASON}; s is the smallest singular value of what the bodies feel of the multipliers over the largest",
 )
 
@@ -115,18 +119,18 @@ def by_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
         here = replace(here, z=np.append(scene.positions(q), multipliers))
         slave, master = force_errors(here, scene, formulation, q, pressure)
         values = {
-            "stress": stress_error(scene, q, pressure),
+            "stress": stress_error(scene, scene.stresses(q), pressure),
             "slave forces": slave,
             "master forces": master,
             "gap": gap_error(here, 0.0, pressure / penalty),
         }
-        of_mesh, of_gap, _ = tolerance_parts(here, scene, pressure)
-        tolerances = dict.fromkeys(values, of_mesh + of_gap)
+        roundoff = uniform_tolerances(here, scene, pressure)
+        tolerances = dict.fromkeys(values, roundoff.stress)
         tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
         if subject.traits.penalty == "distributed":
             carry = right != 0  # one that faces nothing has none
             values[MULTIPLIERS.name] = float(np.abs(multipliers[carry] / pressure - 1).max(initial=0.0))
-            tolerances[MULTIPLIERS.name] = (of_mesh + of_gap) / sharpness
+            tolerances[MULTIPLIERS.name] = roundoff.stress / sharpness
         return Measurement(values, tolerances)
 
     trace, u = solution(scene, formulation, exact_u, pressure / penalty)
@@ -160,7 +164,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
     here = replace(case, z=z, penalty=penalty)
     slave, master = force_errors(here, scene, formulation, q, pressure)
     values = {
-        "stress": stress_error(scene, q, pressure),
+        "stress": stress_error(scene, scene.stresses(q), pressure),
         "slave forces": slave,
         "master forces": master,
         "gap": gap_error(here, pressure / penalty, pressure / penalty),
@@ -173,11 +177,11 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
         if subject.traits.penalty != "nodal":
             found = np.where(points.active, points.pressure, 0.0)[carry]
             values["pressure"] = float(np.abs(found - pressure).max(initial=0.0) / pressure) if len(found) else np.inf
-    of_mesh, of_gap, ratio = tolerance_parts(here, scene, pressure)
-    tolerances = dict.fromkeys(values, of_mesh + of_gap)
+    roundoff = uniform_tolerances(here, scene, pressure)
+    tolerances = dict.fromkeys(values, roundoff.stress)
     tolerances["gap"] *= 1 + penalty * float(case.parameters["compliance"].sum())
     if "pressure" in values:
-        tolerances["pressure"] = of_mesh + of_gap / ratio
+        tolerances["pressure"] = roundoff.pressure
     return Measurement(values, tolerances, details=_ended(trace))
 
 
@@ -213,15 +217,6 @@ def solution(
     again = solve(scene, formulation, start=exact, iterations=ITERATIONS, own_tangent=False)
     balanced = again.roundings[0] <= NEARLY or len(again.u) == 1
     return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
-
-
-def stress_error(scene: Scene, q: FloatArray, pressure: float) -> float:
-    """Largest entry of σ − σ_exact at the Gauss points of all bodies, over p."""
-    largest = 0.0
-    for body, stresses in zip(scene.bodies, scene.stresses(q), strict=True):
-        exact = [-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0]
-        largest = max(largest, float(np.abs(stresses - exact).max(initial=0.0)))
-    return largest / pressure
 
 
 def force_errors(
@@ -262,19 +257,6 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
     level = heights[n_slave:].mean()
     errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
     return float(errors.max() / size)
-
-
-def tolerance_parts(case: Case, scene: Scene, pressure: float) -> tuple[float, float, float]:
-    """The two summands of TOLERANCE in the state of the case, of the mesh and of the gap, and the ratio r."""
-    interface = case.interface
-    young = [body.young for body in scene.bodies if not body.rigid]
-    lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
-    h, ratio = float(interface.slave.lengths(interface.nodes).mean()), float(lengths.min() / lengths.max())
-    of_mesh = 1e-11 + 1e-13 * max(case.penalty * h, *young) / min(young) + 5e-15 / ratio
-    modulus = max(body.oedometer for body in scene.bodies if not body.rigid)
-    displacement = float(np.abs(case.positions - interface.nodes).max())
-    of_mesh += 64 * UNIT_ROUNDOFF * modulus * displacement / float(lengths.min()) / pressure
-    return of_mesh, 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure, ratio
 
 
 def exact_picture(case: Case) -> FloatArray:

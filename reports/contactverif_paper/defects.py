@@ -22,9 +22,9 @@ from contactverif.contract.body import block
 from contactverif.contract.interface import Interface
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
+from contactverif.scenes.uniform_stress import stress_error
 from contactverif_paper import cast
 from contactverif_paper.paper_data import Defects, Member, Said, Series, Statement
-from contactverif_paper.paper_patch import stress_error
 from contactverif_reports.html.pages import number
 
 TILTS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
@@ -193,4 +193,4 @@ def _overhanging(member: Member, part: float) -> float:
     """Largest error of a stress over the pressure; NaN where Newton ends nowhere."""
     scene = overhanging(part)
     trace = newton.solve(scene, cast.subject(member).on(scene.case()))
-    return stress_error(scene, trace.solution) if trace.converged else np.nan
+    return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan

@@ -17,9 +17,9 @@ from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 from contactverif_paper import cast
 from contactverif_paper.paper_data import Member, MultiplierRow, Said, Statement
-from contactverif_paper.paper_patch import roundoff, stress_error
 from contactverif_reports.html.pages import number
 
 SCENES = ("a1", "b", "example-1", "c", "c-prime", "example-1bis")
@@ -107,7 +107,7 @@ def eight_on_two() -> Scene:
 
 
 def _row(member: Member, name: str, scene: Scene) -> MultiplierRow:
-    subject, tolerance = cast.subject(member), roundoff(scene)
+    subject, tolerance = cast.subject(member), condition_tolerance(scene, scene.penalty)
     trace = newton.solve(scene, subject.on(scene.case()))
     found = trace.multipliers / float(scene.facts["pressure"])
     if subject.traits.penalty == "nodal":
@@ -117,7 +117,7 @@ def _row(member: Member, name: str, scene: Scene) -> MultiplierRow:
         member=member,
         scene=name,
         end=trace.end.words,
-        error=stress_error(scene, trace.solution) if trace.converged else np.nan,
+        error=stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan,
         tolerance=tolerance,
         low=_plain(found.min(initial=np.inf), tolerance),
         high=_plain(found.max(initial=-np.inf), tolerance),

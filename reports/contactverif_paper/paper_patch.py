@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactverif.mechanics import newton
-from contactverif.mechanics.scene import Scene
 from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import pressure_of
+from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 from contactverif.studies import solved_scenes as pictures
 from contactverif_paper import cast
 from contactverif_paper.paper_data import Curve, Member, PassTable, Patch, Said, Statement
@@ -90,13 +89,13 @@ def passes(told: Callable[[str], None]) -> PassTable:
             scene = catalogue.made(name)
             trace = newton.solve(scene, cast.subject(member).on(scene.case()))
             if trace.converged:
-                errors[row, column] = stress_error(scene, trace.solution)
+                errors[row, column] = stress_error(scene, scene.stresses(trace.solution))
     said = [[SAID.get(member.formulation, {}).get(name, _SILENT) for name in SCENES] for member in members]
     return PassTable(
         members=members,
         scenes=SCENES,
         errors=errors,
-        tolerances=np.array([roundoff(catalogue.made(name)) for name in SCENES]),
+        tolerances=np.array([condition_tolerance(scene, scene.penalty) for scene in map(catalogue.made, SCENES)]),
         fails=FAILS,
         said=np.array(said),
         unequal=_unequal(),
@@ -201,24 +200,8 @@ def _of_areas(by_scene: Mapping[str, Mapping[Member, float]], table: PassTable) 
 def _unequal() -> tuple[float, float]:
     scene = catalogue.made("example-1bis", ratio=UNEQUAL)
     trace = newton.solve(scene, cast.subject(cast.VTS_PPT).on(scene.case()))
-    return stress_error(scene, trace.solution) if trace.converged else np.nan, roundoff(scene)
-
-
-def roundoff(scene: Scene) -> float:
-    """Of a stress over the pressure: 1e-11 + 1e-13 ε̂h/E + 5e-15 over the smallest ratio of segments."""
-    interface = scene.interface
-    lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
-    return 1e-11 + 1e-13 * catalogue.MODERATE + 5e-15 * float(lengths.max() / lengths.min())
-
-
-def stress_error(scene: Scene, q: np.ndarray) -> float:
-    """Largest error of a stress at a Gauss point of a uniform scene without lateral strain, over the pressure."""
-    p, worst = pressure_of(scene.case(), scene.penalty), 0.0
-    for body, stresses in zip(scene.bodies, scene.stresses(q), strict=True):
-        if not body.rigid:
-            exact = [-p * body.poisson / (1 - body.poisson), -p, 0.0]
-            worst = max(worst, float(np.abs(stresses - exact).max()) / p)
-    return worst
+    error = stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
+    return error, condition_tolerance(scene, scene.penalty)
 
 
 def _patch(name: str, shown: Shown) -> Patch:

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.scenes.uniform_stress import CONDITION_TOLERANCE
 from contactverif_paper.paper_data import (
     Convergence,
     Curve,
@@ -212,7 +213,7 @@ def _passes(table: PassTable) -> xr.Dataset:
             fill=np.nan,
         ),
         "tolerance": numbers(
-            ["scene"], table.tolerances, "of roundoff: an error below it passes", "1", "1e-11 + 1e-13 κ + 5e-15/r"
+            ["scene"], table.tolerances, "of roundoff: an error below it passes", "1", CONDITION_TOLERANCE
         ),
         "said": codes(dims, table.said, meanings, "what the paper says", "missing: nothing", fill=-1),
     }

@@ -21,8 +21,9 @@ from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case
 from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.uniform_stress import stress_error
 from contactverif.strategies.solids import block_cases
-from contactverif_properties.solved import FLAT_SOLVE, at_penalty, stress_error
+from contactverif_properties.solved import FLAT_SOLVE, at_penalty
 
 N_MESHES = 40
 
@@ -65,7 +66,7 @@ def solved_by_us(blocks: TwoBlocks, subject: Subject) -> float:
     """What the plain script does: mesh, bodies, solution, and the stresses held against the exact ones."""
     scene = posed(blocks)
     trace = solve(scene, subject.with_penalty(blocks.penalty))
-    return stress_error(scene, trace.solution, exact_pressure(blocks))
+    return stress_error(scene, scene.stresses(trace.solution), exact_pressure(blocks))
 
 
 def judged_by_us(blocks: TwoBlocks, subject: Subject) -> float:

@@ -1,0 +1,134 @@
+"""The uniform stress of a solved patch test: its exact value, the error of a solution, and what roundoff may do to it.
+
+Properties, studies, the paper's room and the tests judge solved patch tests. All of them use these functions, so that
+the same solution has the same error and the same tolerance everywhere.
+
+Rules for the next editor: a formula is written once as text, beside the function that computes it, and whoever prints a
+tolerance prints that text. A change of a formula changes both, and `docs/tolerances.md`.
+
+Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment; r is the
+ratio of the shortest to the longest segment; u = 2⁻⁵³; X is the largest coordinate; M is the stiffer body's oedometer
+modulus; U is the largest displacement; ℓ is the shortest segment; p is the exact pressure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.body import Body
+from contactverif.contract.case import Case
+from contactverif.mechanics.scene import Scene
+from contactverif.scenes.blocks import pressure_of
+
+CONDITION_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r"
+STRESS_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂ + M U/ℓ)/p"
+PRESSURE_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂/r + M U/ℓ)/p"
+
+
+def exact_stress(body: Body, pressure: float) -> FloatArray:
+    """Return the stress of an elastic body under a uniform pressure that cannot strain along the interface.
+
+    Parameters
+    ----------
+    body : Body
+        An elastic body on rollers, so that no fibre along the interface changes its length (oedometer).
+    pressure : float
+        The contact pressure p, positive in compression.
+
+    Returns
+    -------
+    FloatArray, shape (3,)
+        Normal stress along the interface −p ν/(1−ν), across it −p, and shear 0, in the body's axes.
+    """
+    return np.array([-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0])
+
+
+def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float | None = None) -> float:
+    """Return the largest error of a stress component at a Gauss point over the exact pressure, dimensionless.
+
+    Parameters
+    ----------
+    scene : Scene
+        A uniform scene: two blocks without lateral strain under a pressure that is known exactly.
+    stresses : Sequence[FloatArray], each of shape (n_cells, n_points, 3)
+        The stresses of each body, as `Scene.stresses` gives them. Rigid bodies have none, and bodies that touch
+        nothing carry no pressure; both are left out.
+    pressure : float | None
+        The exact pressure p. By default that of the scene at its own penalty.
+    """
+    if pressure is None:
+        pressure = pressure_of(scene.case(), scene.penalty)
+    largest = 0.0
+    for index in scene.reached:
+        if not scene.bodies[index].rigid:
+            errors = np.abs(stresses[index] - exact_stress(scene.bodies[index], pressure))
+            largest = max(largest, float(errors.max(initial=0.0)))
+    return largest / pressure
+
+
+def condition_tolerance(scene: Scene, penalty: float) -> float:
+    """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number.
+
+    Parameters
+    ----------
+    scene : Scene
+        The solved scene.
+    penalty : float
+        The distributed penalty ε̂ that it was solved with.
+    """
+    lengths = _segment_lengths(scene)
+    young = [body.young for body in scene.bodies if not body.rigid]
+    h = float(scene.interface.slave.lengths(scene.interface.nodes).mean())
+    return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _ratio(lengths)
+
+
+@dataclass(frozen=True, slots=True)
+class UniformTolerances:
+    """The tolerances of a solved patch test in one state, all dimensionless.
+
+    Attributes
+    ----------
+    stress : float
+        STRESS_TOLERANCE, for stresses over p and nodal forces over p L.
+    pressure : float
+        PRESSURE_TOLERANCE, for the pressure that a formulation reports, over p.
+    """
+
+    stress: float
+    pressure: float
+
+
+def uniform_tolerances(case: Case, scene: Scene, pressure: float) -> UniformTolerances:
+    """Return the tolerances of a solved scene in the state of the case.
+
+    Parameters
+    ----------
+    case : Case
+        The solved state: its positions, and the penalty ε̂ that the scene was solved with.
+    scene : Scene
+        The scene of the case.
+    pressure : float
+        The exact pressure p.
+    """
+    lengths = _segment_lengths(scene)
+    modulus = max(body.oedometer for body in scene.bodies if not body.rigid)
+    displacement = float(np.abs(case.positions - scene.interface.nodes).max())
+    solution = condition_tolerance(scene, case.penalty)
+    solution += 64 * UNIT_ROUNDOFF * modulus * displacement / float(lengths.min()) / pressure
+    gap = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure
+    return UniformTolerances(stress=solution + gap, pressure=solution + gap / _ratio(lengths))
+
+
+def _segment_lengths(scene: Scene) -> FloatArray:
+    """Return the reference lengths of all segments (n_segments,), slave first."""
+    interface = scene.interface
+    return np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
+
+
+def _ratio(lengths: FloatArray) -> float:
+    """Return the shortest length over the longest."""
+    return float(lengths.min() / lengths.max())
