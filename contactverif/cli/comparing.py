@@ -31,7 +31,7 @@ from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
 from contactverif.studies.comparison_study import Study, compared
-from contactverif.studies.solved_scenes import solved
+from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing
 from contactverif_reports.compare.regression import Changes
 from contactverif_reports.files import check_writable, made_folder
@@ -197,7 +197,7 @@ def _drawing(one: Differing, subjects: dict[str, Subject], reference: str) -> Dr
     """What a picture of the case needs: its scene solved by both, or the forces of both."""
     candidate, other = subjects[one.formulation], subjects[reference]
     if has_bodies(one.case):
-        return Drawing(solved=solved(one.case, [candidate, other]))
+        return Drawing(solved=solve_scene(one.case, [candidate, other]))
     exact = one.question.exact(one.case) if one.question.exact is not None else None
     return Drawing(forces_on(one.case, candidate), forces_on(one.case, other), exact)
 
@@ -205,12 +205,12 @@ def _drawing(one: Differing, subjects: dict[str, Subject], reference: str) -> Dr
 def _pictures(one: Differing, reference: str, subjects: dict[str, Subject], folder: Path) -> list[str]:
     """Names of what was drawn: the bodies solved by both, or the case with the forces of each of them."""
     if has_bodies(one.case):
-        from contactverif_reports.draw.scene_figures import draw_solved  # matplotlib takes its time
+        from contactverif_reports.draw.scene_figures import draw_scene  # matplotlib takes its time
 
-        found = solved(one.case, [subjects[one.formulation], subjects[reference]])
+        found = solve_scene(one.case, [subjects[one.formulation], subjects[reference]])
         name = f"{case_id(one.formulation, one.question.id)}.png"
         if found.solutions:
-            draw_solved(found, folder / name, title=f"{one.question.id}, case {one.number}")
+            draw_scene(found, folder / name, title=f"{one.question.id}, case {one.number}")
         return [name] if found.solutions else []
     names = []
     for formulation, outcome in ((one.formulation, one.outcome), (reference, one.reference_outcome)):

@@ -18,9 +18,10 @@ from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on, judged, the_formulation, the_property
 from contactverif.run.registry import formulation_names, load_formulation
 from contactverif.scenes.catalogue import scene_named
-from contactverif.studies.solved_scenes import solved
-from contactverif_reports.draw import as_text, figure
-from contactverif_reports.draw.solved_scene import Solution, Solved
+from contactverif.studies.solved_scenes import solve_scene
+from contactverif_reports import draw as pictures
+from contactverif_reports.draw import as_text
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 from contactverif_reports.files import check_writable, checked_name
 from contactverif_reports.netcdf.read import StoredCase, read_case
 
@@ -93,12 +94,12 @@ def draw_case(subject: Subject, question: Property, outcome: Outcome, path: Path
     try:
         forces = forces_on(outcome.case, subject)
         exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
-        figure(outcome.case, path, title=title, forces=forces, exact=exact)
+        pictures.draw_case(outcome.case, path, title=title, forces=forces, exact=exact)
     except MisuseError as error:
         raise MisuseError(argument, error.found, error.needed) from None
 
 
-def solutions_table(found: Solved) -> Table:
+def solutions_table(found: SolvedScene) -> Table:
     """How each formulation ended, a line each."""
     table = plain_table("")
     columns = ["formulation", "end", "iterations", "residual", *(["stress error"] if _has_error(found) else [])]
@@ -129,7 +130,7 @@ def _draw_stored(stored: StoredCase, names: Sequence[str], targets: Targets) -> 
 def _draw_solved(case: Case, names: Sequence[str], title: str, targets: Targets) -> bool:
     if targets.vtu is not None and len(names) > 1:
         raise MisuseError("--vtu", f"{len(names)} formulations", "one --formulation: a file holds one solution")
-    found = solved(case, [load_formulation(name) for name in names])
+    found = solve_scene(case, [load_formulation(name) for name in names])
     written = _written(found, title, targets) if found.solutions else []
     if not written:
         typer.echo(as_text(case))
@@ -142,13 +143,13 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, targets: Targets)
     return not found.failures
 
 
-def _written(found: Solved, title: str, targets: Targets) -> list[str]:
+def _written(found: SolvedScene, title: str, targets: Targets) -> list[str]:
     """Writes what was asked for; a line for each file."""
     lines = []
     if targets.out is not None:
-        from contactverif_reports.draw.scene_figures import draw_solved  # matplotlib takes its time
+        from contactverif_reports.draw.scene_figures import draw_scene  # matplotlib takes its time
 
-        draw_solved(found, targets.out, title=title)
+        draw_scene(found, targets.out, title=title)
         lines.append(f"picture: {targets.out}")
     if targets.vtu is not None:
         from contactverif_reports.draw.vtu import write_vtu
@@ -158,10 +159,10 @@ def _written(found: Solved, title: str, targets: Targets) -> list[str]:
     return lines
 
 
-def _remarks(found: Solved) -> list[tuple[str, str]]:
+def _remarks(found: SolvedScene) -> list[tuple[str, str]]:
     said = [(one.formulation, one.remark) for one in found.solutions if one.remark]
     return said + list(found.failures.items())
 
 
-def _has_error(found: Solved) -> bool:
+def _has_error(found: SolvedScene) -> bool:
     return any(isinstance(one, Solution) and one.stress_error == one.stress_error for one in found.solutions)

@@ -27,7 +27,7 @@ SHRINK_CALLS = 2000  # judgements spent on one counterexample; hypothesis itself
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class PlannedCases:
     """The planned cases.
 
     Attributes
@@ -44,7 +44,7 @@ class Drawn:
 
 def draw_cases(
     strategy: SearchStrategy[Case], *, seed: str, examples: int, progress: Callable[[int], None] | None = None
-) -> Drawn:
+) -> PlannedCases:
     """As many different cases as asked, or all there are.
 
     `progress` is told how many there are. The first is the simplest that the strategy makes; what the strategy
@@ -66,8 +66,8 @@ def draw_cases(
         try:
             take()
         except Unsatisfiable:  # no case came through the filters: nothing to judge, which the caller sees
-            return Drawn((), exhausted=False)
-    return Drawn(tuple(cases), exhausted=stopped == ["nothing left to do"])
+            return PlannedCases((), exhausted=False)
+    return PlannedCases(tuple(cases), exhausted=stopped == ["nothing left to do"])
 
 
 def shrink(

@@ -32,7 +32,7 @@ class Profile:
         """Whether every run asks the same."""
         return self.seed is not None
 
-    def settled(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
+    def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
         """The profile with the caller's own numbers and a seed, which can be printed and given again.
 
         Where neither the caller nor the profile names a seed, it is `fresh`, or a new one.

@@ -14,7 +14,7 @@ from urllib.parse import unquote, urlparse
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 
 
-def provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
+def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
     """Versions, commit, machine, time and command, with what the run was asked for."""
     return {
         **{f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES},

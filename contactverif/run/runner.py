@@ -19,9 +19,9 @@ from contactverif.contract.names import unknown
 from contactverif.contract.property import Outcome, Property, Verdict, excess, judge
 from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-from contactverif.run.driver import SHRINK_CALLS, Drawn, draw_cases, shrink
+from contactverif.run.driver import SHRINK_CALLS, PlannedCases, draw_cases, shrink
 from contactverif.run.profiles import PROFILES, Profile, profile_named
-from contactverif.run.provenance import provenance
+from contactverif.run.provenance import collect_provenance
 from contactverif.scenes.named_states import named_case
 
 __all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
@@ -85,7 +85,7 @@ def run(
     for property_id in known:
         if property_id not in asked:
             raise unknown("known failure", property_id, asked)
-    settled = (profile_named(profile) if isinstance(profile, str) else profile).settled(examples=examples, seed=seed)
+    settled = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert settled.seed is not None
     if scene is not None:
         interface = scene.interface
@@ -94,7 +94,7 @@ def run(
         rows=tuple(_row(plan, subject, question) for subject in loaded for question in questions),
         not_loaded=not_loaded,
         provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
-        provenance=provenance(profile=settled.name, examples=settled.examples, seed=settled.seed),
+        provenance=collect_provenance(profile=settled.name, examples=settled.examples, seed=settled.seed),
     )
 
 
@@ -145,7 +145,7 @@ class _Plan:
     scene: Case | None
     known: Mapping[str, str]
     progress: Callable[[Progress], None]
-    drawn: dict[str, Drawn]
+    drawn: dict[str, PlannedCases]
 
     def key(self, question: Property) -> str:
         """The seed of a property, which does not depend on what else is asked."""

@@ -20,12 +20,12 @@ from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import is_uniform, pressure_of
 from contactverif.scenes.uniform_stress import stress_error
-from contactverif_reports.draw.solved_scene import PointPressures, Solution, Solved
+from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
 
 _FAR = 1e3  # times the scene; iterates that went further are not drawn
 
 
-def solved(case: Case, subjects: Sequence[Subject | NotLoaded]) -> Solved:
+def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedScene:
     """The scene of the case, solved by each formulation; one that cannot be asked is a failure with its reason.
 
     Raises
@@ -43,7 +43,7 @@ def solved(case: Case, subjects: Sequence[Subject | NotLoaded]) -> Solved:
             solutions.append(_solution(scene, case, subject))
         except ContractError as error:
             failures[subject.name] = str(error)
-    return Solved(case, scene.bodies, _on_interface(scene), tuple(solutions), failures)
+    return SolvedScene(case, scene.bodies, _on_interface(scene), tuple(solutions), failures)
 
 
 def _on_interface(scene: Scene) -> tuple[IntArray, ...]:

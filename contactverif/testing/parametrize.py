@@ -151,7 +151,7 @@ def checks(asked: Asked, options: Any, fresh_seed: int) -> list[Check]:
     for property_id in asked.known:
         if property_id not in ids:
             raise unknown("known", property_id, ids)
-    profile = profile_named(options.contactverif_profile or asked.profile or "dev").settled(
+    profile = profile_named(options.contactverif_profile or asked.profile or "dev").resolve(
         examples=_first(options.contactverif_examples, asked.examples),
         seed=_first(options.contactverif_seed, asked.seed),
         fresh=fresh_seed,

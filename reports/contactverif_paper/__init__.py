@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from contactverif.run.provenance import provenance
+from contactverif.run.provenance import collect_provenance
 from contactverif_paper import cast, convergence, defects, forces
 from contactverif_paper import paper_disk as disk
 from contactverif_paper import paper_multipliers as multipliers
@@ -72,5 +72,5 @@ def _titles(patches: tuple[Patch, ...]) -> dict[str, str]:
 
 def _provenance() -> dict[str, str]:
     """Versions and the commit; nothing that a second run would say otherwise."""
-    found = provenance(profile="", examples=0, seed=0)
+    found = collect_provenance(profile="", examples=0, seed=0)
     return {name: value for name, value in found.items() if name.endswith("_version") or name == "commit"}

@@ -10,7 +10,7 @@ from enum import IntEnum
 from fractions import Fraction
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif_reports.draw.solved_scene import Solution, Solved
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 
 
 class Said(IntEnum):
@@ -132,7 +132,7 @@ class Patch:
     close_up: tuple[float, float] | None
     stiffness: float
     exact: float
-    solved: Solved
+    solved: SolvedScene
     curves: tuple[Curve, ...]
 
 

@@ -31,7 +31,7 @@ from contactverif_paper.paper_data import (
     Patch,
     Series,
 )
-from contactverif_reports.draw.scene_curves import pen
+from contactverif_reports.draw.scene_curves import choose_pen
 from contactverif_reports.draw.scene_meshes import colour_scale, draw_bodies, magnifications
 
 ONE_COLUMN, TWO_COLUMNS = 3.5, 7.2  # inches
@@ -159,7 +159,7 @@ def _figure(wide: float, high: float) -> Figure:
 
 
 def _look(member: Member, n_points: int, **more: Any) -> dict[str, Any]:
-    return pen(member.pen).look(n_points) | {"markersize": 3.6, "markeredgewidth": 0.8, "zorder": 3} | more
+    return choose_pen(member.pen).look(n_points) | {"markersize": 3.6, "markeredgewidth": 0.8, "zorder": 3} | more
 
 
 def _legend(

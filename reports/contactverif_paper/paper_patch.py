@@ -20,7 +20,7 @@ from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 from contactverif.studies import solved_scenes as pictures
 from contactverif_paper import cast
 from contactverif_paper.paper_data import Curve, Member, PassTable, Patch, Said, Statement
-from contactverif_reports.draw.solved_scene import Solution, Solved
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 from contactverif_reports.html.pages import number
 
 YOUNG = 1e4  # the catalogue's
@@ -208,7 +208,7 @@ def _patch(name: str, shown: Shown) -> Patch:
     scene = catalogue.made(name, penalty=shown.stiffness * YOUNG)
     case = scene.case()
     members = shown.members
-    solved = pictures.solved(case, [cast.subject(member) for member in members])
+    solved = pictures.solve_scene(case, [cast.subject(member) for member in members])
     curves = tuple(
         _curve(member, solved, solution, shown.origin)
         for member, solution in zip(members, solved.solutions, strict=True)
@@ -227,7 +227,7 @@ def _patch(name: str, shown: Shown) -> Patch:
     )
 
 
-def _curve(member: Member, solved: Solved, solution: Solution, origin: float) -> Curve:
+def _curve(member: Member, solved: SolvedScene, solution: Solution, origin: float) -> Curve:
     """At the virtual slave nodes where there are any, else nodal forces over the nodes' shares (Eq. 3)."""
     at_points = solution.points is not None and member in cast.VIRTUAL
     if solution.points is not None and at_points:

@@ -14,7 +14,7 @@ from contactverif.mechanics.scene import has_bodies, scene_of
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import Placing, two_blocks
 from contactverif.scenes.catalogue import SCENES, scene_named
-from contactverif.studies.solved_scenes import solved
+from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.read import case_ids, read_case, same_data
 from contactverif_reports.netcdf.write import write
 
@@ -60,7 +60,7 @@ def test_what_comes_back_is_solved_to_the_same_bits(tmp_path: Path) -> None:
     write(run_with(case, "vts-ppt"), tmp_path / "a.nc")
     again = read_case(tmp_path / "a.nc", ID).case
     subject = load_formulation("vts-ppt")
-    (one,), (other,) = (solved(each, [subject]).solutions for each in (case, again))
+    (one,), (other,) = (solve_scene(each, [subject]).solutions for each in (case, again))
     assert one.z.tobytes() == other.z.tobytes()
     assert one.residuals.tobytes() == other.residuals.tobytes()
 

@@ -1,4 +1,4 @@
-"""Solved scenes made by hand, from the contracts alone: nothing is solved here."""
+"""SolvedScene scenes made by hand, from the contracts alone: nothing is solved here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body, block, rigid
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif_reports.draw.solved_scene import PointPressures, Solution, Solved
+from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
 
 PRESSURE = 100.0
 
@@ -34,7 +34,7 @@ def solved(
     rigid_master: bool = False,
     names: tuple[str, ...] = ("one", "two"),
     ends: tuple[str, ...] = ("converged", "2-cycle"),
-) -> Solved:
+) -> SolvedScene:
     """A uniform pressure: the slave has moved towards the master by the penetration, and nothing else has."""
     pair = bodies(wide=wide, angle=angle, rigid_master=rigid_master)
     first = len(pair[0].contact_nodes)
@@ -46,7 +46,7 @@ def solved(
     moves = tuple(np.broadcast_to(down * (index == 0), body.nodes.shape) for index, body in enumerate(pair))
     z = nodes.copy()
     z[:first] += down
-    empty = Solved(case, pair, numbers, ())
+    empty = SolvedScene(case, pair, numbers, ())
     stresses = tuple(_uniform(body) for body in pair)
     solutions = tuple(
         Solution(
@@ -66,7 +66,7 @@ def solved(
         )
         for name, end in zip(names, ends, strict=True)
     )
-    return Solved(case, pair, numbers, solutions)
+    return SolvedScene(case, pair, numbers, solutions)
 
 
 def _uniform(body: Body) -> FloatArray:

@@ -11,8 +11,8 @@ from made import awkward, flat
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
-from contactverif_reports.draw import as_text, figure
-from contactverif_reports.draw.lengths import short
+from contactverif_reports.draw import as_text, draw_case
+from contactverif_reports.draw.lengths import format_number
 
 
 def kinked() -> Case:
@@ -141,30 +141,30 @@ def test_nodes_of_small_meshes_all_have_their_numbers() -> None:
     ],
 )  # fmt: skip
 def test_numbers_as_by_hand(value: float, text: str) -> None:
-    assert short(value) == text
+    assert format_number(value) == text
 
 
 def test_numbers_within_roundoff() -> None:
-    assert short(2 + 4e-16, 1e-15) == "2"
-    assert short(2 + 4e-16) == "2"  # to four digits
-    assert short(1e-9, 1e-7) == "1e-9"  # a small number is not nothing
+    assert format_number(2 + 4e-16, 1e-15) == "2"
+    assert format_number(2 + 4e-16) == "2"  # to four digits
+    assert format_number(1e-9, 1e-7) == "1e-9"  # a small number is not nothing
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 @pytest.mark.parametrize("name", CASES)
 def test_figures(name: str, suffix: str, tmp_path: Path) -> None:
     case = CASES[name]
-    figure(case, tmp_path / f"plain.{suffix}", title=f"$ {name} \\alpha_ ′ ℓ")
+    draw_case(case, tmp_path / f"plain.{suffix}", title=f"$ {name} \\alpha_ ′ ℓ")
     forces = np.zeros((case.interface.n_nodes, 2))
     forces[0] = [0.0, 1.0]
-    figure(case, tmp_path / f"forces.{suffix}", forces=forces, exact=forces.ravel() * 1.5)
-    figure(case, tmp_path / f"none.{suffix}", forces=0 * forces)
+    draw_case(case, tmp_path / f"forces.{suffix}", forces=forces, exact=forces.ravel() * 1.5)
+    draw_case(case, tmp_path / f"none.{suffix}", forces=0 * forces)
     assert all(path.stat().st_size > 1000 for path in tmp_path.iterdir())
 
 
 def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
-    figure(CASES["barely"], tmp_path / "a.svg", title="nts: patch")
-    figure(CASES["barely"], tmp_path / "b.svg", title="nts: patch")
+    draw_case(CASES["barely"], tmp_path / "a.svg", title="nts: patch")
+    draw_case(CASES["barely"], tmp_path / "b.svg", title="nts: patch")
     words = (tmp_path / "a.svg").read_text()
     assert "nts: patch" in words
     assert "gap -1e-9, drawn 2e8 times larger" in words
@@ -173,9 +173,9 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
 
 def test_figures_that_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(MisuseError, match=r"needed a name that ends in \.png or \.svg"):
-        figure(CASES["one"], tmp_path / "a.bmp")
+        draw_case(CASES["one"], tmp_path / "a.bmp")
     with pytest.raises(MisuseError, match="No such file"):
-        figure(CASES["one"], tmp_path / "no" / "a.png")
+        draw_case(CASES["one"], tmp_path / "no" / "a.png")
 
 
 def test_matplotlib_is_imported_late() -> None:

@@ -11,16 +11,16 @@ from contactverif.contract.body import block
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import scene_named
-from contactverif.studies.solved_scenes import solved
-from contactverif_reports.draw.scene_figures import draw_solved
+from contactverif.studies.solved_scenes import solve_scene
+from contactverif_reports.draw.scene_figures import draw_scene
 from contactverif_reports.draw.scene_meshes import close_up, magnifications
 from contactverif_reports.draw.scene_text import silhouettes_as_text
-from contactverif_reports.draw.solved_scene import Solved
+from contactverif_reports.draw.solved_scene import SolvedScene
 
 
 @pytest.fixture(scope="module")
-def disk() -> Solved:
-    return solved(scene_named("example-2").case(), [load_formulation("vts-ppt")])
+def disk() -> SolvedScene:
+    return solve_scene(scene_named("example-2").case(), [load_formulation("vts-ppt")])
 
 
 @pytest.mark.parametrize("width", [40, 72, 120])
@@ -52,7 +52,7 @@ def test_a_flat_pair_has_silhouettes_too() -> None:
     assert set(text[-3]) == {"░"}
 
 
-def test_a_small_contact_is_drawn_from_near(disk: Solved) -> None:
+def test_a_small_contact_is_drawn_from_near(disk: SolvedScene) -> None:
     box = close_up(disk)
     assert box is not None
     assert np.abs(box.mean(axis=0)).max() <= 0.05
@@ -62,13 +62,13 @@ def test_a_small_contact_is_drawn_from_near(disk: Solved) -> None:
 
 @pytest.mark.parametrize("name", ["c", "c-prime:sides=free", "example-1", "b:degrees=33"])
 def test_a_contact_as_wide_as_its_bodies_is_not(name: str) -> None:
-    assert close_up(solved(scene_named(name).case(), [load_formulation("nts-ar")])) is None
+    assert close_up(solve_scene(scene_named(name).case(), [load_formulation("nts-ar")])) is None
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_it_is_drawn(disk: Solved, suffix: str, tmp_path: Path) -> None:
+def test_it_is_drawn(disk: SolvedScene, suffix: str, tmp_path: Path) -> None:
     target = tmp_path / f"a.{suffix}"
-    draw_solved(disk, target, title="example-2")
+    draw_scene(disk, target, title="example-2")
     assert target.stat().st_size > 10_000
     if suffix == "svg":
         words = target.read_text()

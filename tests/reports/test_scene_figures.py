@@ -16,13 +16,13 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.draw import case_figure as figures
 from contactverif_reports.draw.case_geometry import Gaps
-from contactverif_reports.draw.scene_curves import pen
-from contactverif_reports.draw.scene_figures import draw_solved
+from contactverif_reports.draw.scene_curves import choose_pen
+from contactverif_reports.draw.scene_figures import draw_scene
 from contactverif_reports.draw.scene_meshes import Magnification, colour_scale, draw_bodies, magnifications
-from contactverif_reports.draw.solved_scene import Solved
+from contactverif_reports.draw.solved_scene import SolvedScene
 
 
-def changed(found: Solved, index: int = 0, **what: Any) -> Solved:
+def changed(found: SolvedScene, index: int = 0, **what: Any) -> SolvedScene:
     """With one solution changed."""
     solutions = list(found.solutions)
     solutions[index] = replace(solutions[index], **what)
@@ -54,14 +54,14 @@ SCENES = {
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 @pytest.mark.parametrize("name", SCENES)
 def test_everything_is_drawn(name: str, suffix: str, tmp_path: Path) -> None:
-    draw_solved(SCENES[name], tmp_path / f"a.{suffix}", title=f"$ {name} \\alpha_ ′ ℓ")
+    draw_scene(SCENES[name], tmp_path / f"a.{suffix}", title=f"$ {name} \\alpha_ ′ ℓ")
     assert [path.name for path in tmp_path.iterdir()] == [f"a.{suffix}"]
     assert (tmp_path / f"a.{suffix}").stat().st_size > 10_000
 
 
 def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
-    draw_solved(SCENES["two"], tmp_path / "a.svg", title="a scene")
-    draw_solved(SCENES["two"], tmp_path / "b.svg", title="a scene")
+    draw_scene(SCENES["two"], tmp_path / "a.svg", title="a scene")
+    draw_scene(SCENES["two"], tmp_path / "b.svg", title="a scene")
     words = (tmp_path / "a.svg").read_text()
     for said in (
         "a scene",
@@ -80,7 +80,7 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
 
 
 def test_what_is_not_known_is_not_said(tmp_path: Path) -> None:
-    draw_solved(SCENES["unknown pressure"], tmp_path / "a.svg")
+    draw_scene(SCENES["unknown pressure"], tmp_path / "a.svg")
     assert "exact pressure" not in (tmp_path / "a.svg").read_text()
 
 
@@ -101,8 +101,8 @@ def test_gaps_are_drawn_magnified_by_what_is_said(name: str) -> None:
     cells, nodes = found.bodies[0].cells, found.bodies[0].contact_nodes
     places = np.array([drawn[cells == node][0] for node in nodes])
     reference = found.case.interface.nodes  # the master has not moved
-    gaps = Gaps.of(Case(found.case.interface, np.vstack([places, reference[len(places) :]]).ravel())).gap
-    right = Gaps.of(Case(found.case.interface, found.solutions[0].z)).gap
+    gaps = Gaps.from_case(Case(found.case.interface, np.vstack([places, reference[len(places) :]]).ravel())).gap
+    right = Gaps.from_case(Case(found.case.interface, found.solutions[0].z)).gap
     np.testing.assert_allclose(gaps, 7.0 * right, atol=1e-12)
     lengths = np.linalg.norm(drawn - np.roll(drawn, 1, axis=1), axis=-1)
     whole = found.bodies[0].nodes[cells]
@@ -133,15 +133,15 @@ def test_a_difference_of_roundoff_is_drawn_in_one_colour() -> None:
 
 
 def test_curves_are_told_apart_without_colours() -> None:
-    looks = [(str(pen(number).style), pen(number).marker) for number in range(6)]
+    looks = [(str(choose_pen(number).style), choose_pen(number).marker) for number in range(6)]
     assert len({style for style, _ in looks}) == len({marker for _, marker in looks}) == 6
 
 
 def test_figures_that_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(MisuseError, match=r"needed a name that ends in \.png or \.svg"):
-        draw_solved(SCENES["two"], tmp_path / "a.pdf")
+        draw_scene(SCENES["two"], tmp_path / "a.pdf")
     with pytest.raises(MisuseError, match="No such file"):
-        draw_solved(SCENES["two"], tmp_path / "no" / "a.png")
+        draw_scene(SCENES["two"], tmp_path / "no" / "a.png")
 
 
 def test_a_figure_that_fails_leaves_the_one_that_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,5 +154,5 @@ def test_a_figure_that_fails_leaves_the_one_that_was_there(tmp_path: Path, monke
 
     monkeypatch.setattr(figures.Figure, "savefig", full)
     with pytest.raises(MisuseError, match="No space left"):
-        draw_solved(SCENES["two"], target)
+        draw_scene(SCENES["two"], target)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.png", "before")]

@@ -12,17 +12,17 @@ from handmade_scene import PRESSURE, solved
 
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.draw.solved_scene import Solved
+from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.draw.vtu import write_vtu
 
 
-def read_back(found: Solved, folder: Path) -> meshio.Mesh:
+def read_back(found: SolvedScene, folder: Path) -> meshio.Mesh:
     write_vtu(found, found.solutions[0], folder / "a.vtu")
     assert [path.name for path in folder.iterdir()] == ["a.vtu"]
     return meshio.read(folder / "a.vtu")
 
 
-def in_triangles(found: Solved) -> Solved:
+def in_triangles(found: SolvedScene) -> SolvedScene:
     """The master's two cells cut in two."""
     lower = found.bodies[1]
     cells = np.vstack([lower.cells[:, [0, 1, 2]], lower.cells[:, [0, 2, 3]]])

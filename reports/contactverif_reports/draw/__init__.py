@@ -7,11 +7,12 @@ import os
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif_reports.draw.case_text import as_text
+from contactverif_reports.files import checked_name
 
-__all__ = ["as_text", "figure"]
+__all__ = ["as_text", "draw_case"]
 
 
-def figure(
+def draw_case(
     case: Case,
     path: str | os.PathLike[str],
     *,
@@ -40,6 +41,7 @@ def figure(
     MisuseError
         If the file cannot be written, or is to be of another kind.
     """
-    from contactverif_reports.draw.case_figure import draw  # matplotlib takes its time
+    from contactverif_reports.draw.case_figure import SUFFIXES, make_case_figure, save  # importing matplotlib is slow
 
-    draw(case, path, title=title, forces=forces, exact=exact)
+    target = checked_name(path, SUFFIXES)
+    save(make_case_figure(case, title=title, forces=forces, exact=exact), target)

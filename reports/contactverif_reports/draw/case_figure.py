@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 from math import floor, log10
 from pathlib import Path
@@ -16,9 +15,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.draw.case_geometry import Course, Gaps
-from contactverif_reports.draw.lengths import short, unit_of
+from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
-from contactverif_reports.files import checked_name, whole
+from contactverif_reports.files import whole
 
 SUFFIXES = (".png", ".svg")
 _SEEN_GAP = 0.05  # of the interface; a smaller largest gap is magnified to it
@@ -27,22 +26,11 @@ _BODY = 0.10  # width of the hatched part of a body, of the interface
 _ARROW = 0.15  # longest arrow, of the interface
 
 
-def draw(
-    case: Case,
-    path: str | os.PathLike[str],
-    *,
-    title: str,
-    forces: FloatArray | None,
-    exact: FloatArray | None,
-) -> None:
-    """See `contactverif_reports.draw.figure`."""
-    target = checked_name(path, SUFFIXES)
-    save(drawn(case, title=title, forces=forces, exact=exact), target)
-
-
-def drawn(case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5) -> Figure:
-    """The figure that `contactverif_reports.draw.figure` writes, for a page; `width` in inches."""
-    course, gaps = Course.of(case), Gaps.of(case)
+def make_case_figure(
+    case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
+) -> Figure:
+    """The figure that `contactverif_reports.draw.draw_case` writes, for a page; `width` in inches."""
+    course, gaps = Course.from_case(case), Gaps.from_case(case)
     interface = case.interface
     lengths = [surface.lengths(case.positions) for surface in (interface.slave, interface.master)]
     unit, unit_name = unit_of(np.concatenate(lengths))
@@ -57,12 +45,15 @@ def drawn(case: Case, *, title: str, forces: FloatArray | None, exact: FloatArra
     axes.set_aspect("equal", adjustable="datalim")
     side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0  # towards the other body: there the labels are clear
     for surface, pen, found in ((interface.master, MASTER, lengths[1]), (interface.slave, SLAVE, lengths[0])):
-        labels = [short(length, course.roundoff / unit) for length in (found / unit).tolist()]
+        labels = [format_number(length, course.roundoff / unit) for length in (found / unit).tolist()]
         draw_surface(axes, surface, shown, labels, pen, body=_BODY * size, side=side)
     draw_arrows(axes, shown, forces, exact, longest=_ARROW * size)
     _finish(axes, unit_name)
     shortest = min(float(found.min()) for found in lengths) / unit
-    notes = [_gap_note(gaps, course.roundoff) + how, f"shortest segment {short(shortest, course.roundoff / unit)}"]
+    notes = [
+        _gap_note(gaps, course.roundoff) + how,
+        f"shortest segment {format_number(shortest, course.roundoff / unit)}",
+    ]
     axes.set_title(
         "\n".join([*textwrap.wrap(title, 92), ", ".join(notes[: 1 + (shortest < 0.04 * size)])]),
         fontsize=9,
@@ -82,7 +73,7 @@ def _shown(case: Case, gaps: Gaps, roundoff: float, apart: bool) -> tuple[FloatA
     else:
         factor = magnification(gaps.gap, roundoff, size)
         moves = (factor - 1) * gaps.gap
-        how = "" if factor == 1 else f", drawn {short(factor)} times larger"
+        how = "" if factor == 1 else f", drawn {format_number(factor)} times larger"
     positions[: case.interface.n_slave_nodes] += moves[:, None] * gaps.normal
     return positions, how
 
@@ -102,8 +93,8 @@ def _gap_note(gaps: Gaps, roundoff: float) -> str:
     if not len(found):
         return "no slave node faces the master"
     if gaps.uniform(roundoff):
-        return f"gap {short(float(found.mean()), roundoff)}"
-    return f"gap {short(found.min(), roundoff)} to {short(found.max(), roundoff)}"
+        return f"gap {format_number(float(found.mean()), roundoff)}"
+    return f"gap {format_number(found.min(), roundoff)} to {format_number(found.max(), roundoff)}"
 
 
 def _finish(axes: Axes, unit_name: str) -> None:

@@ -42,7 +42,7 @@ class Course:
     straight: bool
 
     @classmethod
-    def of(cls, case: Case) -> Course:
+    def from_case(cls, case: Case) -> Course:
         """Measured from the left-most node."""
         positions, interface = case.positions, case.interface
         chords = _chords(interface.slave, positions)
@@ -100,7 +100,7 @@ class Gaps:
     facing: BoolArray
 
     @classmethod
-    def of(cls, case: Case) -> Gaps:
+    def from_case(cls, case: Case) -> Gaps:
         """By comparison with every master segment."""
         positions, master = case.positions, case.interface.master
         first, chords = positions[master.segments[:, 0]], _chords(master, positions)

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif_reports.draw.case_geometry import Course, Gaps
-from contactverif_reports.draw.lengths import short, unit_of
+from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.raster import raster
 from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, strips
 
@@ -22,7 +22,7 @@ def as_text(case: Case, width: int = 72) -> str:
     and, up to eight nodes a side, a table of current positions.
     """
     width = max(width, 60)
-    course, gaps = Course.of(case), Gaps.of(case)
+    course, gaps = Course.from_case(case), Gaps.from_case(case)
     lengths = np.concatenate(
         [surface.lengths(case.positions) for surface in (case.interface.slave, case.interface.master)]
     )
@@ -50,7 +50,7 @@ def _headline(case: Case, course: Course) -> str:
     n_slave, n_master = len(case.interface.slave), len(case.interface.master)
     shape = "flat" if course.flat else "nearly flat" if course.nearly_flat else "not flat"
     is_turned = course.nearly_flat and abs(course.turned) > 1e-9
-    turned = f", turned by {short(course.turned, 1e-9)}°" if is_turned else ""
+    turned = f", turned by {format_number(course.turned, 1e-9)}°" if is_turned else ""
     name = f"{case.name}: " if case.name else ""
     return f"{name}{n_slave} slave on {n_master} master segment{'s' * (n_master > 1)}, {shape}{turned}"
 
@@ -63,9 +63,9 @@ def _gaps(gaps: Gaps, course: Course, unit: float) -> str:
     n_beyond = int((~gaps.facing).sum())
     where = f"where a slave node faces the master; {n_beyond} beyond it" if n_beyond else "at every slave node"
     if not gaps.uniform(course.roundoff):
-        return f"gap {short(found.min())} to {short(found.max())} {where}"
+        return f"gap {format_number(found.min())} to {format_number(found.max())} {where}"
     mean = float(np.mean(found))
-    amount = short(abs(mean), course.roundoff / unit)
+    amount = format_number(abs(mean), course.roundoff / unit)
     return f"{f'penetration {amount}' if mean < 0 else f'open by {amount}' if mean else 'touching'} {where}"
 
 
@@ -75,11 +75,11 @@ def _table(case: Case, gaps: Gaps, unit: float, roundoff: float, width: int) -> 
     if max(n_slave, case.interface.n_nodes - n_slave) > _LISTED:
         return []
     rows = [
-        [str(node), *(short(value, 0.0, 6) for value in (position / unit).tolist())]
+        [str(node), *(format_number(value, 0.0, 6) for value in (position / unit).tolist())]
         for node, position in enumerate(case.positions)
     ]
     for row, gap, facing in zip(rows, gaps.gap.tolist(), gaps.facing.tolist(), strict=False):
-        row.append(short(gap / unit, roundoff / unit) if facing else "beyond")
+        row.append(format_number(gap / unit, roundoff / unit) if facing else "beyond")
     left = _aligned([[SLAVE_NODE, "x", "y", "gap"], *rows[:n_slave]])
     right = _aligned([[MASTER_NODE, "x", "y"], *rows[n_slave:]])
     if len(left[0]) + len(right[0]) + 8 > width:
@@ -96,9 +96,9 @@ def _aligned(rows: list[list[str]]) -> list[str]:
 
 
 def _rest(case: Case) -> str:
-    numbers = [f"penalty {short(case.penalty)}"]
+    numbers = [f"penalty {format_number(case.penalty)}"]
     numbers += [
-        f"{name} {short(values.item())}"
+        f"{name} {format_number(values.item())}"
         for name, values in case.parameters.items()
         if values.size == 1 and name != "penetration"
     ]

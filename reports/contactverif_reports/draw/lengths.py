@@ -13,7 +13,7 @@ from contactverif.contract.arrays import FloatArray
 _LARGEST_DENOMINATOR = 64
 
 
-def short(value: float, slack: float = 0.0, digits: int = 4) -> str:
+def format_number(value: float, slack: float = 0.0, digits: int = 4) -> str:
     """The shortest text within `slack` of the value: an integer, a decimal, a fraction or an integer times 2^k.
 
     Where there is none, `digits` significant digits.

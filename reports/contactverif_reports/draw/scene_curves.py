@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from contactverif_reports.draw.solved_scene import Solution, Solved
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 
 _MANY = 40  # points a curve that get their markers
 
@@ -42,16 +42,16 @@ _PENS = (
 )
 
 
-def pen(number: int) -> Pen:
+def choose_pen(number: int) -> Pen:
     """Of the formulation of that number; they come again after six."""
     return _PENS[number % len(_PENS)]
 
 
-def draw_pressures(axes: Axes, solved: Solved, side: Literal["slave", "master"]) -> None:
+def draw_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "master"]) -> None:
     """Nodal forces over the nodes' shares of the interface; on the slave also what the contact points say, dotted."""
     order = [index for index, its_side in enumerate(solved.sides) if its_side == side]
     for number, solution in enumerate(solved.solutions):
-        along, pressures, look = solved.along, solved.node_pressures(solution), pen(number)
+        along, pressures, look = solved.along, solved.node_pressures(solution), choose_pen(number)
         for index in order:
             on = solved.on_interface[index]
             on = on[np.argsort(along[on], kind="stable")]
@@ -65,14 +65,14 @@ def draw_pressures(axes: Axes, solved: Solved, side: Literal["slave", "master"])
     _roomy(axes)
 
 
-def draw_history(axes: Axes, solved: Solved, which: Literal["residuals", "energies"]) -> None:
+def draw_history(axes: Axes, solved: SolvedScene, which: Literal["residuals", "energies"]) -> None:
     """A norm against the iterates on a logarithmic scale; 0 is drawn at the roundoff of the residual."""
     for number, solution in enumerate(solved.solutions):
         values = getattr(solution, which)
         floors = solution.floors if which == "residuals" else np.full_like(values, np.finfo(float).tiny)
         shown = np.where(values == 0, floors, values)
         iterates = np.flatnonzero(np.isfinite(shown) & (shown > 0))
-        axes.plot(iterates, shown[iterates], zorder=3, **pen(number).look(len(iterates)))
+        axes.plot(iterates, shown[iterates], zorder=3, **choose_pen(number).look(len(iterates)))
         for step in np.flatnonzero(np.diff(solution.factors)) if len(solved.solutions) == 1 else ():
             axes.axvline(step + 0.5, color="0.8", linewidth=0.8, zorder=1)
     axes.set_yscale("log")
@@ -86,7 +86,7 @@ def draw_history(axes: Axes, solved: Solved, which: Literal["residuals", "energi
     )
 
 
-def _draw_points(axes: Axes, solved: Solved, solution: Solution, color: str) -> None:
+def _draw_points(axes: Axes, solved: SolvedScene, solution: Solution, color: str) -> None:
     """Each point's pressure over its area of competence, or at its place where the plugin names no area."""
     assert solution.points is not None
     at, areas = solved.points_along(solution.points)

@@ -16,10 +16,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contactverif_reports.draw.case_figure import SUFFIXES, save
-from contactverif_reports.draw.lengths import short
-from contactverif_reports.draw.scene_curves import draw_history, draw_pressures, pen
+from contactverif_reports.draw.lengths import format_number
+from contactverif_reports.draw.scene_curves import choose_pen, draw_history, draw_pressures
 from contactverif_reports.draw.scene_meshes import close_up, colour_scale, draw_bodies, draw_meshes, magnifications
-from contactverif_reports.draw.solved_scene import Solution, Solved
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 from contactverif_reports.files import checked_name
 
 _WIDTH = 10.0  # inches
@@ -35,12 +35,12 @@ _SMALL: dict[Any, Any] = {
 }
 
 
-def draw_solved(solved: Solved, path: str | os.PathLike[str], *, title: str = "") -> None:
+def draw_scene(solved: SolvedScene, path: str | os.PathLike[str], *, title: str = "") -> None:
     """Draws a solved scene to a .png or .svg file.
 
     Parameters
     ----------
-    solved : Solved
+    solved : SolvedScene
         With at least one solution.
     path : str | os.PathLike[str]
         File to write, replaced if it is there.
@@ -57,13 +57,13 @@ def draw_solved(solved: Solved, path: str | os.PathLike[str], *, title: str = ""
         save(_figure(solved, title), target)
 
 
-def solved_figure(solved: Solved) -> Figure:
-    """The figure that `draw_solved` writes, without a title, for a page."""
+def make_scene_figure(solved: SolvedScene) -> Figure:
+    """The figure that `draw_scene` writes, without a title, for a page."""
     with matplotlib.rc_context(_SMALL):
         return _figure(solved, "")
 
 
-def _figure(solved: Solved, title: str) -> Figure:
+def _figure(solved: SolvedScene, title: str) -> Figure:
     box = close_up(solved)
     panels = len(solved.solutions) + (box is not None)
     across = min(panels, _ACROSS)
@@ -81,7 +81,7 @@ def _figure(solved: Solved, title: str) -> Figure:
     return figure
 
 
-def _draw_meshes(figure: SubFigure, solved: Solved, rows: int, across: int) -> None:
+def _draw_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int) -> None:
     scale, large = colour_scale(solved), magnifications(solved)
     box = close_up(solved)
     panels = figure.subplots(rows, across, squeeze=False, sharex=box is None, sharey=box is None)
@@ -101,7 +101,7 @@ def _draw_meshes(figure: SubFigure, solved: Solved, rows: int, across: int) -> N
     bar.set_label("pressure across the\ninterface, −σₙ (force / length)")
 
 
-def _draw_curves(figure: SubFigure, solved: Solved) -> None:
+def _draw_curves(figure: SubFigure, solved: SolvedScene) -> None:
     (slave, residuals), (master, energies) = figure.subplots(2, 2, sharex="col")
     draw_pressures(slave, solved, "slave")
     draw_pressures(master, solved, "master")
@@ -112,14 +112,14 @@ def _draw_curves(figure: SubFigure, solved: Solved) -> None:
     for axes in (slave, master, residuals, energies):
         axes.spines[["top", "right"]].set_visible(False)
     handles: list[Artist] = [
-        Line2D([], [], label=_end(one), **pen(number).look(1)) for number, one in enumerate(solved.solutions)
+        Line2D([], [], label=_end(one), **choose_pen(number).look(1)) for number, one in enumerate(solved.solutions)
     ]
     if any(one.points is not None for one in solved.solutions):
         handles.append(
             Line2D([], [], color="0.3", linewidth=0.8, marker=".", label="at contact points, over their areas")
         )
     if solved.pressures:
-        exact = " and ".join(map(short, solved.pressures))  # by penalty and by multipliers
+        exact = " and ".join(map(format_number, solved.pressures))  # by penalty and by multipliers
         handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {exact}"))
     handles.append(Patch(color="0.92", label="roundoff of the residual"))
     figure.legend(
@@ -133,11 +133,13 @@ def _end(solution: Solution) -> str:
     return f"{solution.formulation}: {solution.end}{' after' if solution.converged else ','} {times}"
 
 
-def _facts(solved: Solved) -> str:
+def _facts(solved: SolvedScene) -> str:
     moduli = ", ".join(
-        f"{body.name} E {short(body.young)}, ν {short(body.poisson)}" for body in solved.bodies if not body.rigid
+        f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}"
+        for body in solved.bodies
+        if not body.rigid
     )
-    words = f"penalty {short(float(f'{solved.case.penalty:.4g}'))}; {moduli}"
+    words = f"penalty {format_number(float(f'{solved.case.penalty:.4g}'))}; {moduli}"
     return "\n".join(textwrap.wrap(words, 110, max_lines=2, placeholder=" …"))
 
 

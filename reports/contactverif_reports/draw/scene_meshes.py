@@ -19,7 +19,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif_reports.draw.case_geometry import Gaps
-from contactverif_reports.draw.solved_scene import Solution, Solved, pressures_across
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene, pressures_across
 
 _SEEN_MOVE = 0.06  # of the scene: the largest displacement is drawn about as large
 _SEEN_GAP = 0.06  # of the scene: so is the deepest penetration
@@ -39,7 +39,7 @@ class Magnification:
     gap: float
 
     @classmethod
-    def of(cls, solved: Solved, solutions: list[Solution]) -> Magnification:
+    def of(cls, solved: SolvedScene, solutions: list[Solution]) -> Magnification:
         """One significant digit each, for solutions that are to be compared.
 
         From near, displacements are as they are: magnified they would close gaps that stay open.
@@ -59,14 +59,14 @@ class Magnification:
         return f"displacements × {self.move:g}, penetration × {self.gap:g}"
 
 
-def magnifications(solved: Solved) -> dict[str, Magnification]:
+def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
     """{formulation: magnification}: the same for all that stayed near, or they could not be compared."""
     near = [one for one in solved.solutions if all(np.abs(u).max(initial=0.0) < solved.size for u in one.displacements)]
     shared = Magnification.of(solved, near) if near else Magnification(1.0, 1.0)
     return {one.formulation: shared if one in near else Magnification.of(solved, [one]) for one in solved.solutions}
 
 
-def colour_scale(solved: Solved) -> ScalarMappable:
+def colour_scale(solved: SolvedScene) -> ScalarMappable:
     """From the least to the largest pressure of all cells of all solutions; the exact one, if one, in the middle."""
     values = [
         pressures_across(body, s)
@@ -85,7 +85,7 @@ def colour_scale(solved: Solved) -> ScalarMappable:
     return ScalarMappable(Normalize(low, high), _COLOURS)
 
 
-def close_up(solved: Solved) -> FloatArray | None:
+def close_up(solved: SolvedScene) -> FloatArray | None:
     """Lower left and upper right corner (2, 2) of a square around what penetrates; None if that is not small."""
     if solved.course.flat:
         return None
@@ -101,7 +101,7 @@ def close_up(solved: Solved) -> FloatArray | None:
     return box
 
 
-def draw_meshes(axes: Axes, solved: Solved, box: FloatArray) -> None:
+def draw_meshes(axes: Axes, solved: SolvedScene, box: FloatArray) -> None:
     """All of the meshes before anything moves, and where the close-up is taken."""
     for body in solved.bodies:
         axes.add_collection(
@@ -114,7 +114,9 @@ def draw_meshes(axes: Axes, solved: Solved, box: FloatArray) -> None:
     axes.autoscale_view()
 
 
-def draw_bodies(axes: Axes, solved: Solved, solution: Solution, large: Magnification, scale: ScalarMappable) -> None:
+def draw_bodies(
+    axes: Axes, solved: SolvedScene, solution: Solution, large: Magnification, scale: ScalarMappable
+) -> None:
     """Bodies by the pressure across the interface, the slave over the master, what penetrates hatched."""
     box = close_up(solved)
     moved = [body.nodes + large.move * u for body, u in zip(solved.bodies, solution.displacements, strict=True)]
@@ -169,11 +171,11 @@ def _seen(corners: FloatArray, box: FloatArray) -> IntArray:
     return np.flatnonzero((high >= box[0]).all(axis=1) & (low <= box[1]).all(axis=1))
 
 
-def _gaps(solved: Solved, z: FloatArray) -> Gaps:
-    return Gaps.of(Case(solved.case.interface, z))
+def _gaps(solved: SolvedScene, z: FloatArray) -> Gaps:
+    return Gaps.from_case(Case(solved.case.interface, z))
 
 
-def _carried(solved: Solved, index: int, shifts: FloatArray) -> FloatArray:
+def _carried(solved: SolvedScene, index: int, shifts: FloatArray) -> FloatArray:
     """Shifts (n_nodes, 2) of a slave body that move its contact nodes as given, and columns of cells with them."""
     body, on = solved.bodies[index], solved.on_interface[index]
     own = shifts[on]  # (n_contact_nodes, 2)
@@ -197,7 +199,7 @@ def _draw_rigid(axes: Axes, body: Body, nodes: FloatArray, width: float) -> None
     axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # so that the axes reach around it
 
 
-def _draw_penetration(axes: Axes, solved: Solved, slave: FloatArray, gap: FloatArray, normal: FloatArray) -> None:
+def _draw_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: FloatArray, normal: FloatArray) -> None:
     """Hatched between the slave's surface and the master's, where it is beyond that."""
     feet = slave - gap[:, None] * normal
     segments = solved.case.interface.slave.segments

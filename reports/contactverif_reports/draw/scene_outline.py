@@ -27,7 +27,7 @@ def has_outline(case: Case) -> bool:
     return f"{_BODIES}nodes" in case.parameters
 
 
-def outline(case: Case, width: float) -> Figure:
+def make_outline_figure(case: Case, width: float) -> Figure:
     """The reference configuration of the bodies; `width` in inches. Rigid bodies are their surfaces."""
     packed = {name.removeprefix(_BODIES): found for name, found in case.parameters.items() if name.startswith(_BODIES)}
     nodes = packed["nodes"]  # (n_nodes, 2) of all bodies

@@ -23,7 +23,7 @@ def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> st
     The interface has to run straight, or nearly so. What presses on the slave, and on the master beside it, is a row of
     arrows; a rigid master is hatched.
     """
-    course = Course.of(case)
+    course = Course.from_case(case)
     lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
     rows, note = strips(case, course, unit_of(np.concatenate(lengths))[0], max(width, 40))
     upper, lower = (row[_LABEL:] for row in rows[1:3])

@@ -97,7 +97,7 @@ class Solution:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class SolvedScene:
     """A scene, and the solutions of one or several formulations.
 
     Attributes
@@ -140,7 +140,7 @@ class Solved:
     @property
     def course(self) -> Course:
         """Which way the interface runs in its reference configuration."""
-        return Course.of(Case(self.case.interface, self.case.interface.nodes.reshape(-1)))
+        return Course.from_case(Case(self.case.interface, self.case.interface.nodes.reshape(-1)))
 
     @property
     def along(self) -> FloatArray:

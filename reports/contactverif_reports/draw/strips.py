@@ -12,7 +12,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 from contactverif_reports.draw.case_geometry import NEARLY_FLAT, Course
-from contactverif_reports.draw.lengths import short
+from contactverif_reports.draw.lengths import format_number
 
 SLAVE_NODE, MASTER_NODE = "●", "o"
 MARGIN = 8  # columns of "slave" and "master"
@@ -51,7 +51,8 @@ def strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[st
     if note == TOO_MANY:
         for name, side in zip(("slave", "master"), surfaces, strict=True):
             lengths = side.lengths(case.positions) / unit
-            rows.append(f"{name:8}{len(side)} segments of length {short(lengths.min())} to {short(lengths.max())}")
+            shortest, longest = format_number(lengths.min()), format_number(lengths.max())
+            rows.append(f"{name:8}{len(side)} segments of length {shortest} to {longest}")
     return rows, note
 
 
@@ -79,7 +80,7 @@ def _links(
     links = []
     for (first, second), length in zip(surface.segments.tolist(), lengths.tolist(), strict=True):
         start, end = sorted((number[first], number[second]))
-        links.append(_Link(start, end, short(length, slack, digits)))
+        links.append(_Link(start, end, format_number(length, slack, digits)))
     return sorted(links, key=lambda link: link.start)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.draw.solved_scene import Solution, Solved, pressures_across
+from contactverif_reports.draw.solved_scene import Solution, SolvedScene, pressures_across
 from contactverif_reports.files import checked_name, whole
 
 SUFFIXES = (".vtu",)
@@ -17,7 +17,7 @@ _KINDS = {2: "line", 3: "triangle", 4: "quad"}
 SIDES = {"slave": 0, "master": 1, "": -1}
 
 
-def write_vtu(solved: Solved, solution: Solution, path: str | os.PathLike[str]) -> None:
+def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[str]) -> None:
     """Writes one solution to a .vtu file, replacing a file that is there.
 
     On points: `displacement` and `contact_force` (three components, the last 0), `contact_pressure` (nodal force over
@@ -41,7 +41,7 @@ def write_vtu(solved: Solved, solution: Solution, path: str | os.PathLike[str]) 
         raise MisuseError("path", f"{Path(path)}: {error.strerror}", "a file that can be written") from error
 
 
-def _grid(solved: Solved, solution: Solution) -> dict[str, object]:
+def _grid(solved: SolvedScene, solution: Solution) -> dict[str, object]:
     """The arguments of a `meshio.Mesh`; cells of one kind lie together, since a file may hold triangles and quads."""
     points = np.vstack([body.nodes for body in solved.bodies])
     forces, pressures = np.zeros_like(points), np.zeros(len(points))

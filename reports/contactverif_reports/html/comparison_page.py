@@ -14,7 +14,7 @@ from contactverif.contract.case import Case
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import PARTS, Comparison, Cost, Differing
 from contactverif_reports.compare.regression import Change, Changes
-from contactverif_reports.draw.solved_scene import Solved
+from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
 from contactverif_reports.netcdf.read import StoredCase
@@ -34,14 +34,14 @@ class Drawing:
         Nodal forces (n_nodes, 2) that they find.
     exact : FloatArray | None
         The exact ones.
-    solved : Solved | None
+    solved : SolvedScene | None
         A case with bodies, solved by both; it is drawn instead of the forces at its first guess.
     """
 
     candidate: FloatArray | None = None
     reference: FloatArray | None = None
     exact: FloatArray | None = None
-    solved: Solved | None = None
+    solved: SolvedScene | None = None
 
 
 def comparison_page(
@@ -144,9 +144,9 @@ def _mesh(one: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
         (reference, one.reference_outcome, one.reference_margin),
     ]
     if drawing.solved is not None and drawing.solved.solutions:
-        from contactverif_reports.draw.scene_figures import solved_figure
+        from contactverif_reports.draw.scene_figures import make_scene_figure
 
-        figures = [(svg_inline(solved_figure(drawing.solved), f"{one.question.id}, solved"), sides)]
+        figures = [(svg_inline(make_scene_figure(drawing.solved), f"{one.question.id}, solved"), sides)]
     else:
         figures = [
             (_drawn(one.case, found, drawing.exact, f"{one.question.id}: {side[0]}"), [side])
@@ -158,14 +158,14 @@ def _mesh(one: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
 def _drawn(case: Case, forces: FloatArray | None, exact: FloatArray | None, label: str) -> Markup:
     import matplotlib  # it takes its time
 
-    from contactverif_reports.draw.case_figure import drawn
-    from contactverif_reports.draw.scene_outline import has_outline, outline
+    from contactverif_reports.draw.case_figure import make_case_figure
+    from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
 
     if has_outline(case):
-        return svg_inline(outline(case, _INCHES), label)
+        return svg_inline(make_outline_figure(case, _INCHES), label)
     with matplotlib.rc_context({"legend.fontsize": _LEGEND}):
         beside = exact if forces is not None else None  # of multipliers nobody knows what it should be
-        figure = drawn(case, title="", forces=forces, exact=beside, width=_INCHES)
+        figure = make_case_figure(case, title="", forces=forces, exact=beside, width=_INCHES)
     return svg_inline(figure, label)
 
 

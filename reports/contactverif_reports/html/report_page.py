@@ -169,15 +169,17 @@ def _figures(report: StoredReport) -> dict[str, Markup]:
     """{id: figure} of as many counterexamples as are drawn."""
     if not report.examples:
         return {}
-    from contactverif_reports.draw.case_figure import drawn  # matplotlib takes its time
-    from contactverif_reports.draw.scene_outline import has_outline, outline
+    from contactverif_reports.draw.case_figure import make_case_figure  # matplotlib takes its time
+    from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
 
     ids = sorted(report.examples, key=lambda id_: not _unexpected(report, report.examples[id_]))
     figures = {}
     for id_ in ids[:DRAWN]:
         case = report.examples[id_].case
         figure = (
-            outline(case, _WIDTH) if has_outline(case) else drawn(case, title="", forces=None, exact=None, width=_WIDTH)
+            make_outline_figure(case, _WIDTH)
+            if has_outline(case)
+            else make_case_figure(case, title="", forces=None, exact=None, width=_WIDTH)
         )
         figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
     return figures
