@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -28,3 +29,9 @@ def frozen(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
         array.setflags(write=False)
         return array
     return np.frombuffer(array.tobytes(), dtype=dtype).reshape(array.shape)
+
+
+def dense(matrix: Any) -> FloatArray:
+    """Return a matrix, given as an array or as a sparse matrix or array of scipy, as an array of the same shape."""
+    array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
+    return array

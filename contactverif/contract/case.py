@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,6 +75,16 @@ class Case:
     def positions(self) -> FloatArray:
         """Current positions (n_nodes, dim)."""
         return self.z[: self.interface.n_unknowns].reshape(self.interface.nodes.shape)
+
+    @property
+    def multipliers(self) -> FloatArray:
+        """The multipliers (n_multipliers,), which stand behind the positions."""
+        return self.z[self.interface.n_unknowns :]
+
+    def with_multipliers(self, multipliers: FloatArray) -> Case:
+        """Return the case with multipliers (n_multipliers,) behind its positions, in place of any that it has."""
+        positions = self.z[: self.interface.n_unknowns]
+        return replace(self, z=np.concatenate([positions, multipliers]), n_multipliers=len(multipliers))
 
     @property
     def largest_coordinate(self) -> float:

@@ -19,7 +19,7 @@ from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 from skfem.quadrature import get_quadrature
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
@@ -149,11 +149,11 @@ def condense(body: Body) -> Condensed:
     matrix, gradients = stiffness(body)
     forces = body.load.reshape(-1) - matrix @ imposed
     across = matrix[interior][:, unknowns]
-    solved = _solved(body, matrix[interior][:, interior], np.column_stack([_dense(across), forces[interior]]))
+    solved = _solved(body, matrix[interior][:, interior], np.column_stack([dense(across), forces[interior]]))
     influence, own = -solved[:, :-1], solved[:, -1]
     particular = imposed.copy()
     particular[interior] = own
-    condensed = _dense(matrix[unknowns][:, unknowns]) + across.T @ influence
+    condensed = dense(matrix[unknowns][:, unknowns]) + across.T @ influence
     load = forces[unknowns] - across.T @ own
     return Condensed(body, unknowns, (condensed + condensed.T) / 2, load, interior, particular, influence, gradients)
 
@@ -183,11 +183,6 @@ def _solved(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
 def _loose(body: Body) -> MisuseError:
     found = "a part that hangs neither on a support nor on the contact boundary"
     return MisuseError(f"{body.name}: cells", found, "one connected mesh, or supports for each part")
-
-
-def _dense(matrix: Any) -> FloatArray:
-    array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else matrix
-    return array
 
 
 def loose_modes(body: Body) -> list[str]:

@@ -14,7 +14,7 @@ from scipy import linalg, sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 
 ROUNDING = 8.0  # of a singular value: how many units of roundoff, times the size of the matrix, count as zero
 
@@ -92,8 +92,7 @@ def _scaled(matrix: Any, rows: FloatArray, columns: FloatArray) -> Any:
 
 def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray) -> tuple[FloatArray | None, int]:
     """The shortest solution, None where positions are not unique or nothing solves; how many multipliers are not."""
-    dense = matrix.toarray() if sparse.issparse(matrix) else matrix
-    left, values, right_vectors = linalg.svd(dense)
+    left, values, right_vectors = linalg.svd(dense(matrix))
     rank = int((values > ROUNDING * len(values) * UNIT_ROUNDOFF * values[0]).sum())
     deficiency = len(values) - rank
     if rank == 0:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg, sparse
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, frozen
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense, frozen
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
@@ -208,10 +208,7 @@ class System:
             tangent = self.formulation.tangent(scene.interface, pairing, z)
         else:
             tangent = self.differences(pairing, z)
-        if isinstance(self.spread, np.ndarray):
-            tangent = tangent.toarray() if sparse.issparse(tangent) else tangent
-        else:
-            tangent = sparse.csr_array(tangent)
+        tangent = dense(tangent) if isinstance(self.spread, np.ndarray) else sparse.csr_array(tangent)
         contact = self.spread.T @ tangent @ self.spread
         matrix = self.stiffness + contact
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force

@@ -17,6 +17,7 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif_mortar.cells import Cells, Quadrature
 from contactverif_mortar.options import AREAS, NORMALS, check_penalty, chosen
 from contactverif_mortar.reported import at_nodes
@@ -87,7 +88,7 @@ class MortarMultipliers:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """The cells, and which slave nodes are in contact."""
-        x, multipliers = _parted(interface, z)
+        x, multipliers = split_states(interface, z)
         return self.weighting.pairing(interface, x[0], self.penalty, multipliers[0])
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -95,15 +96,15 @@ class MortarMultipliers:
 
         Rows: −∫φ_j g where active, else λ_j × the node's own length in the reference.
         """
-        x, multipliers = _parted(interface, z)
+        x, multipliers = split_states(interface, z)
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
         forces = weighted.forces(np.where(active, multipliers, 0.0), interface.n_nodes)
         rows = np.where(active, -weighted.with_gap, multipliers * own_lengths(interface, interface.nodes))
-        return np.hstack([forces.reshape(len(x), -1), rows]).reshape(z.shape)
+        return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """The exact derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]], and lengths where not active."""
-        (x,), (multipliers,) = _parted(interface, z)
+        x, multipliers = split_state(interface, z)
         active = pairing["active"]
         rows = self.weighting.rows(interface, self.weighting.carrying(interface, pairing, x[None]), x)
         own, influence = of_given_pressures(rows, np.where(active, multipliers, 0.0))
@@ -114,17 +115,10 @@ class MortarMultipliers:
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """The slave nodes: weighted gap and multiplier, ∫N_j as weight."""
-        (x,), (multipliers,) = _parted(interface, z)
+        x, multipliers = split_state(interface, z)
         cells, active = Cells.of(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
         return at_nodes(interface, cells, x, areas, gaps, np.where(active, multipliers, 0.0), active)
-
-
-def _parted(interface: Interface, z: Array) -> tuple[Array, Array]:
-    """Positions (n_states, n_nodes, 2) and multipliers (n_states, n_slave_nodes) of z (..., both, flat)."""
-    flat = np.array(z).reshape(-1, z.shape[-1])
-    n = interface.n_unknowns
-    return np.ascontiguousarray(flat[:, :n]).reshape(-1, interface.n_nodes, 2), flat[:, n:]
 
 
 def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:

@@ -20,10 +20,10 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray, IntArray, frozen
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import eq6
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen
-from contactverif_nts.state import joined, one_parted, parted
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
 
@@ -60,7 +60,7 @@ class PointContact:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """The nearest master segment of each point, and whether it is in contact."""
-        x, multipliers = one_parted(interface, z)
+        x, multipliers = split_state(interface, z)
         segment, other, slot = self._points(interface)
         partner, active = eq6.pair(
             x,
@@ -79,16 +79,16 @@ class PointContact:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Forces (..., n_unknowns), Eq. 6 summed over the points; behind them the constraints of multipliers."""
-        return joined(*eq6.residual(*parted(interface, z), *self._arguments(interface, pairing)), z)
+        return join_rows(*eq6.residual(*split_states(interface, z), *self._arguments(interface, pairing)), z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """The exact derivative of the residual, sparse."""
-        rows, columns, values = eq6.tangent(*one_parted(interface, z), *self._arguments(interface, pairing))
+        rows, columns, values = eq6.tangent(*split_state(interface, z), *self._arguments(interface, pairing))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Each point, with its gap and pressure; areas of competence end at the middle of a segment or share it out."""
-        x, multipliers = one_parted(interface, z)
+        x, multipliers = split_state(interface, z)
         ends = x[interface.slave.segments[pairing["segment"]]]  # (n_points, 2, dim)
         c = self.c[pairing["slot"]]
         position = (1 - c[:, None]) / 2 * ends[:, 0] + (1 + c[:, None]) / 2 * ends[:, 1]

@@ -21,11 +21,11 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, walk
 from contactverif_nts.eq6 import CURRENT
 from contactverif_nts.options import AREAS, check_count, check_free_end, check_penalty, chosen
-from contactverif_nts.state import joined, one_parted, parted
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
 _FREE_ENDS = {"truncate": walk.TRUNCATE, "extend": walk.EXTEND, "cover": walk.COVER}
@@ -81,7 +81,7 @@ class PatchTestPassing:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """What the area of competence of each virtual slave node covers, and whether it is in contact."""
-        x, multipliers = one_parted(interface, z)
+        x, multipliers = split_state(interface, z)
         master = interface.master
         found = walk.pair(
             x,
@@ -99,18 +99,18 @@ class PatchTestPassing:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Forces (..., n_unknowns), Box 3; behind them the constraints of multipliers."""
-        return joined(*box3.residual(*parted(interface, z), *self._arguments(interface, pairing)), z)
+        return join_rows(*box3.residual(*split_states(interface, z), *self._arguments(interface, pairing)), z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """Derivative of the residual, Appendix A; that of one segment only where not consistent."""
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
-        rows, columns, values = box3.tangent(*one_parted(interface, z), *self._arguments(interface, pairing))
+        rows, columns, values = box3.tangent(*split_state(interface, z), *self._arguments(interface, pairing))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Each virtual slave node, with its gap and pressure and the ends Q, P of its area of competence."""
-        x, multipliers = one_parted(interface, z)
+        x, multipliers = split_state(interface, z)
         slave, master = interface.slave.segments, interface.master.segments
         ends = np.array(
             [

@@ -13,7 +13,6 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
@@ -45,11 +44,5 @@ def posed(case: Case, subject: Subject) -> tuple[CheckedFormulation, Case]:
     low, high = (share * case.shortest_segment for share in PRESS)
     formulation = subject.with_penalty(1.0)
     random = np.random.default_rng([case.seed, 1])  # not the numbers that the property draws for itself
-    return formulation, with_multipliers(
-        replace(case, penalty=1.0), random.uniform(low, high, formulation.n_multipliers(case.interface))
-    )
-
-
-def with_multipliers(case: Case, multipliers: FloatArray) -> Case:
-    """The case with multipliers (n_multipliers,) behind its positions."""
-    return replace(case, z=np.concatenate([case.z, multipliers]), n_multipliers=len(multipliers))
+    multipliers = random.uniform(low, high, formulation.n_multipliers(case.interface))
+    return formulation, replace(case, penalty=1.0).with_multipliers(multipliers)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
@@ -15,7 +15,7 @@ from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties import roundoff
 from contactverif_properties.anywhere import any_cases, no_barrier, posed
-from contactverif_properties.kinks import dense, excuse
+from contactverif_properties.kinks import excuse
 
 SCALED_REASON = "powers of two scale the four operations and roots exactly; a power or an angle is rounded anew"
 TURNED_FORCES = Quantity("turned forces", "1", roundoff.TURNED, roundoff.TURNED_REASON)

@@ -7,12 +7,9 @@ from the positions; where it does not, one-sided differences of its residual mus
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy import sparse
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
@@ -66,12 +63,6 @@ def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tupl
     if "tangent" not in formulation.provides:
         return forces, np.zeros(1)
     return forces, dense(formulation.tangent(case.interface, pairing, z))
-
-
-def dense(tangent: Any) -> FloatArray:
-    """The tangent as an array (n_unknowns, n_unknowns)."""
-    array: FloatArray = tangent.toarray() if sparse.issparse(tangent) else np.asarray(tangent)
-    return array
 
 
 def kink_within(

@@ -17,7 +17,6 @@ from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases
-from contactverif_properties.anywhere import with_multipliers
 from contactverif_properties.patch import consistent_forces, force_columns
 
 TOO_MANY = Quantity(
@@ -35,7 +34,7 @@ def right_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
     that transmits nothing, as that of a node which faces nothing.
     """
     uniform = np.full(formulation.n_multipliers(case.interface), pressure)
-    pressed = with_multipliers(case, uniform)
+    pressed = case.with_multipliers(uniform)
     transfer = -force_columns(pressed, formulation, formulation.pair(case.interface, pressed.z))
     exact = consistent_forces(case, pressure).reshape(-1)
     nearest: FloatArray = optimize.nnls(transfer, exact)[0]  # one below 0 would be let go

@@ -8,7 +8,7 @@ from math import ceil, inf, log, log2
 import numpy as np
 from scipy import linalg
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing, Traits
 from contactverif.contract.property import Measurement, Property, Quantity
@@ -18,7 +18,7 @@ from contactverif.mechanics.newton import End, System, Trace, solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.anywhere import no_barrier
-from contactverif_properties.kinks import dense, kink_within
+from contactverif_properties.kinks import kink_within
 
 DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # 3e-2 … 1e-5, × the shortest segment
 DIRECTIONS = 2

@@ -14,7 +14,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.strategies import flat_cases
 from contactverif_properties import roundoff
-from contactverif_properties.anywhere import no_barrier, with_multipliers
+from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.kinks import excuse
 
 ERROR = roundoff.gap_quantity("error of a nodal force")
@@ -66,7 +66,7 @@ def _by_multipliers(
 ) -> tuple[FloatArray, float]:
     """Forces (n_unknowns,) of the multipliers that are asked about, and their largest over the mean of their sizes."""
     uniform = np.full(formulation.n_multipliers(case.interface), case.penalty * case.parameter("penetration"))
-    pressed = with_multipliers(case, uniform)
+    pressed = case.with_multipliers(uniform)
     transfer = -force_columns(pressed, formulation, formulation.pair(case.interface, pressed.z))
     if subject.traits.penalty == "nodal":
         multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
@@ -113,7 +113,7 @@ def resultant(case: Case, subject: Subject) -> Measurement:
     interface = case.interface.at(case.interface.nodes * stretch)
     formulation = subject.on(case)
     count = formulation.n_multipliers(interface)
-    case = with_multipliers(case, np.full(count, case.penalty * case.parameter("penetration")))
+    case = case.with_multipliers(np.full(count, case.penalty * case.parameter("penetration")))
     pairing = formulation.pair(interface, case.z)
     if count:
         columns = force_columns(replace(case, interface=interface), formulation, pairing)

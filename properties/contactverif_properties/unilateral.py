@@ -12,7 +12,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases
-from contactverif_properties.anywhere import no_barrier, with_multipliers
+from contactverif_properties.anywhere import no_barrier
 from contactverif_properties.patch import force_columns
 
 MOVES = 8
@@ -45,10 +45,10 @@ def open_and_closed(case: Case, subject: Subject) -> Measurement:
     def begins(there: Case) -> bool:
         if not count:
             return bool(_forces(formulation, there).any())
-        waiting = with_multipliers(there, np.zeros(count))
+        waiting = there.with_multipliers(np.zeros(count))
         return bool(force_columns(waiting, formulation, formulation.pair(interface, waiting.z)).any())
 
-    raised = with_multipliers(lifted(case, 2 * depth), np.zeros(count))
+    raised = lifted(case, 2 * depth).with_multipliers(np.zeros(count))
     values = {OPEN.name: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
     tolerances = {OPEN.name: 0.0}
     far = beyond(case)

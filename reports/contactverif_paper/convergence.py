@@ -9,11 +9,9 @@ Source: Zavarise & De Lorenzis (2009), Fig. 30, Sections 6.1 and 6.2.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy import sparse
 
+from contactverif.contract.arrays import dense
 from contactverif.mechanics import newton
 from contactverif.scenes import catalogue
 from contactverif_paper import cast
@@ -94,8 +92,3 @@ def _rate(stiffness: float) -> tuple[float, float]:
     iteration = np.eye(len(q)) - np.linalg.solve(basic, consistent)
     radius = float(np.abs(np.linalg.eigvals(iteration)).max())
     return radius, _last_rate(trace.residuals, float(trace.floors[-1]))
-
-
-def dense(matrix: Any) -> np.ndarray[Any, Any]:
-    """The matrix as an array."""
-    return np.asarray(matrix.toarray() if sparse.issparse(matrix) else matrix)

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactverif.contract.arrays import dense
 from contactverif.contract.result import NotLoaded
 from contactverif.mechanics import newton
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes import catalogue
 from contactverif_paper import cast
-from contactverif_paper.convergence import dense
 from contactverif_paper.paper_data import Member, Said, Statement, Tangents
 from contactverif_reports.html.pages import number
 

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import skfem
-from scipy import sparse
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.body import Body, block, rigid
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import bulk
@@ -23,12 +22,6 @@ from contactverif.mechanics.scene import Scene
 from contactverif.scenes.blocks import Placing, exact_unknowns, two_blocks
 
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
-
-
-def as_array(matrix: Any) -> FloatArray:
-    """A stiffness, which is sparse where it is large."""
-    array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else matrix
-    return array
 
 
 def distorted(body: Body, seed: int = 0) -> Body:
@@ -92,7 +85,7 @@ def size_over_cell(body: Body) -> float:
 
 @every_body
 def test_the_stiffness_is_that_of_skfem(body: Body) -> None:
-    matrix = as_array(stiffness(body)[0])
+    matrix = dense(stiffness(body)[0])
     turn = np.kron(np.eye(len(body.nodes)), body.frame)  # from the body's axes to the global ones
     expected = turn.T @ by_skfem(body) @ turn
     # differences of coordinates lose X/h
@@ -101,7 +94,7 @@ def test_the_stiffness_is_that_of_skfem(body: Body) -> None:
 
 @every_body
 def test_rigid_motions_cost_no_energy(body: Body) -> None:
-    matrix = as_array(stiffness(body)[0])
+    matrix = dense(stiffness(body)[0])
     x, y = (body.nodes @ body.frame).T
     for motion in ((1 + 0 * x, 0 * x), (0 * x, 1 + 0 * x), (-y, x)):
         u = np.column_stack(motion).reshape(-1)
@@ -382,7 +375,7 @@ def test_clockwise_cells_are_turned() -> None:
     turned[:, 1] = turned[::-1, 1]
     mixed = skfem.MeshQuad(QUADS.p, turned).with_defaults()
     assert (mixed.t[:, 1] != QUADS.t[:, 1]).any()
-    difference = as_array(stiffness(made(mixed))[0]) - as_array(stiffness(made())[0])
+    difference = dense(stiffness(made(mixed))[0]) - dense(stiffness(made())[0])
     assert np.abs(difference).max() <= 4 * UNIT_ROUNDOFF * stiffness(made())[0].max()
     assert edges_at(made(mixed)) == edges_at(made())
 
@@ -394,7 +387,7 @@ def test_a_body_from_a_mesh_is_the_block_of_the_same_grid() -> None:
     assert np.array_equal(meshed.fixed[order], drawn.fixed)
     assert np.array_equal(meshed.load[order], drawn.load)
     unknowns = (2 * np.array(order)[:, None] + np.arange(2)).reshape(-1)
-    ours, theirs = as_array(stiffness(drawn)[0]), as_array(stiffness(meshed)[0])[np.ix_(unknowns, unknowns)]
+    ours, theirs = dense(stiffness(drawn)[0]), dense(stiffness(meshed)[0])[np.ix_(unknowns, unknowns)]
     assert np.abs(ours - theirs).max() <= 4 * UNIT_ROUNDOFF * ours.max()
 
 

@@ -364,7 +364,7 @@ MUTANTS = (
     line("weights that do not add up to one", RESULTANT, "points", "np.full(n, 1 / n)", "np.full(n, 0.9 / n)",
          factory="vts_me"),
     line("search on the reference configuration", PATCH, "ppt",
-         "x, multipliers = one_parted(interface, z)\n        master = interface.master",
+         "x, multipliers = split_state(interface, z)\n        master = interface.master",
          "x, multipliers = np.array(interface.nodes), np.zeros(0)\n        master = interface.master"),
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),

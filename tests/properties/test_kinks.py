@@ -9,8 +9,9 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from scipy import sparse
 
+from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
-from contactverif_properties.kinks import dense, jump, kink_within
+from contactverif_properties.kinks import jump, kink_within
 
 REACH = 1e-6
 
