@@ -193,28 +193,28 @@ def claiming(make: Callable[..., Any], **promises: Any) -> Subject:
 @pytest.mark.parametrize(
     ("make", "property_id", "promises", "unexpected"),
     [
-        (contactverif_nts.nts, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised, and fails"),
-        (contactverif_nts.vts_me, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised, and fails"),
-        (contactverif_nts.vts_ppt, FORCE, {"conserves_force": True, "witnesses": {}}, "promised, and fails"),
-        (contactverif_nts.vts_ppt, MOMENT, {"conserves_moment": True, "witnesses": {}}, "promised, and fails"),
-        (contactverif_nts.vts_ppt_basic, TANGENT, {"tangent": "exact", "witnesses": {}}, "promised, and fails"),
+        (contactverif_nts.nts, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.vts_me, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.vts_ppt, FORCE, {"conserves_force": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.vts_ppt, MOMENT, {"conserves_moment": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.vts_ppt_basic, TANGENT, {"tangent": "exact", "witnesses": {}}, "promised to pass, but fails"),
         (
             contactverif_nts.vts_ppt,
             PATCH,
             {"passes_flat_patch": False, "witnesses": {PATCH: "c"}},
-            "said to fail, and passes",
+            "stated to fail, but passes",
         ),
         (
             contactverif_nts.vts_ppt_balanced,
             FORCE,
             {"conserves_force": False, "witnesses": {FORCE: "tilted"}},
-            "said to fail, and passes",
+            "stated to fail, but passes",
         ),
         (
             contactverif_nts.vts_me,
             TANGENT,
             {"tangent": "approximate", "witnesses": {TANGENT: "offset-c"}},
-            "said to fail, and passes",
+            "stated to fail, but passes",
         ),
         (contactverif_nts.vts_ppt, PATCH, {"passes_flat_patch": False, "witnesses": {}}, "crashed"),
         (

@@ -96,7 +96,7 @@ def verify(
     """
     from contactverif.cli.drawing import draw_case
     from contactverif.cli.progress import Bar
-    from contactverif.cli.run_tables import RunTable, counterexample, show, show_as_it_is, summary
+    from contactverif.cli.run_tables import RunTable, counterexample, how_to_keep, show, show_as_it_is, summary
     from contactverif.contract.subject import Subject
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import run
@@ -142,6 +142,8 @@ def verify(
                 typer.echo(f"    picture: {pictures / name}")
     if report is not None:
         typer.echo(f"report: {report}")
+    elif (advice := how_to_keep(found)) is not None:
+        show(advice)
     show(summary(found))
     raise typer.Exit(0 if found.passed else 1)
 

@@ -13,7 +13,7 @@ from contactverif.cli.comparison_tables import (
     DRAWN,
     ChangesTable,
     SideBySide,
-    conclusion,
+    last_line,
     mesh,
     outcome_of,
     stored_mesh,
@@ -164,7 +164,7 @@ def compare_formulations(names: Sequence[str], globs: Sequence[str], html: Path 
     for what, path in (("report", asked.report), ("page", html)):
         if path is not None:
             typer.echo(f"{what}: {path}")
-    show(conclusion(study.comparison))
+    show(last_line(study.comparison))
     return study.comparison.kept
 
 

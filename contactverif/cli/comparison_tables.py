@@ -14,8 +14,9 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from contactverif.cli.run_tables import plain_table
-from contactverif.contract.property import Outcome, Verdict
+from contactverif.cli.run_tables import PLAIN_STYLE, STYLES, conclusion, headline, plain_table
+from contactverif.contract.property import Outcome
+from contactverif.contract.result import result_of
 from contactverif.studies.comparison_study import Study
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import PARTS, Comparison, Differing
@@ -29,7 +30,6 @@ WIDE = 112  # columns in which the table of errors has room for what went furthe
 NARROW = 76  # columns below which tables leave out what can be done without, so that names stay whole
 NAMES = 18  # columns that a name has at least
 DRAWN = 3  # meshes in a terminal; more would bury the tables
-_STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
 
 
 class SideBySide:
@@ -41,10 +41,7 @@ class SideBySide:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
         found = self._study.comparison
         about = found.provenance
-        yield Text(
-            f"{', '.join(found.formulations[1:]) or 'nothing'} against {found.reference}: "
-            f"profile {about.get('profile')}, {about.get('examples')} examples a property, seed {about.get('seed')}"
-        )
+        yield Text(f"{', '.join(found.formulations[1:]) or 'nothing'} against {found.reference}: {headline(about)}")
         yield Text("")
         yield verdicts_table(found)
         narrow = options.max_width < NARROW
@@ -73,8 +70,8 @@ def _verdict(cell: Cell | None, reference: Cell | None) -> Text:
     if cell is None:
         return Text("  –", style="dim")
     mark = DIFFERS if reference is not None and cell.verdict is not reference.verdict else " "
-    said = f"{mark} {cell.verdict}{f' ({cell.unexpected.upper()})' if cell.unexpected else ''}"
-    return Text(said, style=_STYLES.get(cell.verdict, "dim"))
+    result = result_of(cell.verdict, cell.promise, "", cell.unexpected)
+    return Text(f"{mark} {result}", style=STYLES.get(result, PLAIN_STYLE))
 
 
 def errors_table(found: Comparison, *, with_worst: bool = True, with_counts: bool = True) -> Table:
@@ -314,17 +311,16 @@ def outcome_of(changes: Changes) -> Text:
     return Text.assemble(("".join(looks), "yellow"), ("\n".join(lines), "red"))
 
 
-def conclusion(found: Comparison) -> Text:
-    """One line: whether the candidates keep their promises."""
-    wrong = [f"{cell.formulation} {cell.property_id} ({cell.unexpected})" for cell in found.unexpected]
-    wrong += [f"{name} (not loaded)" for name in found.not_loaded]
+def last_line(found: Comparison) -> Text:
+    """Say whether the candidates keep their promises; the reference is not on trial."""
+    cells = [cell for cell in found.cells.values() if cell.formulation != found.reference]
     if found.kept:
-        fails = any(
-            cell.verdict is Verdict.FAIL for cell in found.cells.values() if cell.formulation != found.reference
-        )
-        announced = "; what fails was announced, or nothing was said of it" if fails else ""
-        return Text(f"every promise of {', '.join(found.formulations[1:])} kept{announced}", style="green")
-    return Text(f"{len(wrong)} unexpected: {'; '.join(wrong)}" if wrong else "nothing was asked", style="red")
+        return Text(f"Every promise of {', '.join(found.formulations[1:])} is kept.", style="green")
+    rows = []
+    for cell in cells:
+        result = result_of(cell.verdict, cell.promise, "", cell.unexpected)
+        rows.append((result, f"{cell.formulation} {cell.property_id}", cell.unexpected))
+    return conclusion(rows, list(found.not_loaded))
 
 
 def number(value: float) -> str:

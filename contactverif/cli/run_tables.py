@@ -6,7 +6,7 @@ import os
 import shlex
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -18,7 +18,7 @@ from rich.text import Text
 
 from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Outcome, Property, Verdict, excess
-from contactverif.contract.result import NotLoaded, Row, Run
+from contactverif.contract.result import NotLoaded, Result, Row, Run, result_of
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.mechanics.newton import End
 from contactverif.run.registry import Wrapper
@@ -30,12 +30,40 @@ if TYPE_CHECKING:  # slow to import
     from contactverif_reports.compare.cells import Cell
     from contactverif_reports.netcdf.stored import StoredReport, StoredRow
 
-_STYLES = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.CRASHED: "red", Verdict.NOT_JUDGED: "yellow"}
+STYLES = {  # Red only where the run fails by it; what a formulation states itself is no news.
+    Result.PASS: "green",
+    Result.FAIL: "magenta",
+    Result.BROKEN_PROMISE: "bold red",
+    Result.CRASHED: "red",
+    Result.NOT_LOADED: "red",
+    Result.NOT_JUDGED: "yellow",
+    Result.UNDECIDED: "yellow",
+}
+PLAIN_STYLE = "dim"  # The style of the other results.
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _PIPE_WIDTH = 140  # columns where no terminal says how many there are
-_COLUMNS = ("property", "promise", "verdict", "judged", "worst", "tolerance")
-_FEW = 3  # quantities that are written with their formulas
-_NUMBERS = _COLUMNS[3:]  # at the right end of their columns
+_COLUMNS = ("property", "promise", "result", "judged", "closest", "tolerance")
+_RIGHT_ALIGNED = _COLUMNS[3:]
+_LEGEND = {
+    "promise": "what the formulation states about itself: it passes, it fails, or – nothing",
+    "judged": "random cases that could be decided, of those planned",
+    "closest": "of all measured numbers the one nearest to its tolerance, or furthest beyond it",
+}
+_PLURALS = {
+    "broken promise": "broken promises",
+    "crash": "crashes",
+    "property not judged": "properties not judged",
+    "plugin not loaded": "plugins not loaded",
+}
+_MEANINGS = {  # Results that are explained below the table where they occur in it.
+    Result.FAIL: "the formulation fails, and states nothing about this property: news, but no broken promise",
+    Result.FAILS_AS_STATED: "the formulation states itself that it fails here, or --known lists it",
+    Result.BROKEN_PROMISE: "the formulation does not do what it states",
+    Result.UNDECIDED: "roundoff or a kink leaves open whether it passes; the reason stands beside it",
+    Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided",
+    Result.NOT_APPLICABLE: "the property makes no sense for this formulation",
+    Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
+}
 
 
 class _Console(Console):
@@ -63,7 +91,7 @@ class _Line:
     """One formulation, one property, in words; `quantity` names the worst number where there are several."""
 
     formulation: str
-    verdict: Verdict
+    result: Result
     cells: tuple[str, ...]
     quantity: str
     remark: str
@@ -98,7 +126,7 @@ class StoredTable:
 def _verdicts(
     provenance: Mapping[str, str], found: Iterable[_Line], not_loaded: Mapping[str, str], max_width: int
 ) -> Iterator[Text]:
-    yield Text(_asked(provenance))
+    yield Text(headline(provenance))
     lines = list(found)
     widths = [max(map(len, column)) for column in zip(_COLUMNS, *(line.cells for line in lines), strict=True)]
     if lines:
@@ -114,21 +142,35 @@ def _verdicts(
         said = [text for text in (one.remark, one.quantity) if text]
         behind = next((text for text in ("; ".join(said), one.remark) if len(line) + 2 + len(text) <= max_width), "")
         text = Text(f"{line}  {behind}".rstrip(), no_wrap=True, overflow="ignore")
-        text.stylize(_STYLES.get(one.verdict, "dim"), at_verdict, at_verdict + len(one.cells[2]))
+        text.stylize(STYLES.get(one.result, PLAIN_STYLE), at_verdict, at_verdict + len(one.cells[2]))
         yield text
         if one.remark and not behind:
             yield _folded(one.remark, max_width)
     for name, reason in not_loaded.items():
         yield Text(name, style="bold")
         yield _folded(f"{Verdict.NOT_LOADED}: {reason}", max_width, style="red")
+    if lines:
+        yield from _legend({line.result for line in lines}, max_width)
+
+
+def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
+    """Explain the columns, and those of the results that do not explain themselves."""
+    entries = _LEGEND | {str(result): words for result, words in _MEANINGS.items() if result in results}
+    width = max(map(len, entries))
+    yield Text("")
+    for name, words in entries.items():
+        indent = " " * (width + 4)
+        folded = textwrap.wrap(words, max(max_width - len(indent), 20))
+        yield Text(f"  {name:{width}}  " + f"\n{indent}".join(folded), style="dim", no_wrap=True, overflow="ignore")
+    yield Text("")
 
 
 def _line(row: Row) -> _Line:
     value, tolerance, quantity = _worst(row)
     judged = f"{row.judged}/{row.planned}" if row.planned else "–"
-    cells = row.question.id, _PROMISES[row.promise], str(row.verdict), judged, value, tolerance
+    cells = row.question.id, _PROMISES[row.promise], str(row.result), judged, value, tolerance
     undecided = sum(outcome.verdict is Verdict.UNDECIDED for outcome in row.outcomes)
-    return _Line(row.formulation, row.verdict, cells, quantity, _remark(row, row.known, undecided))
+    return _Line(row.formulation, row.result, cells, quantity, _remark(row, row.known, undecided))
 
 
 def _stored_line(row: StoredRow) -> _Line:
@@ -136,14 +178,15 @@ def _stored_line(row: StoredRow) -> _Line:
     value = f"{worst.value:.2g}" if worst else ""
     tolerance = f"{worst.sign} {worst.tolerance:.2g}" if worst else ""
     judged = f"{cell.judged}/{cell.planned}" if cell.planned else "–"
-    cells = cell.property_id, _PROMISES[cell.promise], str(cell.verdict), judged, value, tolerance
+    result = result_of(cell.verdict, cell.promise, row.known, cell.unexpected)
+    cells = cell.property_id, _PROMISES[cell.promise], str(result), judged, value, tolerance
     quantity = worst.quantity.name if worst and row.n_quantities > 1 else ""
-    return _Line(cell.formulation, cell.verdict, cells, quantity, _remark(cell, row.known, row.undecided))
+    return _Line(cell.formulation, result, cells, quantity, _remark(cell, row.known, row.undecided))
 
 
 def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
     return "  ".join(
-        cell.rjust(width) if name in _NUMBERS else cell.ljust(width)
+        cell.rjust(width) if name in _RIGHT_ALIGNED else cell.ljust(width)
         for name, cell, width in zip(_COLUMNS, cells, widths, strict=True)
     )
 
@@ -155,43 +198,67 @@ def _folded(words: str, width: int, style: str = "") -> Text:
 
 
 def counterexample(row: Row, report: Path | None) -> Text | None:
-    """What failed, on the smallest mesh found, and the line that replays it; None where nothing failed."""
+    """Draw the smallest mesh found on which the row fails, with the line that replays it; None if nothing failed."""
     outcome = row.shrunk or row.witness
     if row.verdict not in (Verdict.FAIL, Verdict.CRASHED) or outcome is None:
         return None
-    of_witness = f" (witness {outcome.case.name})" if outcome is row.witness else ""
+    which = f"the case {outcome.case.name}" if outcome is row.witness else "the smallest case found"
     lines = [
-        f"{row.formulation}, {row.question.id}: {outcome.verdict}{of_witness}",
+        f"{row.formulation}, {row.question.id}: {row.result}, {which}",
         *(f"    {line}" for line in _numbers(row.question, outcome)),
         *(f"    {line}" for line in as_text(outcome.case).splitlines()),
     ]
-    if report is None:
-        lines.append("    to keep and replay it, run again with --report FILE.nc and the same --seed")
-    else:
+    if report is not None:
         name = case_id(row.formulation, row.question.id, witness=outcome is row.witness)
         lines.append(f"    contactverif replay {shlex.quote(str(report))} --case {shlex.quote(name)}")
     return Text("\n".join(["", *lines]))
 
 
+def how_to_keep(found: Run) -> Text | None:
+    """Say how the drawn cases are stored, so that they can be replayed; None where none was drawn."""
+    if all(counterexample(row, None) is None for row in found.rows):
+        return None
+    seed = found.provenance.get("seed")
+    return Text(f"\nTo keep these cases and replay them, run the same command with --seed {seed} --out FILE.nc\n")
+
+
 def summary(found: Run) -> Text:
-    """One line: how it came out, and why if not well."""
-    wrong = [f"{row.formulation} {row.question.id} ({row.unexpected})" for row in found.rows if row.unexpected]
-    wrong += [f"{item.formulation} (not loaded)" for item in found.not_loaded]
-    return _summed_up(found.passed, wrong)
+    """Say in the last line whether every promise is kept, and if not what is wrong."""
+    wrong = [(row.result, f"{row.formulation} {row.question.id}", row.unexpected) for row in found.rows]
+    return conclusion(wrong, [item.formulation for item in found.not_loaded])
 
 
 def stored_summary(found: StoredReport) -> Text:
-    """The same of a stored report."""
-    cells = [row.cell for row in found.unexpected]
-    wrong = [f"{cell.formulation} {cell.property_id} ({cell.unexpected})" for cell in cells]
-    wrong += [f"{name} (not loaded)" for name in found.not_loaded]
-    return _summed_up(found.passed, wrong)
+    """Say the same of a stored report."""
+    wrong = []
+    for row in found.rows.values():
+        cell = row.cell
+        result = result_of(cell.verdict, cell.promise, row.known, cell.unexpected)
+        wrong.append((result, f"{cell.formulation} {cell.property_id}", cell.unexpected))
+    return conclusion(wrong, list(found.not_loaded))
 
 
-def _summed_up(passed: bool, wrong: Sequence[str]) -> Text:
-    if passed:
-        return Text("every promise kept, every property judged", style="green")
-    return Text(f"{len(wrong)} unexpected: {'; '.join(wrong)}" if wrong else "nothing was asked", style="red")
+def conclusion(rows: Sequence[tuple[Result, str, str]], not_loaded: Sequence[str]) -> Text:
+    """Sum up rows (result, formulation and property, why it fails the run) and plugins that did not load."""
+    wrong = {result: [(name, why) for found, name, why in rows if found is result and why] for result in Result}
+    said = [
+        *_counted("broken promise", [f"{name} ({why})" for name, why in wrong[Result.BROKEN_PROMISE]]),
+        *_counted("crash", [name for name, _ in wrong[Result.CRASHED]]),
+        *_counted("property not judged", [name for name, _ in wrong[Result.NOT_JUDGED]]),
+        *_counted("plugin not loaded", not_loaded),
+    ]
+    if said:
+        return Text(". ".join(said) + ".", style="red")
+    if not rows:
+        return Text("Nothing was checked.", style="red")
+    return Text("Every promise is kept and every property was judged.", style="green")
+
+
+def _counted(what: str, names: Sequence[str]) -> list[str]:
+    """Return "2 broken promises: …" in a list, or an empty one where there are no names."""
+    if not names:
+        return []
+    return [f"{len(names)} {what if len(names) == 1 else _PLURALS[what]}: {'; '.join(names)}"]
 
 
 def replayed(stored: StoredCase, name: str, outcome: Outcome) -> Table:
@@ -244,8 +311,10 @@ def plain_table(title: str) -> Table:
     )
 
 
-def _asked(about: Mapping[str, str]) -> str:
-    return f"profile {about.get('profile')}, {about.get('examples')} examples a property, seed {about.get('seed')}"
+def headline(about: Mapping[str, str]) -> str:
+    """Say how much was asked, from the root attributes of a run."""
+    profile, examples, seed = (about.get(name) for name in ("profile", "examples", "seed"))
+    return f"profile {profile}: {examples} random cases for each property, seed {seed}"
 
 
 def _promises(traits: Traits, every_trait: bool) -> list[str]:
@@ -292,7 +361,7 @@ def _worst(row: Row) -> tuple[str, str, str]:
 
 def _remark(row: Row | Cell, known: str, undecided: int) -> str:
     parts = [
-        row.unexpected.upper() if row.unexpected else "",
+        row.unexpected if row.unexpected not in ("", "crashed", "not judged") else "",
         f"known: {known}" if known else "",
         row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
         f"{undecided} undecided" if undecided else "",
@@ -301,32 +370,34 @@ def _remark(row: Row | Cell, known: str, undecided: int) -> str:
 
 
 def _numbers(question: Property, outcome: Outcome) -> list[str]:
-    """Each quantity against its tolerance; the reason where there are none."""
+    """Write each quantity beside its tolerance and how Newton ended; the reason where nothing was measured."""
     measured: Measurement | None = outcome.measurement
     if measured is None:
         return [outcome.reason]
     lines = [measured.broken] if measured.broken else []
-    told = [quantity for quantity in question.quantities if quantity.name in measured.values]
-    apart = len(told) > _FEW  # then a formula that several share is written once, below
-    for quantity in told:
-        value, tolerance = measured.values[quantity.name], measured.tolerances[quantity.name]
-        mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
-        formula = "" if apart else f" = {quantity.tolerance}"
-        lines.append(f"{mark} {quantity.name} {value:.3g}, {quantity.sense} {tolerance:.3g}{formula}")
-    if apart:
-        formulas: dict[str, list[str]] = {}
-        for quantity in told:
-            formulas.setdefault(quantity.tolerance, []).append(quantity.name)
-        most = max(formulas, key=lambda formula: len(formulas[formula]))
-        lines.append(f"tolerance: {most}")
-        lines += [f"of {', '.join(names)}: {formula}" for formula, names in formulas.items() if formula != most]
-    if measured.details:
-        lines.append("; ".join(_detail(name, value) for name, value in measured.details.items()))
-    return lines
+    for quantity in question.quantities:
+        if quantity.name in measured.values:
+            value, tolerance = measured.values[quantity.name], measured.tolerances[quantity.name]
+            mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
+            lines.append(f"{mark} {quantity.name}: {value:.3g}, must be {quantity.sense} {tolerance:.3g}")
+    return lines + _details(measured.details)
 
 
-def _detail(name: str, value: float) -> str:
-    """A further number; how Newton ended, in words."""
-    what, _, of = name.partition(", ")
-    words = End(int(value)).words if what == "end" and value in list(End) else f"{value:.3g}"
-    return f"{what} {words}{f' ({of})' if of else ''}"
+def _details(details: Mapping[str, float]) -> list[str]:
+    """Write how each solution ended, a line each, then the other details in one line."""
+    lines, others = [], []
+    for name, value in details.items():
+        what, _, which = name.partition(", ")
+        behind = f" ({which})" if which else ""
+        iterations = details.get(name.replace("end", "iterations", 1))
+        if what == "end" and value in list(End) and iterations is not None:
+            lines.append(f"Newton's method{behind}: {_ending(End(int(value)), iterations)}")
+        elif what != "iterations":
+            others.append(f"{what}{behind}: {value:.3g}")
+    return lines + (["; ".join(others)] if others else [])
+
+
+def _ending(end: End, iterations: float) -> str:
+    """Say how a solution ended and, if it did not converge, what to try next."""
+    after = f"after {iterations:g} iteration{'s' * (iterations != 1)}"
+    return f"{end.words} {after}" if end is End.CONVERGED else f"{end.words} {after}: {end.advice}"

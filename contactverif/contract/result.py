@@ -4,10 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from contactverif.contract.property import Outcome, Property, Verdict
 
-JUDGED_SHARE = 0.9  # a property with a smaller share of its planned cases judged is not judged
+JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
+BROKEN_BY_FAILING = "promised to pass, but fails"
+BROKEN_BY_PASSING = "stated to fail, but passes"
+
+
+class Result(StrEnum):
+    """The word for a row in every table and page: the verdict, seen beside what the formulation states."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    FAILS_AS_STATED = "fails as stated"
+    BROKEN_PROMISE = "BROKEN PROMISE"
+    CRASHED = "crashed"
+    UNDECIDED = "undecided"
+    NOT_JUDGED = "not judged"
+    NOT_APPLICABLE = "not applicable"
+    NOT_PROVIDED = "not provided"
+    NOT_LOADED = "not loaded"
+
+
+def result_of(verdict: Verdict, promise: bool | None, known: str, unexpected: str) -> Result:
+    """Return the word for a verdict, given what the formulation states and why the row makes the run fail, if so."""
+    failed = verdict in (Verdict.FAIL, Verdict.CRASHED)
+    if unexpected and verdict not in (Verdict.CRASHED, Verdict.NOT_JUDGED):
+        return Result.BROKEN_PROMISE
+    if failed and not unexpected and (promise is False or known):
+        return Result.FAILS_AS_STATED
+    return Result[verdict.name]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,22 +92,26 @@ class Row:
 
     @property
     def unexpected(self) -> str:
-        """Empty, or why this row makes the run fail."""
-        if self.verdict is Verdict.CRASHED:
-            return "" if self.known else "crashed"
-        if self.verdict is Verdict.FAIL and self.breach and not self.known:
-            return "breaks the contract"
-        if self.verdict is Verdict.NOT_PROVIDED and self.promise is True and not self.known:
-            return "promised, and not provided"
-        if self.verdict is Verdict.NOT_JUDGED:
-            return "not judged"
-        if self.verdict is Verdict.FAIL and self.promise is True and not self.known:
-            return "promised, and fails"
-        if self.verdict is Verdict.PASS and self.promise is False:
-            return "said to fail, and passes"
-        if self.verdict is Verdict.PASS and self.known:
-            return "known to fail, and passes"
+        """Why this row makes the run fail; empty if it does not."""
+        match self.verdict:
+            case Verdict.CRASHED:
+                return "" if self.known else "crashed"
+            case Verdict.NOT_JUDGED:
+                return "not judged"
+            case Verdict.FAIL if not self.known:
+                return "breaks the contract" if self.breach else BROKEN_BY_FAILING if self.promise else ""
+            case Verdict.NOT_PROVIDED if self.promise and not self.known:
+                return "promised to pass, but a part that it needs is not provided"
+            case Verdict.PASS if self.promise is False:
+                return BROKEN_BY_PASSING
+            case Verdict.PASS if self.known:
+                return "listed as a known failure, but passes"
         return ""
+
+    @property
+    def result(self) -> Result:
+        """The word for the row in tables and pages."""
+        return result_of(self.verdict, self.promise, self.known, self.unexpected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -250,7 +250,7 @@ def test_a_plugin_that_does_not_load_is_a_row_and_the_others_run(ask: Ask) -> No
     assert "absent\n      not loaded: ModuleNotFoundError: No module named 'no_such_module'\n" in answer.out
     assert "unlicensed\n      not loaded: make: RuntimeError: no licence [red] left\n" in answer.out
     assert rows(answer.out)["nts", "purity"][:3] == ["passes", "pass", "3/3"]
-    assert answer.out.endswith("2 unexpected: absent (not loaded); unlicensed (not loaded)\n")
+    assert answer.out.endswith("2 plugins not loaded: absent; unlicensed.\n")
     assert not answer.err
 
 
@@ -261,7 +261,7 @@ def test_a_plugin_that_raises_or_returns_nan_is_an_outcome(ask: Ask, tmp_path: P
     answer = ask("verify", "raising", "nan", "nts", *options)
     assert answer.status == 1
     assert rows(answer.out)["raising", "balance.force"][1] == "crashed"
-    assert rows(answer.out)["nan", "balance.force"][1] == "fail"
+    assert rows(answer.out)["nan", "balance.force"][1:3] == ["BROKEN", "PROMISE"]
     assert rows(answer.out)["nts", "balance.force"][1] == "pass"
     assert "exception: residual: KeyError: '[/bold] is no markup'" in answer.out
     assert "not finite: residual: nan in" in answer.out
@@ -296,9 +296,9 @@ def test_verify_says_what_was_asked_and_how_it_came_out(ask: Ask) -> None:
     answer = ask("verify", "vts-ppt-balanced", "-p", "balance.*", "-p", "purity", "--examples", "7", "--seed", "1")
     assert answer.status == 0
     assert not answer.err
-    assert answer.out.startswith("profile dev, 7 examples a property, seed 1\n")
+    assert answer.out.startswith("profile dev: 7 random cases for each property, seed 1\n")
     assert set(rows(answer.out)) == {("vts-ppt-balanced", one) for one in ("balance.force", "balance.moment", "purity")}
-    assert answer.out.endswith("\nevery promise kept, every property judged\n")
+    assert answer.out.endswith("\nEvery promise is kept and every property was judged.\n")
     promise, verdict, judged, worst, sign, tolerance = rows(answer.out)["vts-ppt-balanced", "balance.force"]
     assert (promise, verdict, judged, sign) == ("passes", "pass", "7/7", "≤")
     assert 0 <= float(worst) <= float(tolerance) < 1e-6
@@ -307,20 +307,22 @@ def test_verify_says_what_was_asked_and_how_it_came_out(ask: Ask) -> None:
 def test_what_fails_as_promised_is_drawn_and_the_run_passes(ask: Ask) -> None:
     answer = ask("verify", "nts", "vts-ppt", "-p", "patch.*", "--examples", "10", "--seed", "1")
     assert answer.status == 0
-    promise, verdict, judged, worst, _, tolerance = rows(answer.out)["nts", "patch.flat.transmission"]
-    assert (promise, verdict, judged) == ("fails", "fail", "10/10")
-    assert float(worst) > float(tolerance)
+    promise, fails, as_, stated, judged, closest, _, tolerance = rows(answer.out)["nts", "patch.flat.transmission"]
+    assert (promise, fails, as_, stated, judged) == ("fails", "fails", "as", "stated", "10/10")
+    assert float(closest) > float(tolerance)
     assert rows(answer.out)["vts-ppt", "patch.flat.transmission"][:3] == ["passes", "pass", "10/10"]
-    assert "nts, patch.flat.transmission: fail\n    ✗ error of a nodal force" in answer.out
+    first_lines = "nts, patch.flat.transmission: fails as stated, the smallest case found\n    ✗ error of a "
+    assert first_lines in answer.out
     assert "●──" in answer.out
-    assert "run again with --report FILE.nc and the same --seed" in answer.out
+    assert "run the same command with --seed 1 --out FILE.nc" in answer.out
 
 
 def test_a_known_failure_that_passes_fails_the_run(ask: Ask) -> None:
     answer = ask("verify", "nts", "-p", "purity", "--known", "purity=issue 12", "--examples", "3", "--seed", "1")
     assert answer.status == 1
-    assert "KNOWN TO FAIL, AND PASSES; known: issue 12" in answer.out
-    assert answer.out.endswith("1 unexpected: nts purity (known to fail, and passes)\n")
+    assert "BROKEN PROMISE" in answer.out
+    assert "listed as a known failure, but passes; known: issue 12" in answer.out
+    assert answer.out.endswith("1 broken promise: nts purity (listed as a known failure, but passes).\n")
 
 
 def test_all_is_every_installed_formulation(ask: Ask) -> None:
@@ -344,10 +346,10 @@ def test_the_table_lines_up_at_any_width(ask: Ask, columns: int) -> None:
     table = answer.out.split("\n\n")[1].splitlines()
     assert max(map(len, table)) <= columns
     head, *lines = table
-    verdict, tolerance = head.index("verdict"), head.index("tolerance") + len("tolerance")
+    result, tolerance = head.index("result"), head.index("tolerance") + len("tolerance")
     for line in lines:
         if re.match(r"  \S", line) and "not applicable" not in line:
-            assert line[verdict : verdict + 5].rstrip() in ("pass", "fail")
+            assert line[result : result + 15].rstrip() in ("pass", "fails as stated")
             assert line[:tolerance].rstrip() == line[:tolerance]
             assert re.search(r"[≤≥] \S+$", line[:tolerance])
             assert line[tolerance : tolerance + 2].strip() == ""

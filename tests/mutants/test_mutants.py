@@ -45,7 +45,7 @@ def test_a_run_finds_a_mutant_out_and_shrinks_it() -> None:
     mutant = next(one for one in MUTANTS if one.name == "ξ of the last segment from its other end")
     found = run([Subject(mutant.name, mutant.make)], [the_property(mutant.caught_by)], profile="ci")
     (row,) = found.rows
-    assert row.unexpected == "promised, and fails"
+    assert row.unexpected == "promised to pass, but fails"
     assert not found.passed
     assert row.shrunk is not None
     assert row.shrunk.verdict is Verdict.FAIL

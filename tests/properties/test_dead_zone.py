@@ -145,13 +145,13 @@ class Claims:
         (contactverif_nts.vts_me, {}, ""),
         (contactverif_nts.vts_ppt, {}, ""),
         (contactverif_nts.vts_ppt, {"covers_overhang": None}, ""),
-        (contactverif_nts.vts_ppt, {"covers_overhang": True}, "promised, and fails"),
+        (contactverif_nts.vts_ppt, {"covers_overhang": True}, "promised to pass, but fails"),
         (contactverif_nts.vts_ppt_balanced, {}, ""),
         (contactverif_mortar.sts, {"covers_overhang": False}, "crashed"),  # and names no witness
         (
             contactverif_mortar.sts,
             {"covers_overhang": False, "witnesses": {"patch.dead-zone": "dead-zone"}},
-            "said to fail, and passes",
+            "stated to fail, but passes",
         ),
     ],
 )

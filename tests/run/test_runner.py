@@ -273,7 +273,7 @@ def test_a_plugin_that_answers_differently_each_time_still_gives_a_case() -> Non
         (2, Verdict.FAIL, ""),  # random cases and the witness fail
         (7, Verdict.FAIL, ""),
         (8, Verdict.FAIL, ""),  # the witness passes, random cases fail
-        (10**6, Verdict.PASS, "said to fail, and passes"),
+        (10**6, Verdict.PASS, "stated to fail, but passes"),
     ],
 )
 @pytest.mark.usefixtures("witnesses")
@@ -311,7 +311,7 @@ def test_only_a_promise_to_fail_has_a_witness() -> None:
 
 
 def test_a_broken_promise_fails_the_run_and_a_missing_one_does_not() -> None:
-    assert one_row(subject(from_size(5), passes_flat_patch=True)).unexpected == "promised, and fails"
+    assert one_row(subject(from_size(5), passes_flat_patch=True)).unexpected == "promised to pass, but fails"
     assert one_row(subject(from_size(5))).unexpected == ""
 
 
@@ -346,7 +346,7 @@ def test_what_cannot_be_asked_is_a_row_without_cases(question: Property, verdict
 
 def test_a_promise_about_a_missing_part_is_broken() -> None:
     row = one_row(subject(passes_flat_patch=True), replace(ZERO, needs=frozenset({"tangent"})))
-    assert row.unexpected == "promised, and not provided"
+    assert row.unexpected == "promised to pass, but a part that it needs is not provided"
 
 
 def test_the_given_interface_reaches_the_strategy() -> None:
@@ -361,7 +361,7 @@ def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:
     assert (fails.verdict, fails.known, fails.unexpected) == (Verdict.FAIL, "issue 12", "")
     assert one_row(subject(raising_from(5)), known=known).unexpected == ""
     assert one_row(subject(lambda size: np.nan), known=known).unexpected == ""
-    assert one_row(subject(), known=known).unexpected == "known to fail, and passes"
+    assert one_row(subject(), known=known).unexpected == "listed as a known failure, but passes"
 
 
 def test_a_known_failure_that_matches_nothing_is_an_error() -> None:

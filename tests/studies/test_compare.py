@@ -306,8 +306,8 @@ def test_a_verdict_that_got_worse(old: Verdict, new: Verdict, said: list[str]) -
 
 
 def test_a_promise_that_is_not_kept_any_more() -> None:
-    old, new = cell(0.5, promise=False), cell(0.5, promise=False, unexpected="said to fail, and passes")
-    assert change(old, new, same_seed=True).regressions == ("as promised → said to fail, and passes",)
+    old, new = cell(0.5, promise=False), cell(0.5, promise=False, unexpected="stated to fail, but passes")
+    assert change(old, new, same_seed=True).regressions == ("as promised → stated to fail, but passes",)
     assert change(new, new, same_seed=True).regressions == ()
 
 

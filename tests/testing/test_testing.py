@@ -113,7 +113,7 @@ def test_a_failure_tells_all_that_one_needs(author: pytest.Pytester) -> None:
         [
             "check = <check bad-patch.zero>",
             ">       check()",
-            "E       AssertionError: patch.zero: bad: promised, and fails",
+            "E       AssertionError: patch.zero: bad: promised to pass, but fails",
             "E         No force at rest.",
             "E         40 of 40 cases judged",
             "E         the worst: error 1, at most 1e-06",
@@ -134,10 +134,14 @@ def test_a_failure_tells_all_that_one_needs(author: pytest.Pytester) -> None:
     [
         ("'silent', properties=('patch.zero',)", "xfailed", "fails, and promised nothing: error 1, at most 1e-06"),
         ("'bad', properties=('patch.zero',), known={'patch.zero': 'issue 12'}", "xfailed", "known: issue 12"),
-        ("'good', properties=('patch.zero',), known={'patch.zero': 'x'}", "failed", "known to fail, and passes"),
+        (
+            "'good', properties=('patch.zero',), known={'patch.zero': 'x'}",
+            "failed",
+            "listed as a known failure, but passes",
+        ),
         ("'good', properties=('patch.kink',)", "failed", "not judged"),
         ("'lost', properties=('patch.zero',)", "failed", "lost: not loaded: make: RuntimeError: no licence"),
-        ("bad, properties=('patch.zero',)", "failed", "patch.zero: bad: promised, and fails"),
+        ("bad, properties=('patch.zero',)", "failed", "patch.zero: bad: promised to pass, but fails"),
         ("lambda *, penalty: bad(penalty=penalty), properties=('patch.curved',)", "skipped", "<lambda>-patch.curved"),
     ],
 )
