@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import judge_case
     from contactverif.run.runner import run as verify
-    from contactverif.scenes.catalogue import scene_named
+    from contactverif.scenes.catalogue import load_scene
 
 __version__ = "0.1.0"
 
@@ -44,7 +44,7 @@ _HOMES = {
     "meshes.mesh_file": ("read_interface",),
     "run.registry": ("load_formulation", "load_properties"),
     "run.runner": ("judge_case", "verify"),
-    "scenes.catalogue": ("scene_named",),
+    "scenes.catalogue": ("load_scene",),
 }
 _NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
@@ -78,8 +78,8 @@ __all__ = [
     "judge_case",
     "load_formulation",
     "load_properties",
+    "load_scene",
     "read_interface",
-    "scene_named",
     "solve",
     "verify",
 ]

@@ -48,16 +48,16 @@ GROUPS = (ELASTIC_A, ("b", "example-1"), ("c", "c-prime", "example-1bis"))
 
 def tolerance_of(name: str) -> float:
     """Return what roundoff may make of the stress in a named scene, over the pressure."""
-    scene = catalogue.made(name)
+    scene = catalogue.make_scene(name)
     return condition_tolerance(scene, scene.penalty)
 
 
 def error_of(formulation: str, name: str) -> float:
     """Return the largest error of a stress at a Gauss point, over the pressure."""
-    scene = catalogue.made(name)
+    scene = catalogue.make_scene(name)
     subject = load_formulation(formulation)
     assert isinstance(subject, Subject)
-    trace = newton.solve(scene, subject.on(scene.case()))
+    trace = newton.solve(scene, subject.for_case(scene.case()))
     assert trace.converged
     return stress_error(scene, scene.stresses(trace.solution))
 
@@ -80,10 +80,10 @@ def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
 
 def multipliers(formulation: str, name: str) -> FloatArray:
     """Of the solved scene (n_multipliers,), over the pressure."""
-    scene = catalogue.made(name)
+    scene = catalogue.make_scene(name)
     subject = load_formulation(formulation)
     assert isinstance(subject, Subject)
-    found: FloatArray = newton.solve(scene, subject.on(scene.case())).multipliers / scene.facts["pressure"]
+    found: FloatArray = newton.solve(scene, subject.for_case(scene.case())).multipliers / scene.facts["pressure"]
     return found
 
 
@@ -106,7 +106,7 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
     assert isinstance(question, Property)
     subject = load_formulation("vts-me-lm")
     assert isinstance(subject, Subject)
-    outcome = judge_case(question, catalogue.made(name).case(), subject)
+    outcome = judge_case(question, catalogue.make_scene(name).case(), subject)
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     beyond = {key for key, value in outcome.measurement.values.items() if value > outcome.measurement.tolerances[key]}
@@ -124,6 +124,6 @@ def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_t
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     assert outcome.measurement.values == {"multipliers too many": 7.0}
-    trace = newton.solve(scene, subject.on(scene.case()))
+    trace = newton.solve(scene, subject.for_case(scene.case()))
     assert trace.converged
     assert trace.deficiency == 7

@@ -144,7 +144,7 @@ def test_the_printed_vts_ppt_loses_one_minus_the_cosine_of_the_tilt(name: str) -
 
 def printed_forces(name: str) -> Any:
     case = named_case("tilted")
-    formulation = the_formulation(name).on(case)
+    formulation = the_formulation(name).for_case(case)
     return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
 
 

@@ -436,11 +436,11 @@ def _interface(mesh: Path | None, slave: str | None, master: str | None, flip: b
 def _scene(scene: str | None, mesh: Path | None) -> Case | None:
     if scene is None:
         return None
-    from contactverif.scenes.catalogue import scene_named
+    from contactverif.scenes.catalogue import load_scene
 
     if mesh is not None:
         raise MisuseError("--scene", f"{scene} and --mesh {mesh}", "one of the two")
-    return scene_named(scene).case()
+    return load_scene(scene).case()
 
 
 def _reason(text: str) -> tuple[str, str]:

@@ -24,7 +24,7 @@ from contactverif.cli.run_tables import show, show_as_it_is
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.names import unknown
+from contactverif.contract.names import unknown_name_error
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
@@ -225,7 +225,7 @@ def _only(report: StoredCells, globs: Sequence[str], both: Sequence[StoredCells]
     every = dict.fromkeys(id_ for one in both for id_ in one.properties)
     for glob in globs:
         if not any(fnmatchcase(id_, glob) for id_ in every):
-            raise unknown("--property", glob, every)
+            raise unknown_name_error("--property", glob, every)
     return report.only([id_ for id_ in every if not globs or any(fnmatchcase(id_, glob) for glob in globs)])
 
 

@@ -17,7 +17,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on, judged, the_formulation, the_property
 from contactverif.run.registry import formulation_names, load_formulation
-from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports import draw as pictures
 from contactverif_reports.draw import as_text
@@ -64,7 +64,7 @@ def draw(report: Path | None, case_id: str | None, scene: str | None, names: Seq
         for option, given in (("--case", case_id), ("REPORT", report)):
             if given is not None:
                 raise MisuseError("--scene", f"{scene} and {option} {given}", "one of the two")
-        case = scene_named(scene).case()
+        case = load_scene(scene).case()
         if not names:
             raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
         return _draw_solved(case, names, scene, targets)

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.scenes.catalogue import BLOCKS, SCENES, options_of, scene_named
+from contactverif.scenes.catalogue import BLOCKS, SCENES, load_scene, options_of
 from contactverif_reports.draw.scene_text import blocks_as_text, silhouettes_as_text
 
 SOURCE = "Zavarise & De Lorenzis (2009)"
@@ -44,7 +44,7 @@ class Gallery:
             if name not in BLOCKS:
                 own = (f"{option} {_shown(default)}".strip() for option, default in options_of(name).items())
                 yield _folded(f"options: {', '.join(own)}", width)
-            scene = scene_named(name)
+            scene = load_scene(name)
             slave, master = scene.bodies
             draw = blocks_as_text if name in BLOCKS else silhouettes_as_text
             picture = draw(scene.case(), slave, master, width - _MARGIN)

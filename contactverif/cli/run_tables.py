@@ -400,4 +400,4 @@ def _details(details: Mapping[str, float]) -> list[str]:
 def _ending(end: End, iterations: float) -> str:
     """Say how a solution ended and, if it did not converge, what to try next."""
     after = f"after {iterations:g} iteration{'s' * (iterations != 1)}"
-    return f"{end.words} {after}" if end is End.CONVERGED else f"{end.words} {after}: {end.advice}"
+    return f"{end.label} {after}" if end is End.CONVERGED else f"{end.label} {after}: {end.advice}"

@@ -18,7 +18,7 @@ UNIT_ROUNDOFF = 2.0**-53
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
-def frozen(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
+def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
     """A contiguous copy of `values` with the given dtype that nobody can write on.
 
     It stands on immutable bytes: a plugin cannot make it writeable again and change what others are judged on.

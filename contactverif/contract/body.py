@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, frozen
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
 
 _CORNERS = (3, 4)  # nodes of a cell: triangles or quadrilaterals
@@ -91,8 +91,8 @@ class Body:
         if not len(self.contact):
             self._refuse("contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)")
         frame = [[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]]
-        object.__setattr__(self, "frame", frozen(frame, np.float64))
-        object.__setattr__(self, "contact_nodes", frozen(np.unique(self.contact), np.int64))
+        object.__setattr__(self, "frame", freeze(frame, np.float64))
+        object.__setattr__(self, "contact_nodes", freeze(np.unique(self.contact), np.int64))
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
         for name, low, high, needed in (
@@ -118,7 +118,7 @@ class Body:
         return len(self.cells) == 0
 
     @property
-    def oedometer(self) -> float:
+    def oedometric_modulus(self) -> float:
         """M = E(1−ν)/((1+ν)(1−2ν)): stress over strain where there is no lateral strain."""
         return self.young * (1 - self.poisson) / ((1 + self.poisson) * (1 - 2 * self.poisson))
 
@@ -140,7 +140,7 @@ class Body:
             self._refuse(name, f"dtype {raw.dtype}", f"{np.dtype(dtype).name}")
         if raw.dtype.kind == "f" and not np.isfinite(raw).all():
             self._refuse(name, "NaN or infinity", "finite numbers")
-        object.__setattr__(self, name, frozen(raw, dtype))
+        object.__setattr__(self, name, freeze(raw, dtype))
 
     def _check_cells(self) -> None:
         corners = self.nodes[self.cells]  # (n_cells, n_corners, 2)
@@ -262,7 +262,7 @@ def block(
     )
 
 
-def rigid(
+def rigid_surface(
     points: ArrayLike, *, axis: ArrayLike = (1.0, 0.0), moved: ArrayLike = (0.0, 0.0), name: str = "rigid"
 ) -> Body:
     """A rigid surface through the points (n, 2) in walking order, the body on the left; `moved` is imposed on it."""

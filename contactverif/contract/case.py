@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contactverif.contract.arrays import FloatArray, frozen
+from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 
@@ -51,7 +51,7 @@ class Case:
         raw = np.asarray(self.z)
         if raw.dtype.kind not in "fiu":
             raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
-        z = frozen(raw, np.float64)
+        z = freeze(raw, np.float64)
         if z.shape != (self.interface.n_unknowns + self.n_multipliers,):
             needed = (
                 f"({self.interface.n_unknowns + self.n_multipliers},): n_nodes × dim, flat, then multipliers if any"
@@ -68,7 +68,7 @@ class Case:
         object.__setattr__(self, "z", z)
         object.__setattr__(self, "penalty", float(self.penalty))
         object.__setattr__(self, "seed", int(self.seed))
-        parameters = {name: frozen(values, np.float64) for name, values in self.parameters.items()}
+        parameters = {name: freeze(values, np.float64) for name, values in self.parameters.items()}
         object.__setattr__(self, "parameters", parameters)
 
     @property

@@ -22,7 +22,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray, frozen
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.interface import Interface
 
@@ -51,7 +51,7 @@ class Pairing(Mapping[str, NDArray[Any]]):
             if not isinstance(values, np.ndarray) or values.dtype not in (np.int64, np.bool_):
                 found = f"dtype {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
                 raise ContractError(f"pair: {name!r} is {found}; needed an array of int64 or bool")
-            checked[name] = frozen(values, values.dtype.type)
+            checked[name] = freeze(values, values.dtype.type)
         self._arrays = checked
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -243,7 +243,7 @@ class ContactPoints:
             raw, dtype = np.asarray(getattr(self, entry.name)), dtypes.get(entry.name, np.float64)
             if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # or 0.7 becomes segment 0
                 raise MisuseError(f"ContactPoints.{entry.name}", f"dtype {raw.dtype}", np.dtype(dtype).name)
-            values: NDArray[Any] = frozen(raw, dtype)
+            values: NDArray[Any] = freeze(raw, dtype)
             wanted = 2 if entry.name in ("position", "normal") else 1
             if values.ndim != wanted or len(values) != n_points:
                 raise MisuseError(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contactverif.contract.arrays import FloatArray, IntArray, frozen
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
 
 
@@ -45,7 +45,7 @@ class Surface:
             raise MisuseError("segments", f"an array of shape {raw.shape}", "shape (n_segments, 2), n_segments ≥ 1")
         if not np.issubdtype(raw.dtype, np.integer):
             raise MisuseError("segments", f"dtype {raw.dtype}", "integer node numbers")
-        segments = frozen(raw, np.int64)
+        segments = freeze(raw, np.int64)
         if segments.min() < 0:
             raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
         looped = np.flatnonzero(segments[:, 0] == segments[:, 1])
@@ -66,8 +66,8 @@ class Surface:
                     "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
                 )
         object.__setattr__(self, "segments", segments)
-        object.__setattr__(self, "neighbours", frozen(_neighbours(segments), np.int64))
-        object.__setattr__(self, "chain_order", frozen(_chain_order(self.neighbours), np.int64))
+        object.__setattr__(self, "neighbours", freeze(_neighbours(segments), np.int64))
+        object.__setattr__(self, "chain_order", freeze(_chain_order(self.neighbours), np.int64))
 
     def __len__(self) -> int:
         return len(self.segments)
@@ -115,7 +115,7 @@ class Interface:
             raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
         if raw.dtype.kind not in "fiu":
             raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
-        nodes = frozen(raw, np.float64)
+        nodes = freeze(raw, np.float64)
         bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
         if len(bad):
             raise MisuseError("nodes", f"node {bad[0]} at {tuple(nodes[bad[0]].tolist())}", "finite coordinates")

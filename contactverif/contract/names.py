@@ -9,7 +9,7 @@ from typing import Any
 from contactverif.contract.errors import MisuseError
 
 
-def unknown(argument: str, name: str, names: Iterable[str]) -> MisuseError:
+def unknown_name_error(argument: str, name: str, names: Iterable[str]) -> MisuseError:
     """The error for a name that is none of the names: it suggests the nearest, or lists all if none is near."""
     every = sorted(names)
     near = difflib.get_close_matches(name, every, n=3)
@@ -18,7 +18,7 @@ def unknown(argument: str, name: str, names: Iterable[str]) -> MisuseError:
     return MisuseError(argument, repr(name), f"one of {', '.join(every)}" if every else "a name, but there is none")
 
 
-def parsed(
+def parse_name(
     argument: str, text: str, form: str = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 ) -> tuple[str, dict[str, Any]]:
     """Name and options of `name:option=value,option=value`.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, frozen
+from contactverif.contract.arrays import Array, FloatArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
@@ -59,7 +59,7 @@ class Subject:
             return case.penalty
         return case.penalty * float(case.interface.slave.lengths(case.interface.nodes).mean())
 
-    def on(self, case: Case) -> CheckedFormulation:
+    def for_case(self, case: Case) -> CheckedFormulation:
         """The formulation with the penalty of the case."""
         return self.with_penalty(self.penalty(case))
 
@@ -120,7 +120,7 @@ class CheckedFormulation:
         if "pair" not in self.provides:
             return None
         self._check_size(interface, z)
-        answer = _asked("pair", self.plugin.pair, interface, frozen(z, np.float64))
+        answer = _asked("pair", self.plugin.pair, interface, freeze(z, np.float64))
         pairing = answer if isinstance(answer, Pairing) else _asked("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
@@ -136,7 +136,7 @@ class CheckedFormulation:
         return forces
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
-        forces = _asked("residual", self.plugin.residual, interface, pairing, frozen(z, z.dtype.type))
+        forces = _asked("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
         if not isinstance(forces, np.ndarray):
             raise ContractError(f"residual: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
         forces = np.array(forces)  # a copy, since the plugin may use its own again; and no subclass with its own rules
@@ -151,7 +151,7 @@ class CheckedFormulation:
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """The tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a scipy.sparse coo array."""
         self._check_size(interface, z)
-        tangent = _asked("tangent", self.plugin.tangent, interface, pairing, frozen(z, np.float64))
+        tangent = _asked("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
         if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
             raise ContractError(f"tangent: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
         if tangent.shape != (z.size, z.size):
@@ -167,7 +167,7 @@ class CheckedFormulation:
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """The points of contact at z (n_unknowns,)."""
         self._check_size(interface, z)
-        points = _asked("contact_points", self.plugin.contact_points, interface, pairing, frozen(z, np.float64))
+        points = _asked("contact_points", self.plugin.contact_points, interface, pairing, freeze(z, np.float64))
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
         for name, surface in (("slave_segment", interface.slave), ("master_segment", interface.master)):

@@ -23,8 +23,8 @@ from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
-KEPT = 512  # condensed bodies, so that penalties and formulations of one run share them
-DENSE = 600  # unknowns up to which a matrix without structure is as quick to factorise
+CACHE_SIZE = 512  # condensed bodies, so that penalties and formulations of one run share them
+DENSE_LIMIT = 600  # unknowns up to which a matrix without structure is as quick to factorise
 _LEFT = 2.0**-40  # of a diagonal entry after elimination: less than 1e2 u of a loose part, 1e6 u of a long thin bar
 _FREE = 1e-9  # of a rigid motion of the body's size: less resistance is none
 _PART = 1e-6  # of a loose motion: a smaller part of it is not worth a word
@@ -32,7 +32,7 @@ _MODES = ("move along its first axis", "move along its second axis", "turn")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Condensed:
+class CondensedBody:
     """A body as its contact boundary feels it: S q − g are the forces that somebody else must bring.
 
     Attributes
@@ -97,7 +97,7 @@ def stiffness(body: Body) -> tuple[Any, FloatArray]:
     unknowns = (2 * body.cells[:, :, None] + np.arange(2)).reshape(n_cells, -1)
     rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
     size = 2 * len(body.nodes)
-    if size <= DENSE:
+    if size <= DENSE_LIMIT:
         places = (rows * size + columns).ravel()
         return np.bincount(places, weights=blocks.ravel(), minlength=size * size).reshape(size, size), gradients
     return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), gradients
@@ -129,8 +129,8 @@ def free_on_contact(body: Body) -> IntArray:
     return np.flatnonzero((on_contact & ~body.fixed).reshape(-1))
 
 
-@lru_cache(maxsize=KEPT)
-def condense(body: Body) -> Condensed:
+@lru_cache(maxsize=CACHE_SIZE)
+def condense(body: Body) -> CondensedBody:
     """The body condensed onto the free components of its contact boundary; once for each body.
 
     Raises
@@ -145,7 +145,7 @@ def condense(body: Body) -> Condensed:
     imposed = body.imposed.reshape(-1)
     if body.rigid:
         none = np.zeros((0, 0))
-        return Condensed(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
+        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
     matrix, gradients = stiffness(body)
     forces = body.load.reshape(-1) - matrix @ imposed
     across = matrix[interior][:, unknowns]
@@ -155,7 +155,9 @@ def condense(body: Body) -> Condensed:
     particular[interior] = own
     condensed = dense(matrix[unknowns][:, unknowns]) + across.T @ influence
     load = forces[unknowns] - across.T @ own
-    return Condensed(body, unknowns, (condensed + condensed.T) / 2, load, interior, particular, influence, gradients)
+    return CondensedBody(
+        body, unknowns, (condensed + condensed.T) / 2, load, interior, particular, influence, gradients
+    )
 
 
 def _solved(body: Body, matrix: Any, right: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 
-ROUNDING = 8.0  # of a singular value: how many units of roundoff, times the size of the matrix, count as zero
+RANK_ROUNDOFF = 8.0  # of a singular value: how many units of roundoff, times the size of the matrix, count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Step:
     deficiency: int = 0
 
 
-def solved(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None = None) -> Step:
+def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None = None) -> Step:
     """The solution of matrix · step = right.
 
     Parameters
@@ -56,11 +56,11 @@ def solved(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray |
         step, condition = _factorised(matrix, right)
         singular = step is None or condition <= UNIT_ROUNDOFF * len(right) or not np.isfinite(step).all()
         return Step(None if singular else step, condition)
-    rows, columns = scales(matrix, n_positions)
+    rows, columns = scale_factors(matrix, n_positions)
     scaled = _scaled(matrix, rows, columns)
     step, condition = _factorised(scaled, rows * right)
     # a matrix whose rank is short may still have factors in floats, with a condition of some units of roundoff
-    if step is not None and condition > ROUNDING * UNIT_ROUNDOFF * len(right) and np.isfinite(step).all():
+    if step is not None and condition > RANK_ROUNDOFF * UNIT_ROUNDOFF * len(right) and np.isfinite(step).all():
         return Step(columns * step, condition)
     if not np.isfinite(scaled.data if sparse.issparse(scaled) else scaled).all():
         return Step(None, 0.0)
@@ -68,7 +68,7 @@ def solved(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray |
     return Step(None if step is None else columns * step, 0.0, deficiency)
 
 
-def scales(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray]:
+def scale_factors(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray]:
     """(n,) factors of rows and of columns that make constraints and multipliers comparable with forces and positions.
 
     A column's factor is the multiplier, a pressure or a force, that does as much as a unit of displacement.
@@ -93,11 +93,11 @@ def _scaled(matrix: Any, rows: FloatArray, columns: FloatArray) -> Any:
 def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray) -> tuple[FloatArray | None, int]:
     """The shortest solution, None where positions are not unique or nothing solves; how many multipliers are not."""
     left, values, right_vectors = linalg.svd(dense(matrix))
-    rank = int((values > ROUNDING * len(values) * UNIT_ROUNDOFF * values[0]).sum())
+    rank = int((values > RANK_ROUNDOFF * len(values) * UNIT_ROUNDOFF * values[0]).sum())
     deficiency = len(values) - rank
     if rank == 0:
         return None, deficiency
-    blur = ROUNDING * len(values) * UNIT_ROUNDOFF * values[0] / values[rank - 1]  # of computed singular vectors
+    blur = RANK_ROUNDOFF * len(values) * UNIT_ROUNDOFF * values[0] / values[rank - 1]  # of computed singular vectors
     moving = np.abs(right_vectors[rank:, :n_positions]).max(initial=0.0)
     contradiction = np.abs(left[:, rank:].T @ right)
     rounding = np.abs(left[:, rank:].T) @ floor + blur * np.abs(right).max(initial=0.0)

@@ -15,20 +15,20 @@ from typing import Any
 import numpy as np
 from scipy import linalg, sparse
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense, frozen
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics import linear
 from contactverif.mechanics.scene import Scene
 
-ITERATIONS = 40
-ROUNDINGS = 8.0  # of a residual: how many units of roundoff of its largest terms count as zero
-STALLED = 4  # iterations without a smaller residual
-NEARLY = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
-GONE = 1e8  # times the first residual, or the size of the interface: it will not come back
+MAX_ITERATIONS = 40
+ROUNDOFF_FACTOR = 8.0  # of a residual: how many units of roundoff of its largest terms count as zero
+STAGNATION_ITERATIONS = 4  # iterations without a smaller residual
+NEAR_CONVERGENCE = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
+DIVERGENCE_FACTOR = 1e8  # times the first residual, or the size of the interface: it will not come back
 
-PARTS = ("pair", "residual", "tangent", "solve")  # of the time
+TIMED_PARTS = ("pair", "residual", "tangent", "solve")  # of the time
 
 
 class End(IntEnum):
@@ -42,7 +42,7 @@ class End(IntEnum):
     EXHAUSTED = 5
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """Short, for a table."""
         return _WORDS[self][0]
 
@@ -78,7 +78,7 @@ class Trace:
         Share of loads and imposed displacements, 1 at the last load step.
     residuals : FloatArray, shape (n_iterates,)
         Largest entry of S q − g + R, a force; where there are multipliers, of the constraint rows too, each
-        with the factor that makes it comparable (`linear.scales`).
+        with the factor that makes it comparable (`linear.scale_factors`).
     energies : FloatArray, shape (n_iterates,)
         |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
     floors : FloatArray, shape (n_iterates,)
@@ -153,22 +153,22 @@ class System:
     scene: Scene
     formulation: CheckedFormulation
     factor: float = 1.0
-    own_tangent: bool = True
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(PARTS, 0.0))
+    use_tangent: bool = True
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED_PARTS, 0.0))
     n_multipliers: int = field(init=False)
-    spread: Any = field(init=False)
+    transformation: Any = field(init=False)
     stiffness: Any = field(init=False)
 
     def __post_init__(self) -> None:
         scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
-        self.n_multipliers, self.spread, self.stiffness = count, scene.spread, scene.stiffness
+        self.n_multipliers, self.transformation, self.stiffness = count, scene.transformation, scene.stiffness
         if count:
-            if isinstance(scene.spread, np.ndarray):
-                self.spread = linalg.block_diag(scene.spread, np.eye(count))
+            if isinstance(scene.transformation, np.ndarray):
+                self.transformation = linalg.block_diag(scene.transformation, np.eye(count))
                 self.stiffness = linalg.block_diag(scene.stiffness, np.zeros((count, count)))
             else:
                 unit, nothing = sparse.eye_array(count), sparse.csr_array((count, count))
-                self.spread = sparse.csr_array(sparse.block_diag([scene.spread, unit]))
+                self.transformation = sparse.csr_array(sparse.block_diag([scene.transformation, unit]))
                 self.stiffness = sparse.csr_array(sparse.block_diag([scene.stiffness, nothing]))
 
     @property
@@ -192,7 +192,8 @@ class System:
         """(n,) forces that are not in balance, and constraints that are not met."""
         start = perf_counter()
         n_free = self.scene.n_free
-        residual: FloatArray = self.spread.T @ self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        residual: FloatArray = self.transformation.T @ forces
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
         self.seconds["residual"] += perf_counter() - start
         return residual
@@ -204,27 +205,27 @@ class System:
         """
         start = perf_counter()
         scene, n_free, z = self.scene, self.scene.n_free, self.state(u)
-        if self.own_tangent and "tangent" in self.formulation.provides:
+        if self.use_tangent and "tangent" in self.formulation.provides:
             tangent = self.formulation.tangent(scene.interface, pairing, z)
         else:
             tangent = self.differences(pairing, z)
-        tangent = dense(tangent) if isinstance(self.spread, np.ndarray) else sparse.csr_array(tangent)
-        contact = self.spread.T @ tangent @ self.spread
+        tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
+        contact = self.transformation.T @ tangent @ self.transformation
         matrix = self.stiffness + contact
         # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
         sizes = np.full(self.size, np.abs(z[: scene.interface.n_unknowns]).max())
         sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # also of one that is let go
         # and a force along an inclined normal is rounded in both of its components
-        forces = abs(self.spread).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
+        forces = abs(self.transformation).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
         terms = abs(contact) @ sizes + forces
         terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + self.factor * np.abs(scene.load)
         self.seconds["tangent"] += perf_counter() - start
-        return matrix, ROUNDINGS * UNIT_ROUNDOFF * terms
+        return matrix, ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
         """The solution of matrix · step = right; `floor` (n,) is what roundoff makes of the right-hand side."""
         start = perf_counter()
-        step = linear.solved(matrix, right, self.scene.n_free, floor)
+        step = linear.solve_step(matrix, right, self.scene.n_free, floor)
         self.seconds["solve"] += perf_counter() - start
         return step
 
@@ -252,22 +253,22 @@ def solve(
     *,
     start: FloatArray | None = None,
     load_steps: int = 1,
-    iterations: int = ITERATIONS,
-    own_tangent: bool = True,
+    iterations: int = MAX_ITERATIONS,
+    use_tangent: bool = True,
 ) -> Trace:
     """Solve the scene with full Newton steps, in one load step unless more are asked for.
 
     Parameters
     ----------
     formulation : CheckedFormulation
-        With its penalty, `subject.on(case)` or `subject.with_penalty(…)`.
+        With its penalty, `subject.for_case(case)` or `subject.with_penalty(…)`.
     start : FloatArray | None, shape (n_free,)
         First iterate, or (n_free + n_multipliers,); the scene's own by default, and no multipliers.
     load_steps : int
         Loads and imposed displacements grow in that many equal steps, each solved from the one before.
     iterations : int
         Linear systems solved at most, in each load step.
-    own_tangent : bool
+    use_tangent : bool
         The formulation's, if it has one; else its residual is differentiated on the frozen pairing.
 
     Raises
@@ -278,7 +279,7 @@ def solve(
     if load_steps < 1 or iterations < 1:
         name, number = ("load_steps", load_steps) if load_steps < 1 else ("iterations", iterations)
         raise MisuseError(name, f"{number}", "at least 1")
-    system, record = System(scene, formulation, own_tangent=own_tangent), _Record()
+    system, record = System(scene, formulation, use_tangent=use_tangent), _Record()
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
         behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""
@@ -299,12 +300,12 @@ def _load_step(system: System, record: _Record, u: FloatArray, iterations: int) 
     first, before, n_free = len(record.u), None, system.scene.n_free
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
-        if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= GONE * size):
+        if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= DIVERGENCE_FACTOR * size):
             return End.DIVERGED, u  # no plugin is asked about such a state
         pairing = system.pair(u)
         residual = system.residual(u, pairing)
         matrix, floor = system.matrix(u, pairing)
-        comparable = linear.scales(matrix, n_free)[0] if system.n_multipliers else 1.0
+        comparable = linear.scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
         record.add(u, system.factor, residual, floor, comparable, _changed(pairing, before))
         end = _end(record, first, n_free)
         if end is not None:
@@ -353,15 +354,15 @@ class _Record:
         return Trace(
             scene=scene,
             end=end,
-            u=frozen(np.array(self.u), np.float64),
-            factors=frozen(self.factors, np.float64),
-            residuals=frozen(self.residuals, np.float64),
-            energies=frozen(self.energies, np.float64),
-            floors=frozen(self.floors, np.float64),
-            roundings=frozen(self.roundings, np.float64),
-            changes=frozen(self.changes, np.int64),
-            conditions=frozen(self.conditions, np.float64),
-            deficiencies=frozen(self.deficiencies, np.int64),
+            u=freeze(np.array(self.u), np.float64),
+            factors=freeze(self.factors, np.float64),
+            residuals=freeze(self.residuals, np.float64),
+            energies=freeze(self.energies, np.float64),
+            floors=freeze(self.floors, np.float64),
+            roundings=freeze(self.roundings, np.float64),
+            changes=freeze(self.changes, np.int64),
+            conditions=freeze(self.conditions, np.float64),
+            deficiencies=freeze(self.deficiencies, np.int64),
             seconds=seconds,
         )
 
@@ -372,13 +373,14 @@ def _end(record: _Record, first: int, n_free: int) -> End | None:
     q = [u[:n_free] for u in record.u[first:]]
     if roundings[-1] <= 1:
         return End.CONVERGED
-    if not np.isfinite(residuals[-1]) or residuals[-1] > GONE * max(residuals[0], record.floors[first]):
+    if not np.isfinite(residuals[-1]) or residuals[-1] > DIVERGENCE_FACTOR * max(residuals[0], record.floors[first]):
         return End.DIVERGED
     if len(q) > 4:
         back, steps = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)], np.abs(q[-1] - q[-2]).max()
-        if max(back) <= 2.0**-20 * steps and min(roundings[-4:]) > NEARLY:
+        if max(back) <= 2.0**-20 * steps and min(roundings[-4:]) > NEAR_CONVERGENCE:
             return End.CYCLE
-    if len(q) > STALLED and min(roundings[-STALLED:]) >= min(roundings[:-STALLED]) <= NEARLY:
+    earlier, latest = roundings[:-STAGNATION_ITERATIONS], roundings[-STAGNATION_ITERATIONS:]
+    if earlier and min(latest) >= min(earlier) <= NEAR_CONVERGENCE:
         return End.STAGNATED
     return None
 

@@ -20,7 +20,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
-from contactverif.mechanics.bulk import DENSE, KEPT, Condensed, condense, free_on_contact, loose_modes
+from contactverif.mechanics.bulk import CACHE_SIZE, DENSE_LIMIT, CondensedBody, condense, free_on_contact, loose_modes
 
 _BODIES = "bodies_"  # before the names of the parameters of a case that hold its bodies
 
@@ -68,7 +68,7 @@ class Scene:
                 raise MisuseError(f"supports of {body.name}", f"{supports}: it can {' and '.join(loose)}", held)
 
     @cached_property
-    def reached(self) -> tuple[int, ...]:
+    def bodies_in_reach(self) -> tuple[int, ...]:
         """The bodies that another side's body can reach, slaves first.
 
         Two bodies reach each other if the boxes around their contact boundaries, each widened by its own diagonal, meet
@@ -87,29 +87,31 @@ class Scene:
         return slaves + masters
 
     @cached_property
-    def condensed(self) -> tuple[Condensed, ...]:
-        """The bodies within reach, condensed, in the order of `reached`."""
-        return tuple(condense(self.bodies[index]) for index in self.reached)
+    def condensed_bodies(self) -> tuple[CondensedBody, ...]:
+        """The bodies within reach, condensed, in the order of `bodies_in_reach`."""
+        return tuple(condense(self.bodies[index]) for index in self.bodies_in_reach)
 
     @cached_property
     def interface(self) -> Interface:
         """The contact boundaries of the bodies within reach."""
         segments: dict[bool, list[IntArray]] = {True: [], False: []}
         first = 0
-        for index in self.reached:
+        for index in self.bodies_in_reach:
             body = self.bodies[index]
             segments[index in self.slave].append(np.searchsorted(body.contact_nodes, body.contact) + first)
             first += len(body.contact_nodes)
-        nodes = np.vstack([self.bodies[index].nodes[self.bodies[index].contact_nodes] for index in self.reached])
+        nodes = np.vstack(
+            [self.bodies[index].nodes[self.bodies[index].contact_nodes] for index in self.bodies_in_reach]
+        )
         return Interface(nodes, Surface(np.vstack(segments[True])), Surface(np.vstack(segments[False])))
 
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
         """What q is made of: the free components on the contact boundary of each body within reach."""
-        return tuple(free_on_contact(self.bodies[index]) for index in self.reached)
+        return tuple(free_on_contact(self.bodies[index]) for index in self.bodies_in_reach)
 
     @cached_property
-    def part(self) -> tuple[slice, ...]:
+    def slices(self) -> tuple[slice, ...]:
         """Where each body within reach has its unknowns in q."""
         ends = np.cumsum([0, *map(len, self.unknowns)]).tolist()
         return tuple(slice(start, end) for start, end in itertools.pairwise(ends))
@@ -117,13 +119,13 @@ class Scene:
     @property
     def n_free(self) -> int:
         """Number of unknowns q."""
-        return self.part[-1].stop if self.part else 0
+        return self.slices[-1].stop if self.slices else 0
 
     @cached_property
     def stiffness(self) -> FloatArray | sparse.csr_array:
         """(n_free, n_free) of all bodies within reach: dense where that is small, else sparse."""
-        blocks = [body.stiffness for body in self.condensed]
-        if self.n_free <= DENSE:
+        blocks = [body.stiffness for body in self.condensed_bodies]
+        if self.n_free <= DENSE_LIMIT:
             matrix: FloatArray = linalg.block_diag(*blocks)
             return matrix
         return sparse.csr_array(sparse.block_diag(blocks))
@@ -131,14 +133,14 @@ class Scene:
     @cached_property
     def load(self) -> FloatArray:
         """(n_free,) forces of loads and imposed displacements."""
-        return np.concatenate([body.load for body in self.condensed])
+        return np.concatenate([body.load for body in self.condensed_bodies])
 
     @cached_property
-    def spread(self) -> FloatArray | sparse.csr_array:
+    def transformation(self) -> FloatArray | sparse.csr_array:
         """(n_unknowns of the interface, n_free): what unit values of q do to the positions."""
         rows, columns, values = [], [], []
         first = 0
-        for index, unknowns, part in zip(self.reached, self.unknowns, self.part, strict=True):
+        for index, unknowns, part in zip(self.bodies_in_reach, self.unknowns, self.slices, strict=True):
             body = self.bodies[index]
             nodes, components = np.divmod(unknowns, 2)
             row = 2 * (first + np.searchsorted(body.contact_nodes, nodes))
@@ -149,28 +151,30 @@ class Scene:
             first += len(body.contact_nodes)
         shape = (self.interface.n_unknowns, self.n_free)
         places = np.concatenate(rows), np.concatenate(columns)
-        if self.n_free <= DENSE:
+        if self.n_free <= DENSE_LIMIT:
             matrix = np.zeros(shape)
             matrix[places] = np.concatenate(values)
             return matrix
         return sparse.csr_array((np.concatenate(values), places), shape=shape)
 
     @cached_property
-    def moved(self) -> FloatArray:
+    def imposed_displacements(self) -> FloatArray:
         """(n_unknowns,) what the imposed displacements do to the positions."""
-        bodies = [self.bodies[index] for index in self.reached]
+        bodies = [self.bodies[index] for index in self.bodies_in_reach]
         parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in bodies]
         return np.vstack(parts).reshape(-1)
 
     @cached_property
     def start(self) -> FloatArray:
         """(n_free,) the first guess of q."""
-        pairs = zip(self.reached, self.unknowns, strict=True)
+        pairs = zip(self.bodies_in_reach, self.unknowns, strict=True)
         return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Current positions (n_unknowns,), flat, with imposed displacements × factor."""
-        positions: FloatArray = self.interface.nodes.reshape(-1) + factor * self.moved + self.spread @ q
+        positions: FloatArray = (
+            self.interface.nodes.reshape(-1) + factor * self.imposed_displacements + self.transformation @ q
+        )
         return positions
 
     def bulk_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
@@ -180,7 +184,7 @@ class Scene:
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """The same on the nodes of the interface (n_nodes, 2), in global axes; without what supports there take."""
-        forces: FloatArray = (self.spread @ self.bulk_forces(q, factor)).reshape(-1, 2)
+        forces: FloatArray = (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
         return forces
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
@@ -197,8 +201,8 @@ class Scene:
         z = self.positions(self.start)
         return Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
 
-    def _every(self, q: FloatArray, factor: float) -> list[tuple[Condensed, FloatArray]]:
-        own = dict(zip(self.reached, (q[part] for part in self.part), strict=True))
+    def _every(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
+        own = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
         pairs = []
         for index, body in enumerate(self.bodies):
             condensed = condense(body)
@@ -213,7 +217,7 @@ def has_bodies(case: Case) -> bool:
     return f"{_BODIES}nodes" in case.parameters
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def scene_of(case: Case) -> Scene:
     """The scene that `Scene.case` made a case of.
 
@@ -241,7 +245,7 @@ def _reach(body: Body) -> tuple[FloatArray, FloatArray]:
     return low - diagonal, high + diagonal
 
 
-def _alone(condensed: Condensed, factor: float) -> FloatArray:
+def _alone(condensed: CondensedBody, factor: float) -> FloatArray:
     """The unknowns of a body that touches nothing."""
     if not len(condensed.unknowns):
         return np.zeros(0)

@@ -50,7 +50,7 @@ class Projection:
         return (self.signed_squared_gap > 0) - (self.signed_squared_gap < 0)
 
 
-def nearest(interface: Interface, z: FloatArray, slave_segment: int, c: float | Fraction) -> Projection:
+def project_point(interface: Interface, z: FloatArray, slave_segment: int, c: float | Fraction) -> Projection:
     """The master segment nearest to the point at c ∈ [−1, 1] of a slave segment, in exact arithmetic.
 
     The nearest closed segment; where the foot lies at or past an end the distance is taken to the end node itself.

@@ -14,7 +14,7 @@ _PAIRS_AT_ONCE = 2**18  # of points and master segments, so that memory stays sm
 _SNAP = 1e-2  # past a free end by this share of the segment, formulations may still see contact
 
 
-def usual_places(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+def default_points(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Contact points to ask about where a plugin names none: nodes, quarter points, middles of the slave segments.
 
     Returns (slave_segment, c, area_from, area_to), each (5 n_segments,): quarter points with the half of the segment

@@ -52,7 +52,7 @@ def judged(question: Property, case: Case, subject: Subject) -> Outcome:
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
     """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none, or has multipliers: no case holds any."""
     try:
-        formulation = subject.on(case)
+        formulation = subject.for_case(case)
         if formulation.n_multipliers(case.interface):
             return None
         forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)

@@ -6,7 +6,7 @@ import secrets
 from dataclasses import dataclass, replace
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown
+from contactverif.contract.names import unknown_name_error
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,5 +62,5 @@ PROFILES = {
 def profile_named(name: str) -> Profile:
     """One of `PROFILES`; a `MisuseError` that suggests the nearest if there is none."""
     if name not in PROFILES:
-        raise unknown("profile", name, PROFILES)
+        raise unknown_name_error("profile", name, PROFILES)
     return PROFILES[name]

@@ -18,7 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
 from contactverif.contract.errors import ContractError, MisuseError
-from contactverif.contract.names import parsed, unknown
+from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
@@ -97,7 +97,7 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     names = property_ids()
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in names):
-            raise unknown("property", glob, names)
+            raise unknown_name_error("property", glob, names)
     chosen = [name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs)]
     return tuple(_property(name) for name in chosen)
 
@@ -163,10 +163,10 @@ def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
 def _factory(text: str) -> Callable[..., Any] | NotLoaded:
     """`make(*, penalty)` for the text, options and inner formulation filled in."""
     outer, slash, inner_text = text.partition("/")
-    name, options = parsed("formulation", outer, _FORM)
+    name, options = parse_name("formulation", outer, _FORM)
     installed = _installed(FORMULATIONS)
     if name not in installed:
-        raise unknown("formulation", name, installed)
+        raise unknown_name_error("formulation", name, installed)
     make = _loaded(name, installed[name])
     if isinstance(make, NotLoaded):
         return NotLoaded(text, make.reason)

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.interface import Interface
-from contactverif.contract.names import unknown
+from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, Verdict, excess, judge
 from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
@@ -84,7 +84,7 @@ def run(
     asked = [item.id if isinstance(item, Property) else item.formulation for item in properties]
     for property_id in known:
         if property_id not in asked:
-            raise unknown("known failure", property_id, asked)
+            raise unknown_name_error("known failure", property_id, asked)
     settled = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert settled.seed is not None
     if scene is not None:
@@ -219,10 +219,10 @@ def _witness(subject: Subject, question: Property) -> Case:
     if not question.bodies:
         return named_case(name)
     from contactverif.scenes.catalogue import (
-        named_scene,  # brings bodies and Newton's method: only where they are needed
+        load_scene_case,  # brings bodies and Newton's method: only where they are needed
     )
 
-    return named_scene(name)
+    return load_scene_case(name)
 
 
 def _overall(row: Row) -> tuple[Verdict, str]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import Body, block, placed_at, rigid
+from contactverif.contract.body import Body, block, placed_at, rigid_surface
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import Scene
 
@@ -98,7 +98,7 @@ def two_blocks(
     if rigid_master:
         points = np.column_stack([master_x[::-1], np.full(len(master_x), master_y[-1])])
         placed = placed_at(points, placing.axis, placing.shift, placing.scale)
-        lower = rigid(placed, axis=placing.axis, name="master")
+        lower = rigid_surface(placed, axis=placing.axis, name="master")
     else:
         lower = block(
             master_x,
@@ -123,7 +123,7 @@ def two_blocks(
     all_touch = left >= 0 and right >= 0 if rigid_master else left == right == 0
     if tilt == 0 and not free_sides and (pressure is not None or all_touch):
         heights = (np.ptp(slave_y), 0.0 if rigid_master else np.ptp(master_y))
-        moduli = (upper.oedometer, lower.oedometer)
+        moduli = (upper.oedometric_modulus, lower.oedometric_modulus)
         facts["compliance"] = np.array([h / m for h, m in zip(heights, moduli, strict=True)]) * placing.scale
         if approach is not None:
             facts["approach"] = np.array(approach * placing.scale)
@@ -157,6 +157,6 @@ def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:
     return np.concatenate(
         [
             np.where(body.unknowns % 2 == 1, down[index in scene.slave], 0.0)
-            for index, body in zip(scene.reached, scene.condensed, strict=True)
+            for index, body in zip(scene.bodies_in_reach, scene.condensed_bodies, strict=True)
         ]
     )

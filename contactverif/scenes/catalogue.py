@@ -20,12 +20,12 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import parsed, unknown
+from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.mechanics.scene import Scene
 from contactverif.scenes.blocks import Placing, two_blocks
-from contactverif.scenes.disk import Problem, disk_on_foundation
+from contactverif.scenes.disk import DiskProblem, disk_on_foundation
 
-MODERATE = 10.0  # ε̂ h / E
+MODERATE_PENALTY = 10.0  # ε̂ h / E
 _MATERIAL = "E = 1e4, ν = 0.3 in both; rollers at all sides; heights; two layers of cells"
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # exact (cos, sin)
 
@@ -167,18 +167,18 @@ SCENES: Mapping[str, NamedScene] = {
 }
 
 
-def named_scene(text: str) -> Case:
+def load_scene_case(text: str) -> Case:
     """The scene that the text names, with its options, as a case.
 
     Raises
     ------
     MisuseError
-        As `scene_named`.
+        As `load_scene`.
     """
-    return scene_named(text, "scene").case()
+    return load_scene(text, "scene").case()
 
 
-def scene_named(text: str, argument: str = "--scene") -> Scene:
+def load_scene(text: str, argument: str = "--scene") -> Scene:
     """The scene that the text names, with its options: `c`, `c:refine=2,penalty=1e4`.
 
     Raises
@@ -186,20 +186,20 @@ def scene_named(text: str, argument: str = "--scene") -> Scene:
     MisuseError
         For a name, an option or a value that is none.
     """
-    name, options = parsed(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
+    name, options = parse_name(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
     if name not in SCENES:
-        raise unknown(argument, name, SCENES)
+        raise unknown_name_error(argument, name, SCENES)
     own = options_of(name)
     for option, value in options.items():
         if option not in own:
-            error = unknown(f"{argument}: option of {text!r}", option, own)
+            error = unknown_name_error(f"{argument}: option of {text!r}", option, own)
             raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(own)}")
         if needed := _refused(name, option, value):
             raise MisuseError(f"{argument}: {option} of {text!r}", repr(value), needed)
-    return made(name, **options)
+    return make_scene(name, **options)
 
 
-def made(name: str, **options: Any) -> Scene:
+def make_scene(name: str, **options: Any) -> Scene:
     """The scene of that name; `options_of` says which options it has, `blocks` and `disk` what they mean.
 
     Raises
@@ -208,11 +208,11 @@ def made(name: str, **options: Any) -> Scene:
         For a name or an option that is none, and for a value that cannot be.
     """
     if name not in SCENES:
-        raise unknown("scene", name, SCENES)
+        raise unknown_name_error("scene", name, SCENES)
     own = options_of(name)
     for option, value in options.items():
         if option not in own:
-            raise unknown(f"option of scene {name}", option, own)
+            raise unknown_name_error(f"option of scene {name}", option, own)
         left_open = value is None and own[option] is None
         if not left_open and (needed := _refused(name, option, value)):
             raise MisuseError(f"{option} of scene {name}", repr(value), needed)
@@ -261,7 +261,7 @@ def disk(
     MisuseError
         For a force so large or a penalty so soft that the contact is wider than the meshes are fine.
     """
-    problem = Problem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
+    problem = DiskProblem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
     return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
 
 
@@ -316,7 +316,7 @@ def blocks(
         layers - drawing.height,
         young=(young, ratio * young),
         poisson=(poisson, poisson),
-        penalty=MODERATE * young / mean_segment if penalty is None else penalty,
+        penalty=MODERATE_PENALTY * young / mean_segment if penalty is None else penalty,
         pressure=p,
         lowered=lowered,
         free_sides=sides == "free",

@@ -24,7 +24,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body, block
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.hertz import Layered, half_width, layer_half_width, on_layer
+from contactverif.scenes.hertz import WinklerContact, half_width, layer_half_width, solve_winkler_contact
 
 UNIFORM = 1.6  # half-widths of the contact: where the foundation's elements are equally wide
 ELEMENTS = (60, 50, 30)  # of the foundation: where they are uniform (and one), on either side of that (and one less),
@@ -39,7 +39,7 @@ _CORNER = pi / 4  # the blocks below, above, left and right of that square see i
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class DiskProblem:
     """What is pressed on what; the paper's numbers unless said otherwise.
 
     Attributes
@@ -85,13 +85,13 @@ class Problem:
         """Of the contact if the penalty's layer alone gave way."""
         return layer_half_width(self.force, self.radius, self.penalty)
 
-    def on_layer(self) -> Layered:
+    def winkler_contact(self) -> WinklerContact:
         """The contact after Hertz with the penalty as a Winkler layer, which a penalty method tends to."""
-        return on_layer(self.force, self.radius, self.stiffness, self.penalty)
+        return solve_winkler_contact(self.force, self.radius, self.stiffness, self.penalty)
 
 
 def disk_on_foundation(
-    problem: Problem = Problem(), *, refine: int = 1, lowered: float | None = None, name: str = ""
+    problem: DiskProblem = DiskProblem(), *, refine: int = 1, lowered: float | None = None, name: str = ""
 ) -> Scene:
     """The disk, slave, on the foundation, master; they touch in the origin.
 
@@ -115,7 +115,7 @@ def disk_on_foundation(
         raise MisuseError("force", found, f"a contact from {2 * low:.3g} to {2 * high:.3g} wide")
     widest = WIDEST * FINE * a
     wide = problem.layer_half_width
-    wide = problem.on_layer().half_width if wide <= widest else wide
+    wide = problem.winkler_contact().half_width if wide <= widest else wide
     if wide > widest:
         found = f"{problem.penalty:g}, with which the contact is {2 * wide:.3g} wide"
         raise MisuseError("penalty", found, f"a stiffer one: the meshes are made for at most {2 * widest:.3g}")
@@ -125,7 +125,7 @@ def disk_on_foundation(
     return Scene(bodies, penalty=problem.penalty, name=name)
 
 
-def foundation(problem: Problem, refine: int = 1) -> Body:
+def foundation(problem: DiskProblem, refine: int = 1) -> Body:
     """The foundation, whose surface is y = 0; what may touch is |x| ≤ 2.5 a."""
     a = problem.half_width
     inner, outer, deep = ELEMENTS
@@ -148,7 +148,7 @@ def foundation(problem: Problem, refine: int = 1) -> Body:
     return replace(whole, contact=whole.contact[near], fixed=np.repeat(whole.fixed[:, 1:], 2, axis=1))
 
 
-def disk(problem: Problem, refine: int = 1, lowered: float = 0.0) -> Body:
+def disk(problem: DiskProblem, refine: int = 1, lowered: float = 0.0) -> Body:
     """The disk, which stands on the origin, loaded on top; what may touch is |x| ≤ 2 a."""
     nodes, cells, contact = disk_mesh(problem.radius, FINE * problem.half_width, refine)
     load = np.zeros(nodes.shape)

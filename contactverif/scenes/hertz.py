@@ -45,7 +45,7 @@ def pressure(x: FloatArray, force: float, radius: float, stiffness: float) -> Fl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layered:
+class WinklerContact:
     """A cylinder on a flat with a layer of springs between.
 
     Attributes
@@ -77,7 +77,9 @@ class Layered:
         return pressures
 
 
-def on_layer(force: float, radius: float, stiffness: float, penalty: float, terms: int = TERMS) -> Layered:
+def solve_winkler_contact(
+    force: float, radius: float, stiffness: float, penalty: float, terms: int = TERMS
+) -> WinklerContact:
     """Hertz on a Winkler layer: p/ε̂ − (2/πE*) ∫ p(s) ln|x − s| ds = δ − x²/2R in contact, and p = 0 at its edge.
 
     There the layer is not pressed any more: p falls to 0 with a finite slope. Collocation at Gauss points with
@@ -101,7 +103,7 @@ def on_layer(force: float, radius: float, stiffness: float, penalty: float, term
     return _of_width(a, radius, stiffness, penalty, terms)
 
 
-def _of_width(a: float, radius: float, stiffness: float, penalty: float, terms: int) -> Layered:
+def _of_width(a: float, radius: float, stiffness: float, penalty: float, terms: int) -> WinklerContact:
     """The solution of half-width a, whatever its force."""
     orders = 2 * np.arange(terms)
     points = legendre.leggauss(2 * terms)[0][terms:]  # (terms,), in (0, 1): all is even
@@ -115,7 +117,7 @@ def _of_width(a: float, radius: float, stiffness: float, penalty: float, terms: 
     solution = np.linalg.solve(matrix, np.append(-(points**2), 0.0)) * a**2 / (2 * radius * yielding)
     coefficients = np.zeros(orders[-1] + 1)
     coefficients[orders] = solution[:-1]
-    return Layered(a, coefficients)
+    return WinklerContact(a, coefficients)
 
 
 def _logarithms(points: FloatArray, highest: int) -> FloatArray:

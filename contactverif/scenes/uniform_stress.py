@@ -63,7 +63,7 @@ def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float |
     if pressure is None:
         pressure = pressure_of(scene.case(), scene.penalty)
     largest = 0.0
-    for index in scene.reached:
+    for index in scene.bodies_in_reach:
         if not scene.bodies[index].rigid:
             errors = np.abs(stresses[index] - exact_stress(scene.bodies[index], pressure))
             largest = max(largest, float(errors.max(initial=0.0)))
@@ -115,7 +115,7 @@ def uniform_tolerances(case: Case, scene: Scene, pressure: float) -> UniformTole
         The exact pressure p.
     """
     lengths = _segment_lengths(scene)
-    modulus = max(body.oedometer for body in scene.bodies if not body.rigid)
+    modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
     displacement = float(np.abs(case.positions - scene.interface.nodes).max())
     solution = condition_tolerance(scene, case.penalty)
     solution += 64 * UNIT_ROUNDOFF * modulus * displacement / float(lengths.min()) / pressure

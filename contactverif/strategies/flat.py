@@ -19,7 +19,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
-from contactverif.strategies.panels import Panel, assembled, shortest
+from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
 
 MOST_MASTER_SEGMENTS = 100  # in one chain
@@ -57,7 +57,7 @@ def _flat_cases(draw: DrawFn) -> Case:
     motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
     slide, shuffle = draw(_SLIDES), draw(shuffles())
     penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
-    interface, z, along = assembled([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
+    interface, z, along = assemble_panels([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
     parameters = {
         "penetration": np.array(penetration * motion.scale),
         "along": along,

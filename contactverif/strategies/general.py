@@ -20,15 +20,15 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
-from contactverif.strategies.panels import Panel, assembled, on_lattice, shortest
+from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
 from contactverif.strategies.parts import (
     OFFSETS,
-    dealt,
     depth_units,
     depths,
     lengths,
     motions,
     penalties,
+    repeat_cyclically,
     seeds,
     shifts,
     shuffles,
@@ -67,7 +67,7 @@ def _general_cases(draw: DrawFn, smooth: bool) -> Case:
     if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
         # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
-    interface, z, _ = assembled([maker(offsets) for maker in makers], motion, shuffle)
+    interface, z, _ = assemble_panels([maker(offsets) for maker in makers], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)
 
 
@@ -88,7 +88,7 @@ class Broken:
     tilt : float
         Slope of the slave against the master, turned about its middle, flatter for long chains.
     quarters, unit : Sequence[int] or float
-        Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
+        Penetrations: quarters/4 × unit × the shortest segment, repeat_cyclically to the slave nodes in turn.
     upright : bool
         Walls do not lean.
     """
@@ -111,7 +111,7 @@ class Broken:
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
         shift = shifts(offsets, len(x))
-        depth = (dealt(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
+        depth = (repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
         heights = on_lattice(np.interp(x, *line.T)) + rise - depth

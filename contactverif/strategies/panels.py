@@ -51,7 +51,9 @@ def shortest(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).min())
 
 
-def assembled(panels: Sequence[Panel], motion: Motion, shuffle: int = 0) -> tuple[Interface, FloatArray, FloatArray]:
+def assemble_panels(
+    panels: Sequence[Panel], motion: Motion, shuffle: int = 0
+) -> tuple[Interface, FloatArray, FloatArray]:
     """The panels in a row, far apart.
 
     Parameters

@@ -40,7 +40,7 @@ def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]
 
 @cache
 def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
-    """Penetrations in quarters of some unit, to be dealt out in turn to the nodes; below 0 is open."""
+    """Penetrations in quarters of some unit, to be repeat_cyclically out in turn to the nodes; below 0 is open."""
     return st.lists(st.integers(lowest, 8), min_size=1, max_size=most)
 
 
@@ -122,10 +122,10 @@ def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> 
 
 def shifts(offsets: Sequence[int], count: int) -> FloatArray:
     """Shifts (count, 2) of slave nodes, along and across, of 0 to 1/16."""
-    return dealt(offsets, 2 * count).reshape(-1, 2) / [7.0, 11.0] / 16
+    return repeat_cyclically(offsets, 2 * count).reshape(-1, 2) / [7.0, 11.0] / 16
 
 
-def dealt(values: Sequence[int], count: int) -> FloatArray:
+def repeat_cyclically(values: Sequence[int], count: int) -> FloatArray:
     """`count` floats, the values in turn."""
     return np.resize(np.asarray(values, dtype=np.float64), count)
 

@@ -11,7 +11,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.strategies.panels import Panel, on_lattice, shortest
-from contactverif.strategies.parts import dealt, depth_units, depths, shifts
+from contactverif.strategies.parts import depth_units, depths, repeat_cyclically, shifts
 
 RADIUS = 4.0
 
@@ -45,7 +45,7 @@ class Ring:
         master = self._points(self.master, not self.inner_slave, warp)
         reference = self._points(self.slave, self.inner_slave, 1.0)
         length = min(shortest(master), shortest(reference))
-        depth = on_lattice(dealt(self.quarters, len(reference)) / 4 * self.unit * length)
+        depth = on_lattice(repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
         depth = np.clip(depth, -RADIUS / 2, RADIUS / 2)  # neither a hole nor a disc shrinks to a point
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
         shift = shifts(offsets, len(reference)) * length

@@ -20,7 +20,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import has_bodies
 from contactverif.scenes.blocks import Placing, is_uniform, overhangs, two_blocks
-from contactverif.scenes.catalogue import MODERATE
+from contactverif.scenes.catalogue import MODERATE_PENALTY
 from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
@@ -137,7 +137,7 @@ def _dead_zones(draw: DrawFn) -> Case:
     layers = tuple([unit * height for height in draw(_LAYERS)] for _ in range(2))
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
     strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
-    stiff = draw(st.sampled_from([MODERATE, 1.0, 100.0]))
+    stiff = draw(st.sampled_from([MODERATE_PENALTY, 1.0, 100.0]))
     master_x = begin + _cut(master, float(end - begin))
     pressure = strain * min(young)
     return _case(x, master_x, layers, young, poisson, motion, seed, pressure=pressure, stiff=stiff)
@@ -170,7 +170,7 @@ def _case(
     strain: float = 0.0,
     pressure: float | None = None,
     tilt: float = 0.0,
-    stiff: float = MODERATE,
+    stiff: float = MODERATE_PENALTY,
     rigid_master: bool = False,
     variant: int | None = None,
 ) -> Case:

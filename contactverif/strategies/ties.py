@@ -14,8 +14,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.strategies.panels import Panel, assembled
-from contactverif.strategies.parts import dealt, depth_units, motions, penalties, seeds
+from contactverif.strategies.panels import Panel, assemble_panels
+from contactverif.strategies.parts import depth_units, motions, penalties, repeat_cyclically, seeds
 
 _RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # of a vertex above its neighbours, per length
 _QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # penetrations; 0 is a gap of exactly zero
@@ -31,7 +31,7 @@ def tie_cases() -> SearchStrategy[Case]:
 def _tie_cases(draw: DrawFn) -> Case:
     panel = draw(_PANELS)
     motion, penalty, seed = draw(motions(exact=True)), draw(penalties()), draw(seeds())
-    interface, z, _ = assembled([panel], motion)
+    interface, z, _ = assemble_panels([panel], motion)
     return Case(interface, z, penalty, {}, seed)
 
 
@@ -67,7 +67,7 @@ def _on_bisector(
 def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
     """Slave nodes at x, sunk below the broken line (n, 2)."""
     heights = np.interp(x, *line.T)
-    slave = np.column_stack([x, heights - dealt(quarters, len(x)) / 4 * unit])
+    slave = np.column_stack([x, heights - repeat_cyclically(quarters, len(x)) / 4 * unit])
     return Panel(slave, line[::-1], np.column_stack([x, heights]))
 
 

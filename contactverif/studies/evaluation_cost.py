@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.arrays import frozen
+from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
@@ -73,7 +73,7 @@ class _Timed:
         if self._failed:
             return
         try:
-            formulation = self._subject.on(self._case)
+            formulation = self._subject.for_case(self._case)
             taken = self._turn(formulation.plugin if count else formulation, formulation)
         except Exception as error:  # whatever a plugin may raise that is asked without a guard
             self._failed, self._fastest = f"{error}", dict.fromkeys(PARTS, nan)
@@ -88,7 +88,7 @@ class _Timed:
 
     def _turn(self, asked: Any, formulation: CheckedFormulation) -> dict[str, float]:
         interface, provides = self._case.interface, self._subject.provides
-        z = frozen(np.concatenate([self._case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
+        z = freeze(np.concatenate([self._case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
         pairing = formulation.pair(interface, z)
         taken = {}
         if "pair" in provides:

@@ -48,13 +48,15 @@ def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedSc
 
 def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
     """For each body, the interface's numbers of its contact nodes; empty if it is out of reach."""
-    ends = np.cumsum([0, *(len(scene.bodies[index].contact_nodes) for index in scene.reached)]).tolist()
-    numbers = {index: np.arange(*ends_) for index, ends_ in zip(scene.reached, itertools.pairwise(ends), strict=True)}
+    ends = np.cumsum([0, *(len(scene.bodies[index].contact_nodes) for index in scene.bodies_in_reach)]).tolist()
+    numbers = {
+        index: np.arange(*ends_) for index, ends_ in zip(scene.bodies_in_reach, itertools.pairwise(ends), strict=True)
+    }
     return tuple(numbers.get(index, np.zeros(0, np.int64)) for index in range(len(scene.bodies)))
 
 
 def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     with np.errstate(all="ignore"):  # an iteration that diverges overflows; its end says so
         trace = solve(scene, formulation)
         shown = _last_to_be_drawn(trace)
@@ -71,7 +73,7 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
         remark = f"drawn: iterate {shown}, the last that is not far away{'; ' if remark else ''}{remark}"
     return Solution(
         formulation=subject.name,
-        end=trace.end.words,
+        end=trace.end.label,
         converged=trace.converged,
         displacements=tuple(scene.displacements(q, factor)),
         stresses=tuple(_in_global_axes(body, s) for body, s in zip(scene.bodies, at_gauss_points, strict=True)),

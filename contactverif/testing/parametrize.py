@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown
+from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
@@ -150,7 +150,7 @@ def checks(asked: Asked, options: Any, fresh_seed: int) -> list[Check]:
     ids = [_id(question) for question in questions]
     for property_id in asked.known:
         if property_id not in ids:
-            raise unknown("known", property_id, ids)
+            raise unknown_name_error("known", property_id, ids)
     profile = profile_named(options.contactverif_profile or asked.profile or "dev").resolve(
         examples=_first(options.contactverif_examples, asked.examples),
         seed=_first(options.contactverif_seed, asked.seed),

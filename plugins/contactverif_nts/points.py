@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, IntArray, frozen
+from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.state_vector import join_rows, split_state, split_states
@@ -244,8 +244,8 @@ def _points_at(
     return PointContact(
         traits,
         check_penalty(penalty),
-        frozen(c, np.float64),
-        frozen(weight, np.float64),
+        freeze(c, np.float64),
+        freeze(weight, np.float64),
         at_nodes,
         area_from,
         check_free_end(tau),

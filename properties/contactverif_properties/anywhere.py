@@ -38,7 +38,7 @@ def no_barrier(traits: Traits) -> str:
 
 def posed(case: Case, subject: Subject) -> tuple[CheckedFormulation, Case]:
     """The formulation with the penalty of the case, and the case with multipliers if it has any."""
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     if not formulation.n_multipliers(case.interface):
         return formulation, case
     low, high = (share * case.shortest_segment for share in PRESS)

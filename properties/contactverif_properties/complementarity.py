@@ -43,10 +43,10 @@ def solved_with_multipliers(case: Case, subject: Subject) -> Measurement:
     Source: verification 10, complementarity.
     """
     scene = scene_of(case)
-    system = System(scene, subject.on(case))
+    system = System(scene, subject.for_case(case))
     trace = _solution(system)
     if not trace.converged:
-        return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.words}")
+        return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.label}")
     solution, n_free = trace.u[-1], scene.n_free
     pairing = system.pair(solution)
     condition = system.step(system.matrix(solution, pairing)[0], np.zeros(system.size)).condition
@@ -68,7 +68,7 @@ def _solution(system: System) -> Trace:
     trace = solve(system.scene, system.formulation)
     if trace.converged:
         return trace
-    return solve(system.scene, system.formulation, own_tangent=False)  # a wrong tangent may never get there
+    return solve(system.scene, system.formulation, use_tangent=False)  # a wrong tangent may never get there
 
 
 def _has_multipliers(traits: Traits) -> str:

@@ -12,7 +12,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.linear import ROUNDING
+from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import exact_unknowns, pressure_of
@@ -61,9 +61,9 @@ def nearest_solution(
     """
     found = case.z[case.interface.n_unknowns :]
     pairing = formulation.pair(case.interface, case.z)
-    felt = scene.spread.T @ force_columns(case, formulation, pairing)
+    felt = scene.transformation.T @ force_columns(case, formulation, pairing)
     _, sizes, directions = linalg.svd(felt)
-    told = int((sizes > ROUNDING * max(felt.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
+    told = int((sizes > RANK_ROUNDOFF * max(felt.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
     unfelt = directions[told:]
     nearest: FloatArray = found + unfelt.T @ (unfelt @ (right - found))
     return nearest, float(sizes[told - 1] / sizes[0]) if told else 1.0
@@ -81,10 +81,10 @@ def rank(case: Case, subject: Subject) -> Measurement:
     segments on two master segments.
     """
     scene, pressure = scene_of(case), pressure_of(case, np.inf)
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     exact = exact_unknowns(scene, pressure, np.inf)
     here = replace(case, z=scene.positions(exact))
-    system = System(scene, formulation, own_tangent=False)
+    system = System(scene, formulation, use_tangent=False)
     u = np.concatenate([exact, right_multipliers(here, subject, formulation, pressure)])
     matrix, floor = system.matrix(u, system.pair(u))
     step = system.step(matrix, np.zeros(system.size), floor)

@@ -13,7 +13,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing, Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.linear import scales
+from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import End, System, Trace, solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.strategies.solids import solid_cases
@@ -61,12 +61,12 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     Source: verification 16. Triples of residuals, which this replaces, are wrong in up to one of five scenes.
     """
     scene = scene_of(case)
-    system = System(scene, subject.on(case))
+    system = System(scene, subject.for_case(case))
     trace = solve(scene, system.formulation)
     if not trace.converged:  # a wrong tangent may never get there
-        trace = solve(scene, system.formulation, own_tangent=False)
+        trace = solve(scene, system.formulation, use_tangent=False)
     if not trace.converged:
-        return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.words}")
+        return Measurement({}, {}, details=ended(trace), undecided=f"Newton found no solution: {trace.end.label}")
     solution = trace.u[-1]
     pairing = system.pair(solution)
     matrix, _ = system.matrix(solution, pairing)
@@ -80,7 +80,7 @@ def one_step(case: Case, subject: Subject) -> Measurement:
     undecided, values, tolerances = "", {}, {}
     if least < QUADRATIC:
         details["spectral radius"] = spectral_radius(system, solution, pairing)
-        smooth, _, _ = _steps(replace(system, own_tangent=False), case, solution, pairing, condition)
+        smooth, _, _ = _steps(replace(system, use_tangent=False), case, solution, pairing, condition)
         if not smooth >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     idle = untouched(system, trace)
@@ -115,13 +115,18 @@ def _steps(
 def floor_of(system: System, solution: FloatArray, pairing: Pairing | None, condition: float) -> float:
     """A length: what a linear system at the solution is solved to, and positions are rounded to."""
     scene, units = system.scene, units_of(system, solution, pairing)
-    floor = 1e3 * UNIT_ROUNDOFF / condition * float(np.abs(solution / units).max() + np.abs(scene.moved).max())
+    floor = (
+        1e3
+        * UNIT_ROUNDOFF
+        / condition
+        * float(np.abs(solution / units).max() + np.abs(scene.imposed_displacements).max())
+    )
     return max(floor, 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max()))
 
 
 def units_of(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
     """(n,) what a unit of distance is: 1 of a position, of a multiplier what does as much to the forces."""
-    return scales(system.matrix(u, pairing)[0], system.scene.n_free)[1]
+    return scale_factors(system.matrix(u, pairing)[0], system.scene.n_free)[1]
 
 
 def order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
@@ -154,7 +159,7 @@ def spectral_radius(system: System, u: FloatArray, pairing: Pairing | None) -> f
     Source: Zavarise & De Lorenzis (2009), Fig. 30, where it is the rate of the basic version.
     """
     matrix, _ = system.matrix(u, pairing)
-    exact, _ = replace(system, own_tangent=False).matrix(u, pairing)
+    exact, _ = replace(system, use_tangent=False).matrix(u, pairing)
     return float(np.abs(linalg.eigvals(np.eye(len(u)) - linalg.solve(dense(matrix), dense(exact)))).max())
 
 
@@ -168,7 +173,7 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
         end. Undecided where the pairing changes to the last, which is normal on kinked surfaces and no verdict against
         anybody. Details: how it ended, iterations, iterates at which the pairing changed.
     """
-    system = System(scene_of(case), subject.on(case))
+    system = System(scene_of(case), subject.for_case(case))
     trace = solve(system.scene, system.formulation)
     details, series = ended(trace), history(trace)
     last = len(trace.residuals) - 1
@@ -176,9 +181,9 @@ def trajectory(case: Case, subject: Subject) -> Measurement:
     solved = trace.converged or (trace.end is End.STAGNATED and trace.roundings.min() <= NOISE)
     why = ""
     if (solved and settled == last > SHORT) or (not solved and last - settled < WANDERS):
-        why = f"the pairing does not settle: {trace.end.words}"
+        why = f"the pairing does not settle: {trace.end.label}"
     elif not solved and trace.changes.max() < 0:
-        why = f"there is no pairing that could tell whether a kink is in the way: {trace.end.words}"
+        why = f"there is no pairing that could tell whether a kink is in the way: {trace.end.label}"
     elif not solved and trace.end is End.STAGNATED:
         why = "the residual has a noise that roundoff does not explain"
     if why:

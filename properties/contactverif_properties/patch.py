@@ -48,7 +48,7 @@ def transmitted(case: Case, subject: Subject) -> Measurement:
 
     Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20; exact forces in rationals (`contactverif.oracle`).
     """
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     exact = exact_forces(case)
     size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
     tolerance = roundoff.of_gap(case, case.parameter("penetration"))
@@ -111,7 +111,7 @@ def resultant(case: Case, subject: Subject) -> Measurement:
     """
     stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
     interface = case.interface.at(case.interface.nodes * stretch)
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     count = formulation.n_multipliers(interface)
     case = case.with_multipliers(np.full(count, case.penalty * case.parameter("penetration")))
     pairing = formulation.pair(interface, case.z)

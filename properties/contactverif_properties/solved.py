@@ -17,7 +17,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.newton import NEARLY, Trace, solve
+from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.scenes.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.scenes.uniform_stress import (
@@ -107,7 +107,7 @@ def by_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
         for one that Newton found less exactly. Details: how it ended, and how many were not unique.
     """
     scene, pressure = scene_of(case), pressure_of(case, np.inf)
-    formulation = subject.on(replace(case, penalty=penalty))
+    formulation = subject.for_case(replace(case, penalty=penalty))
     exact = exact_unknowns(scene, pressure, np.inf)
     right = right_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
     exact_u = np.append(exact, right)
@@ -137,8 +137,8 @@ def by_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
     found = errors(u)
     if any(value > found.tolerances[name] for name, value in found.values.items()):
         # a saddle point that is nearly singular spoils what Newton finds, and not that the exact solution is one
-        at_exact = solve(scene, formulation, start=exact_u, iterations=1, own_tangent=False)
-        if at_exact.roundings[0] <= NEARLY:
+        at_exact = solve(scene, formulation, start=exact_u, iterations=1, use_tangent=False)
+        if at_exact.roundings[0] <= NEAR_CONVERGENCE:
             found = errors(exact_u)
     return replace(found, details=_ended(trace))
 
@@ -157,7 +157,7 @@ def at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
         not count.
     """
     scene, pressure = scene_of(case), pressure_of(case, penalty)
-    formulation = subject.on(replace(case, penalty=penalty))
+    formulation = subject.for_case(replace(case, penalty=penalty))
     exact = exact_unknowns(scene, pressure, penalty)
     trace, q = solution(scene, formulation, exact, pressure / penalty)
     z = scene.positions(q)
@@ -211,11 +211,11 @@ def solution(
     formulation that passes is in balance and does not move. One that is not is judged where it comes nearest to balance
     afterwards.
     """
-    trace = solve(scene, formulation, iterations=ITERATIONS, own_tangent=False)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False)
     if trace.converged and np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0) <= NEAR * penetration:
         return trace, trace.u[-1]
-    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, own_tangent=False)
-    balanced = again.roundings[0] <= NEARLY or len(again.u) == 1
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False)
+    balanced = again.roundings[0] <= NEAR_CONVERGENCE or len(again.u) == 1
     return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
 
 
@@ -231,7 +231,7 @@ def force_errors(
     pairing = formulation.pair(case.interface, case.z)
     given = -formulation.residual(case.interface, pairing, case.z)[: case.interface.n_unknowns].reshape(-1, 2)
     first = 0
-    for index in scene.reached:
+    for index in scene.bodies_in_reach:
         last = first + len(scene.bodies[index].contact_nodes)
         if scene.bodies[index].rigid:
             needed[first:last] = given[first:last]

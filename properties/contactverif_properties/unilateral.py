@@ -37,7 +37,7 @@ def open_and_closed(case: Case, subject: Subject) -> Measurement:
 
     Source: verification 10, for frictionless contact without adhesion.
     """
-    formulation, interface = subject.on(case), case.interface
+    formulation, interface = subject.for_case(case), case.interface
     depth, n = case.parameter("penetration"), case.interface.n_unknowns
     count = formulation.n_multipliers(interface)
     size = case.penalty * depth * case.slave_length

@@ -62,16 +62,16 @@ def statements(found: Convergence) -> tuple[Statement, ...]:
 
 def solved(member: Member, ratio: float, stiffness: float) -> newton.Trace:
     """Case C with free sides, from the slave just touching; ε̂ = stiffness × E."""
-    scene = catalogue.made(
+    scene = catalogue.make_scene(
         "c", young=YOUNG, ratio=ratio, pressure=PRESSURE, penalty=stiffness * YOUNG, lowered=0.0, sides="free"
     )
-    return newton.solve(scene, cast.subject(member).on(scene.case()), iterations=80)
+    return newton.solve(scene, cast.subject(member).for_case(scene.case()), iterations=80)
 
 
 def _history(member: Member, ratio: float) -> History:
     trace = solved(member, ratio, 1.0)
     floor = float(trace.floors[-1])
-    return History(member, trace.residuals, floor, trace.end.words, _last_rate(trace.residuals, floor))
+    return History(member, trace.residuals, floor, trace.end.label, _last_rate(trace.residuals, floor))
 
 
 def _last_rate(residuals: np.ndarray, floor: float) -> float:
@@ -86,7 +86,7 @@ def _rate(stiffness: float) -> tuple[float, float]:
     q, case = trace.solution, trace.scene.case()
     matrices = []
     for member in (cast.BASIC, cast.VTS_PPT):
-        system = newton.System(trace.scene, cast.subject(member).on(case))
+        system = newton.System(trace.scene, cast.subject(member).for_case(case))
         matrices.append(dense(system.matrix(q, system.pair(q))[0]))
     basic, consistent = matrices
     iteration = np.eye(len(q)) - np.linalg.solve(basic, consistent)

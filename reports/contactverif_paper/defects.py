@@ -183,7 +183,7 @@ def overhanging(part: float) -> Scene:
     facts = {
         "along": np.concatenate([slave_x, master_x]),
         "direction": np.array([1.0, 0.0]),
-        "compliance": np.array([4.0, 4.0]) / upper.oedometer,
+        "compliance": np.array([4.0, 4.0]) / upper.oedometric_modulus,
         "pressure": np.array(pressure),
     }
     return Scene((upper, lower), penalty=penalty, facts=facts)
@@ -192,5 +192,5 @@ def overhanging(part: float) -> Scene:
 def _overhanging(member: Member, part: float) -> float:
     """Largest error of a stress over the pressure; NaN where Newton ends nowhere."""
     scene = overhanging(part)
-    trace = newton.solve(scene, cast.subject(member).on(scene.case()))
+    trace = newton.solve(scene, cast.subject(member).for_case(scene.case()))
     return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan

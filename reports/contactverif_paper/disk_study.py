@@ -1,10 +1,10 @@
 """Example 2 over meshes, sizes and slopes: what the pressure under the disk is, and why it is not that of Hertz.
 
 Three things lie between a solution and Hertz' p0, and each is computed on its own. The penalty is a Winkler layer:
-`hertz.on_layer`. The mesh: `over_meshes`. And a formulation that measures areas in the current configuration gives a
-pressure per current length, on a surface that the contact itself compresses by p/E: `over_slopes` shows that this part
-falls like a/R, and that hardly any is left where areas are measured in the reference configuration. The sizes of the
-bodies do not matter: `over_sizes`.
+`hertz.solve_winkler_contact`. The mesh: `over_meshes`. And a formulation that measures areas in the current
+configuration gives a pressure per current length, on a surface that the contact itself compresses by p/E: `over_slopes`
+shows that this part falls like a/R, and that hardly any is left where areas are measured in the reference one.
+The sizes of the bodies do not matter: `over_sizes`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.disk import Problem, disk_on_foundation
+from contactverif.scenes.disk import DiskProblem, disk_on_foundation
 
-PAPER = Problem()
+PAPER = DiskProblem()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class Pressed:
     ----------
     formulation : str
         As typed on the command line.
-    problem : Problem
+    problem : DiskProblem
         Of what.
     converged : bool
         Whether it is a solution.
@@ -47,7 +47,7 @@ class Pressed:
     """
 
     formulation: str
-    problem: Problem
+    problem: DiskProblem
     converged: bool
     iterations: int
     x: FloatArray
@@ -62,10 +62,10 @@ class Pressed:
     @property
     def over_layer(self) -> float:
         """The largest pressure over that of Hertz on a Winkler layer, less 1."""
-        return self.peak / self.problem.on_layer().peak - 1
+        return self.peak / self.problem.winkler_contact().peak - 1
 
 
-def pressed(formulation: str, problem: Problem = PAPER, refine: int = 1, lowered: float = 1.0) -> Pressed:
+def pressed(formulation: str, problem: DiskProblem = PAPER, refine: int = 1, lowered: float = 1.0) -> Pressed:
     """Solves Example 2.
 
     Parameters
@@ -84,7 +84,7 @@ def pressed(formulation: str, problem: Problem = PAPER, refine: int = 1, lowered
     if not isinstance(subject, Subject):
         raise MisuseError("formulation", f"{formulation}, not loaded: {subject.reason}", "one that loads")
     scene = _scene(problem, refine)
-    asked = subject.on(scene.case())
+    asked = subject.for_case(scene.case())
     trace = newton.solve(scene, asked, start=lowered * scene.start)
     points = asked.contact_points(scene.interface, asked.pair(scene.interface, trace.z), trace.z)
     pressure = np.where(points.active, points.pressure, 0.0)
@@ -123,7 +123,7 @@ def over_slopes(formulations: Sequence[str], slopes: Sequence[float], refine: in
         a/R, over that of the paper.
     """
     return [
-        pressed(name, Problem(radius=PAPER.radius / slope, force=PAPER.force * slope), refine)
+        pressed(name, DiskProblem(radius=PAPER.radius / slope, force=PAPER.force * slope), refine)
         for slope in slopes
         for name in formulations
     ]
@@ -145,7 +145,7 @@ def difference(one: Pressed, other: Pressed) -> tuple[FloatArray, FloatArray]:
 
 
 @lru_cache(maxsize=2)
-def _scene(problem: Problem, refine: int) -> Scene:
+def _scene(problem: DiskProblem, refine: int) -> Scene:
     """Condensing it takes longer than solving it."""
     return disk_on_foundation(problem, refine=refine)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contactverif.scenes import hertz
-from contactverif.scenes.disk import Problem, disk_on_foundation
+from contactverif.scenes.disk import DiskProblem, disk_on_foundation
 from contactverif_paper import cast, disk_study
 from contactverif_paper.disk_study import Pressed
 from contactverif_paper.paper_data import Disk, DiskCurve, DiskStudy, Member, Said, Series, Statement
@@ -33,12 +33,12 @@ def disk_steps(*, with_study: bool = True) -> int:
 
 def disk(told: Callable[[str], None], *, with_study: bool = True) -> Disk:
     """All formulations on the base meshes; with the study also finer ones, flatter contacts and other sizes."""
-    problem = Problem()
+    problem = DiskProblem()
     found = {}
     for member in cast.DISK:
         told(f"Example 2, {member.formulation}")
         found[member] = disk_study.pressed(member.formulation)
-    layer = problem.on_layer()
+    layer = problem.winkler_contact()
     places = np.linspace(0.0, layer.half_width, _PLACES)
     x, difference = disk_study.difference(found[cast.VTS_PPT], found[cast.VTS_ME])
     return Disk(
@@ -156,5 +156,5 @@ def _rows(found: Sequence[Pressed], n_members: int) -> list[list[Pressed]]:
 
 def _size(refine: int) -> float:
     """The shortest segment of the slave, a length: that in the middle."""
-    interface = disk_on_foundation(Problem(), refine=refine).interface
+    interface = disk_on_foundation(DiskProblem(), refine=refine).interface
     return float(interface.slave.lengths(interface.nodes).min())

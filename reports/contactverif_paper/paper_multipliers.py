@@ -37,8 +37,8 @@ def multipliers(told: Callable[[str], None]) -> tuple[MultiplierRow, ...]:
     rows = []
     for member in cast.MULTIPLIERS:
         told(f"patch tests of {member.formulation}")
-        rows += [_row(member, name, catalogue.made(name)) for name in SCENES]
-        rows.append(_row(member, REFINED, catalogue.made("c", refine=2)))
+        rows += [_row(member, name, catalogue.make_scene(name)) for name in SCENES]
+        rows.append(_row(member, REFINED, catalogue.make_scene("c", refine=2)))
         rows.append(_row(member, EIGHT_ON_TWO, eight_on_two()))
     return tuple(rows)
 
@@ -108,7 +108,7 @@ def eight_on_two() -> Scene:
 
 def _row(member: Member, name: str, scene: Scene) -> MultiplierRow:
     subject, tolerance = cast.subject(member), condition_tolerance(scene, scene.penalty)
-    trace = newton.solve(scene, subject.on(scene.case()))
+    trace = newton.solve(scene, subject.for_case(scene.case()))
     found = trace.multipliers / float(scene.facts["pressure"])
     if subject.traits.penalty == "nodal":
         lengths = uniform_pressure_weights(scene.interface, scene.facts["along"])[: len(found)]
@@ -116,7 +116,7 @@ def _row(member: Member, name: str, scene: Scene) -> MultiplierRow:
     return MultiplierRow(
         member=member,
         scene=name,
-        end=trace.end.words,
+        end=trace.end.label,
         error=stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan,
         tolerance=tolerance,
         low=_plain(found.min(initial=np.inf), tolerance),

@@ -86,8 +86,8 @@ def passes(told: Callable[[str], None]) -> PassTable:
     for row, member in enumerate(members):
         told(f"patch tests of {member.formulation}")
         for column, name in enumerate(SCENES):
-            scene = catalogue.made(name)
-            trace = newton.solve(scene, cast.subject(member).on(scene.case()))
+            scene = catalogue.make_scene(name)
+            trace = newton.solve(scene, cast.subject(member).for_case(scene.case()))
             if trace.converged:
                 errors[row, column] = stress_error(scene, scene.stresses(trace.solution))
     said = [[SAID.get(member.formulation, {}).get(name, _SILENT) for name in SCENES] for member in members]
@@ -95,7 +95,7 @@ def passes(told: Callable[[str], None]) -> PassTable:
         members=members,
         scenes=SCENES,
         errors=errors,
-        tolerances=np.array([condition_tolerance(scene, scene.penalty) for scene in map(catalogue.made, SCENES)]),
+        tolerances=np.array([condition_tolerance(scene, scene.penalty) for scene in map(catalogue.make_scene, SCENES)]),
         fails=FAILS,
         said=np.array(said),
         unequal=_unequal(),
@@ -198,14 +198,14 @@ def _of_areas(by_scene: Mapping[str, Mapping[Member, float]], table: PassTable) 
 
 
 def _unequal() -> tuple[float, float]:
-    scene = catalogue.made("example-1bis", ratio=UNEQUAL)
-    trace = newton.solve(scene, cast.subject(cast.VTS_PPT).on(scene.case()))
+    scene = catalogue.make_scene("example-1bis", ratio=UNEQUAL)
+    trace = newton.solve(scene, cast.subject(cast.VTS_PPT).for_case(scene.case()))
     error = stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
     return error, condition_tolerance(scene, scene.penalty)
 
 
 def _patch(name: str, shown: Shown) -> Patch:
-    scene = catalogue.made(name, penalty=shown.stiffness * YOUNG)
+    scene = catalogue.make_scene(name, penalty=shown.stiffness * YOUNG)
     case = scene.case()
     members = shown.members
     solved = pictures.solve_scene(case, [cast.subject(member) for member in members])

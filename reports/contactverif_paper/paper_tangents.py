@@ -35,8 +35,8 @@ def tangents() -> Tangents:
 
 
 def _row(member: Member) -> tuple[float, float, float, int]:
-    scene = catalogue.made(SCENE, **OPTIONS)
-    formulation = cast.subject(member).on(scene.case())
+    scene = catalogue.make_scene(SCENE, **OPTIONS)
+    formulation = cast.subject(member).for_case(scene.case())
     trace = newton.solve(scene, formulation)
     z = trace.z
     pairing = formulation.pair(scene.interface, z)

@@ -113,11 +113,11 @@ def test_one_random_patch_test(benchmark: Any, capsys: pytest.CaptureFixture[str
     def condensed() -> None:
         forgotten()
         for case in cases:
-            assert len(scene_of(case).condensed) == 2
+            assert len(scene_of(case).condensed_bodies) == 2
 
     def solved() -> None:
         for case in cases:
-            solve(scene_of(case), subject.on(case))
+            solve(scene_of(case), subject.for_case(case))
 
     drawn, whole, bodies, newton = interleaved(
         lambda: draw_cases(block_cases(), seed="0", examples=N_MESHES), judged, condensed, solved, repeats=1

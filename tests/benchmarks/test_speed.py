@@ -47,7 +47,7 @@ def interleaved(*calls: Callable[[], Any], rounds: int = 9, repeats: int = 20) -
 def test_verb(benchmark: Any, verb: str, name: str, n_slave: int) -> None:
     benchmark.group = f"{verb}, {n_slave} slave segments"
     case = wavy(n_slave)
-    formulation = Subject(name, getattr(contactverif_nts, name)).on(case)
+    formulation = Subject(name, getattr(contactverif_nts, name)).for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     calls = {
         "pair": lambda: formulation.pair(case.interface, case.z),
@@ -62,7 +62,7 @@ def test_verb(benchmark: Any, verb: str, name: str, n_slave: int) -> None:
 def test_directional_check(benchmark: Any, capsys: pytest.CaptureFixture[str], name: str, n_slave: int) -> None:
     benchmark.group = f"tangent.directional, {n_slave} slave segments"
     case, subject = wavy(n_slave), Subject(name, getattr(contactverif_nts, name))
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
 
     def evaluated() -> Any:

@@ -16,7 +16,7 @@ from contactverif.cli import drawing
 from contactverif.cli.gallery import MEANINGS
 from contactverif.contract.result import NotLoaded
 from contactverif.run import runner
-from contactverif.scenes.catalogue import OPTIONS, SCENES, NamedBlocks, scene_named
+from contactverif.scenes.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.scenes.named_states import named_case
 from contactverif.studies import solved_scenes as pictures
 from contactverif_reports.netcdf.write import write
@@ -42,7 +42,7 @@ def ends(out: str) -> dict[str, list[str]]:
 def scene_report(tmp_path: Path) -> Path:
     """A report whose counterexample is the scene c′."""
     path = tmp_path / "scene.nc"
-    write(run_with(scene_named("c-prime").case(), "vts-me"), path)
+    write(run_with(load_scene("c-prime").case(), "vts-me"), path)
     return path
 
 
@@ -159,7 +159,7 @@ def test_draw_writes_for_paraview(ask: Ask, tmp_path: Path) -> None:
     answer = ask(*DRAW_C, "--vtu", tmp_path / "c.vtu", "--out", tmp_path / "c.svg")
     assert answer.status == 0
     assert answer.out.endswith(f"picture: {tmp_path / 'c.svg'}\nParaView: {tmp_path / 'c.vtu'}\n")
-    mesh, scene = meshio.read(tmp_path / "c.vtu"), scene_named("c")
+    mesh, scene = meshio.read(tmp_path / "c.vtu"), load_scene("c")
     assert len(mesh.points) == sum(len(body.nodes) for body in scene.bodies)
     assert mesh.cell_data["pressure"][0] == pytest.approx(100.0)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.svg", "c.vtu"]
@@ -230,6 +230,6 @@ def test_verify_asks_on_a_scene(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(runner, "judge_case", judge)
     options = ("-p", "patch.flat.transmission", "--examples", "4", "--seed", "1")
     assert ask("verify", "vts-ppt", "--scene", "b:refine=2", *options).status == 0
-    interface = scene_named("b:refine=2").interface
+    interface = load_scene("b:refine=2").interface
     assert len(cases) == 4
     assert all(len(case.interface.slave) == len(interface.slave) == 8 for case in cases)

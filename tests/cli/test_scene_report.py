@@ -13,7 +13,7 @@ from contactverif.contract.case import Case
 from contactverif.mechanics.scene import has_bodies, scene_of
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import Placing, two_blocks
-from contactverif.scenes.catalogue import SCENES, scene_named
+from contactverif.scenes.catalogue import SCENES, load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.read import case_ids, read_case, same_data
 from contactverif_reports.netcdf.write import write
@@ -30,8 +30,8 @@ def odd() -> Case:
     ).case(seed=2**63 - 5)  # fmt: skip
 
 
-CASES = {name: scene_named(name).case() for name in SCENES}
-CASES |= {"free": scene_named("c:sides=free,lowered=0,degrees=33").case(), "odd": odd()}
+CASES = {name: load_scene(name).case() for name in SCENES}
+CASES |= {"free": load_scene("c:sides=free,lowered=0,degrees=33").case(), "odd": odd()}
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.contract.body import Body, block, placed_at, rigid
+from contactverif.contract.body import Body, block, placed_at, rigid_surface
 from contactverif.contract.errors import MisuseError
 
 # Four cells; nodes are numbered along x from below, so 0 1 2 touch and 6 7 8 are held.
@@ -40,7 +40,7 @@ def test_what_is_left_out_is_free_and_unloaded() -> None:
 @pytest.mark.parametrize(("young", "poisson", "modulus"), [(3.0, 0.2, 10 / 3), (1.0, 0.0, 1.0), (1.0, -0.5, 1.5)])
 def test_the_oedometer_modulus(young: float, poisson: float, modulus: float) -> None:
     # 3 × .8/(1.2 × .6) = 10/3; 1 × 1.5/(.5 × 2) = 3/2; a few roundings
-    assert abs(replace(BLOCK, young=young, poisson=poisson).oedometer - modulus) <= 8 * UNIT_ROUNDOFF * modulus
+    assert abs(replace(BLOCK, young=young, poisson=poisson).oedometric_modulus - modulus) <= 8 * UNIT_ROUNDOFF * modulus
 
 
 def test_a_body_is_a_read_only_copy() -> None:
@@ -179,12 +179,18 @@ WRONG_BLOCKS: dict[str, tuple[Callable[[], Body], str]] = {
         r"block: shift: found shape \(1,\); needed shape \(2,\)",
     ),
     "material": (lambda: block([0, 1], [0, 1], contact="top", young=0), "block: young: found 0; needed Young's"),
-    "one point": (lambda: rigid([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
-    "in line": (lambda: rigid([0, 1, 2]), r"rigid: points: found shape \(3,\); needed shape \(n, 2\)"),
-    "ragged": (lambda: rigid([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),
-    "words": (lambda: rigid("abc"), "rigid: points: found dtype <U3; needed numbers"),
-    "move": (lambda: rigid([[0, 0], [1, 0]], moved=(1, 2, 3)), r"rigid: moved: found shape \(3,\); needed shape \(2,"),
-    "nowhere": (lambda: rigid([[0, 0], [1, 0]], moved=(np.nan, 0)), "rigid: imposed: found NaN or infinity; needed"),
+    "one point": (lambda: rigid_surface([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
+    "in line": (lambda: rigid_surface([0, 1, 2]), r"rigid: points: found shape \(3,\); needed shape \(n, 2\)"),
+    "ragged": (lambda: rigid_surface([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),
+    "words": (lambda: rigid_surface("abc"), "rigid: points: found dtype <U3; needed numbers"),
+    "move": (
+        lambda: rigid_surface([[0, 0], [1, 0]], moved=(1, 2, 3)),
+        r"rigid: moved: found shape \(3,\); needed shape \(2,",
+    ),
+    "nowhere": (
+        lambda: rigid_surface([[0, 0], [1, 0]], moved=(np.nan, 0)),
+        "rigid: imposed: found NaN or infinity; needed",
+    ),
     "loose": (
         lambda: Body([[0, 0], [1, 0]], np.zeros((0, 4), int), [[0, 1]]),  # type: ignore[arg-type]
         "body: fixed: found a free node of a rigid body; needed every component of every node fixed",
@@ -251,7 +257,7 @@ def test_where_a_block_lies() -> None:
 
 
 def test_a_rigid_body() -> None:
-    floor = rigid([[4, 0], [1, 0], [0, 0]], moved=(0, 0.5), name="floor")
+    floor = rigid_surface([[4, 0], [1, 0], [0, 0]], moved=(0, 0.5), name="floor")
     assert floor.rigid
     assert floor.fixed.all()
     assert floor.imposed.tolist() == [[0, 0.5]] * 3

@@ -54,7 +54,7 @@ def subject(**parts: Any) -> Subject:
 
 def asked(verb: str, **parts: Any) -> Any:
     """What comes over the counter when the verb is asked of springs with some parts replaced."""
-    guarded = subject(**parts).on(CASE)
+    guarded = subject(**parts).for_case(CASE)
     pairing = guarded.pair(PAIR, Z) if verb != "pair" else None
     return guarded.pair(PAIR, Z) if verb == "pair" else getattr(guarded, verb)(PAIR, pairing, Z)
 
@@ -95,7 +95,7 @@ def test_a_residual_alone_is_a_plugin() -> None:
     least = Subject("least", lambda *, penalty: Least())
     assert least.provides == frozenset()
     assert least.traits == Traits()
-    guarded = least.on(CASE)
+    guarded = least.for_case(CASE)
     assert guarded.pair(PAIR, Z) is None
     assert guarded.residual(PAIR, None, Z).tolist() == (-Z).tolist()
 
@@ -115,7 +115,7 @@ def test_a_batch_equals_a_loop(dtype: type) -> None:
 
     answers = {}
     for batched in (False, True):
-        guarded = subject(residual=residual, traits=Traits(batched=batched)).on(CASE)
+        guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
         answers[batched] = guarded.residual(PAIR, None, states)
     assert seen == [1] * 6 + [3]
     assert answers[True].shape == states.shape
@@ -141,7 +141,7 @@ def test_a_plugin_that_writes_to_its_input(verb: str) -> None:
         asked(verb, **{verb: writing})
     z = Z.copy()
     with pytest.raises(PluginError):
-        subject(residual=writing).on(CASE).residual(PAIR, None, z)
+        subject(residual=writing).for_case(CASE).residual(PAIR, None, z)
     assert np.array_equal(z, Z)
 
 
@@ -202,7 +202,7 @@ def test_one_bad_state_of_a_batch() -> None:
         return np.where(z > 11, np.nan, z)
 
     for batched in (False, True):
-        guarded = subject(residual=residual, traits=Traits(batched=batched)).on(CASE)
+        guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
         with pytest.raises(NonFiniteError, match="residual: nan in 2 of "):
             guarded.residual(PAIR, None, BATCH)
 
@@ -244,7 +244,7 @@ def test_a_factory_that_fails_for_the_penalty_of_the_case() -> None:
 
     assert isinstance(Subject("soft", make).with_penalty(1.0), CheckedFormulation)
     with pytest.raises(PluginError, match="make: ValueError: too stiff"):
-        Subject("soft", make).on(CASE)
+        Subject("soft", make).for_case(CASE)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:
     """With multipliers left out, nts-lm would answer as nts does."""
     case, formulation = named_case("c"), load_formulation("nts-lm")
     assert isinstance(formulation, Subject)
-    guarded = formulation.on(case)
+    guarded = formulation.for_case(case)
     for ask in (
         lambda: guarded.pair(case.interface, case.z),
         lambda: guarded.residual(case.interface, None, case.z),

@@ -23,7 +23,7 @@ def test_the_nearest_segment_is_the_rational_one(seed: int) -> None:
     interface = Interface.from_chains(slave, master)
     x = interface.nodes.copy()
     for node in range(11):
-        expected = oracle.nearest(interface, x.ravel(), node, -1)
+        expected = oracle.project_point(interface, x.ravel(), node, -1)
         here = found(interface, x, x[node])
         assert here in expected.tied
         if len(expected.tied) == 1:

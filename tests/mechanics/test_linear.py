@@ -26,7 +26,7 @@ def saddle(constraints: FloatArray, stiffness: float = 1.0) -> FloatArray:
 def test_a_regular_saddle_point_whatever_the_unit_of_pressure(kind: Any, stiffness: float) -> None:
     matrix = saddle(np.array([[1.0, -1, 0, 0], [0, 0, 1, 1]]), stiffness)
     exact = np.concatenate([np.arange(1.0, 5.0), stiffness * np.array([2.0, -1.0])])
-    step = linear.solved(kind(matrix), matrix @ exact, 4)
+    step = linear.solve_step(kind(matrix), matrix @ exact, 4)
     assert step.change is not None
     assert step.deficiency == 0
     assert step.condition > 1e-3
@@ -39,8 +39,8 @@ def test_a_constraint_that_is_asked_several_times_is_counted(kind: Any, times: i
     once = np.array([[1.0, -1, 0, 0], [0, 0, 1, 1]])
     twice = np.vstack([once, *([once[0]] * times)])
     right = np.array([1.0, 2, 3, 4, 0.5, 0.25])
-    alone = linear.solved(saddle(once), right, 4).change
-    step = linear.solved(kind(saddle(twice)), np.concatenate([right, np.full(times, 0.5)]), 4)
+    alone = linear.solve_step(saddle(once), right, 4).change
+    step = linear.solve_step(kind(saddle(twice)), np.concatenate([right, np.full(times, 0.5)]), 4)
     assert alone is not None
     assert step.change is not None
     assert step.deficiency == times
@@ -54,20 +54,20 @@ def test_a_constraint_that_is_asked_several_times_is_counted(kind: Any, times: i
 def test_constraints_that_contradict_each_other_are_not_averaged(kind: Any) -> None:
     matrix = saddle(np.array([[1.0, -1, 0, 0], [1.0, -1, 0, 0]]))
     right = np.array([0, 0, 0, 0, 0.5, 0.25])
-    step = linear.solved(kind(matrix), right, 4)
+    step = linear.solve_step(kind(matrix), right, 4)
     assert step.change is None
     assert step.deficiency == 1
     within = np.array([0, 0, 0, 0, 0.5, 0.5 + 1e-9])
-    assert linear.solved(kind(matrix), within, 4).change is None
-    assert linear.solved(kind(matrix), within, 4, np.full(6, 1e-9)).change is not None
+    assert linear.solve_step(kind(matrix), within, 4).change is None
+    assert linear.solve_step(kind(matrix), within, 4, np.full(6, 1e-9)).change is not None
 
 
 @KINDS
 def test_positions_that_nothing_holds_are_singular(kind: Any) -> None:
     between = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 0]])  # a spring and a constraint between two free nodes
-    assert linear.solved(kind(between), np.array([1.0, -1, 0]), 2).change is None
+    assert linear.solve_step(kind(between), np.array([1.0, -1, 0]), 2).change is None
     held = np.array([[1.0, -1, 1], [-1, 1, 0], [1, 0, 0]])
-    assert linear.solved(kind(held), np.array([1.0, -1, 0]), 2).change is not None
+    assert linear.solve_step(kind(held), np.array([1.0, -1, 0]), 2).change is not None
 
 
 @KINDS
@@ -75,14 +75,14 @@ def test_an_unused_multiplier_with_a_row_of_its_own_is_regular(kind: Any) -> Non
     matrix = np.zeros((5, 5))
     matrix[:4, :4] = saddle(np.zeros((0, 4)))
     matrix[4, 4] = 1e-12
-    step = linear.solved(kind(matrix), np.array([1.0, 0, 0, 0, 3e-12]), 4)
+    step = linear.solve_step(kind(matrix), np.array([1.0, 0, 0, 0, 3e-12]), 4)
     assert step.change is not None
     assert step.change[4] == pytest.approx(3.0)
 
 
 @KINDS
 def test_without_multipliers_a_singular_matrix_has_no_step(kind: Any) -> None:
-    step = linear.solved(kind(np.array([[1.0, 1], [1, 1]])), np.ones(2), 2)
+    step = linear.solve_step(kind(np.array([[1.0, 1], [1, 1]])), np.ones(2), 2)
     assert step.change is None
     assert step.deficiency == 0
 
@@ -94,5 +94,5 @@ def test_a_nearly_singular_matrix_is_told_also_where_its_null_vector_is_orthogon
     """The usual estimate begins with equal entries, and sees nothing of it."""
     vector = np.array(nothing) / np.linalg.norm(nothing)
     matrix = np.eye(4) - (1 - 1e-14) * np.outer(vector, vector)
-    found = linear.solved(sparse.csr_array(matrix), vector, 4)
+    found = linear.solve_step(sparse.csr_array(matrix), vector, 4)
     assert found.condition < 1e-13

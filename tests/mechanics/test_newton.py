@@ -36,7 +36,7 @@ def subject(name: str) -> Subject:
 
 
 def on(name: str, scene: Scene) -> CheckedFormulation:
-    return subject(name).on(scene.case())
+    return subject(name).for_case(scene.case())
 
 
 def solved(name: str, scene: Scene, **how: Any) -> Trace:
@@ -112,7 +112,7 @@ def documented(trace: Trace, scene: Scene) -> None:
     assert trace.converged == (trace.end is End.CONVERGED) == (trace.roundings[-1] <= 1)
     assert set(trace.seconds) == {"pair", "residual", "tangent", "solve"}
     assert all(value >= 0 for value in trace.seconds.values())
-    assert trace.end.words
+    assert trace.end.label
     assert trace.end.advice.count("\n") == 0
 
 
@@ -137,7 +137,7 @@ def springs(scene: Scene, **how: float) -> CheckedFormulation:
 
 
 def test_converged() -> None:
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
     trace = solved("vts-ppt", scene)
     documented(trace, scene)
     assert trace.end is End.CONVERGED
@@ -149,7 +149,7 @@ def test_converged() -> None:
 
 
 def test_a_two_cycle_is_named() -> None:
-    scene = catalogue.made("c", penalty=1e4)
+    scene = catalogue.make_scene("c", penalty=1e4)
     trace = solved("vts-me", scene)
     documented(trace, scene)
     assert trace.end is End.CYCLE
@@ -165,9 +165,9 @@ def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
 ) -> None:
     """Whatever roundoff makes of the matrix: a step of 1e14 downwards would find contact there, and "converge"."""
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE", 0)
+        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     for degrees, poisson, refine in ((0.0, 0.3, 1), (10.0, 0.2, 3), (33.0, 0.45, 1), (77.0, 0.0, 2)):
-        scene = catalogue.made(name, lowered=-0.1, degrees=degrees, poisson=poisson, refine=refine)
+        scene = catalogue.make_scene(name, lowered=-0.1, degrees=degrees, poisson=poisson, refine=refine)
         trace = solved("vts-ppt", scene)
         documented(trace, scene)
         assert trace.end is End.SINGULAR
@@ -179,9 +179,9 @@ def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
 def test_a_stiff_contact_is_not_singular(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE", 0)
+        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     for penalty, ratio in ((1e14, 1.0), (1e4, 1e6), (1e14, 1e6)):
-        scene = catalogue.made("c", penalty=penalty, ratio=ratio)
+        scene = catalogue.make_scene("c", penalty=penalty, ratio=ratio)
         system = System(scene, on("vts-ppt", scene))
         matrix, _ = system.matrix(scene.start, system.pair(scene.start))
         full = matrix if dense else matrix.toarray()
@@ -192,7 +192,7 @@ def test_a_stiff_contact_is_not_singular(dense: bool, monkeypatch: pytest.Monkey
 
 
 def test_iterates_that_leave() -> None:
-    scene = catalogue.made("c")
+    scene = catalogue.make_scene("c")
     trace = solve(scene, springs(scene, said=0.1), start=np.full(scene.n_free, 1e-3))
     documented(trace, scene)
     assert trace.end is End.DIVERGED
@@ -201,7 +201,7 @@ def test_iterates_that_leave() -> None:
 
 
 def test_out_of_iterations() -> None:
-    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
     trace = solved("vts-ppt-basic", scene, iterations=3)
     documented(trace, scene)
     assert trace.end is End.EXHAUSTED
@@ -213,7 +213,7 @@ def test_out_of_iterations() -> None:
 
 
 def test_stagnated_just_above_roundoff() -> None:
-    scene = catalogue.made("c")
+    scene = catalogue.make_scene("c")
     quiet = solve(scene, springs(scene))
     assert quiet.end is End.CONVERGED
     trace = solve(scene, springs(scene, noise=1e3 * UNIT_ROUNDOFF))
@@ -224,7 +224,9 @@ def test_stagnated_just_above_roundoff() -> None:
 
 def test_a_wrong_tangent_is_no_error() -> None:
     """Where it says that nothing pushes though something does, what pushes is no roundoff."""
-    scene = replace(catalogue.made("c"), bodies=tuple(replace(b, load=0 * b.load) for b in catalogue.made("c").bodies))
+    scene = replace(
+        catalogue.make_scene("c"), bodies=tuple(replace(b, load=0 * b.load) for b in catalogue.make_scene("c").bodies)
+    )
     trace = solve(scene, springs(scene, said=0.0, noise=1e-3), start=np.zeros(scene.n_free), iterations=5)
     documented(trace, scene)
     assert trace.roundings[0] > 1e12
@@ -236,12 +238,12 @@ def test_a_wrong_tangent_is_no_error() -> None:
 @pytest.mark.parametrize("penalty", [1e2, 1e5, 1e9])
 def test_non_convergence_never_raises(name: str, scene: str, penalty: float) -> None:
     for lowered in (-1e-3, 0.0, 1.0, 3.0):
-        made = catalogue.made(scene, penalty=penalty, lowered=lowered, sides="free", degrees=10.0)
+        made = catalogue.make_scene(scene, penalty=penalty, lowered=lowered, sides="free", degrees=10.0)
         documented(solved(name, made, iterations=12), made)
 
 
 def test_bad_options_of_a_solution() -> None:
-    scene = catalogue.made("a1")
+    scene = catalogue.make_scene("a1")
     formulation = on("vts-ppt", scene)
     for how, message in (
         ({"load_steps": 0}, "load_steps: found 0; needed at least 1"),
@@ -258,17 +260,17 @@ def test_bad_options_of_a_solution() -> None:
 
 
 def test_residuals_energies_and_changes_are_what_they_say() -> None:
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
     formulation = on("vts-ppt-basic", scene)
     trace = solve(scene, formulation)
     pairings = []
     for index, q in enumerate(trace.q):
-        z = scene.interface.nodes.reshape(-1) + scene.moved + np.asarray(scene.spread) @ q
+        z = scene.interface.nodes.reshape(-1) + scene.imposed_displacements + np.asarray(scene.transformation) @ q
         pairing = formulation.pair(scene.interface, z)
         assert pairing is not None
         pairings.append(pairing)
         contact = formulation.residual(scene.interface, pairing, z)
-        residual = scene.stiffness @ q - scene.load + np.asarray(scene.spread).T @ contact
+        residual = scene.stiffness @ q - scene.load + np.asarray(scene.transformation).T @ contact
         assert abs(np.abs(residual).max() - trace.residuals[index]) <= trace.floors[index]
         if index < trace.n_iterations:
             energy = abs((trace.q[index + 1] - q) @ residual)
@@ -284,7 +286,7 @@ def test_residuals_energies_and_changes_are_what_they_say() -> None:
 
 
 def test_load_steps_end_at_the_same_solution() -> None:
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5)
     once, four = solved("vts-ppt", scene), solved("vts-ppt", scene, load_steps=4)
     documented(four, scene)
     assert four.end is once.end is End.CONVERGED
@@ -317,7 +319,7 @@ def test_load_steps_of_an_imposed_displacement() -> None:
 
 
 def test_a_load_step_that_fails_is_the_last() -> None:
-    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
     trace = solved("vts-ppt-basic", scene, load_steps=3, iterations=2)
     assert trace.end is End.EXHAUSTED
     assert trace.factors.tolist() == [1 / 3] * 3
@@ -335,18 +337,18 @@ class Wrapped:
 
 def wrapped(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
     inner = subject(name)
-    return Subject(name, lambda *, penalty: Wrapped(inner._make(penalty=penalty), **parts)).on(scene.case())
+    return Subject(name, lambda *, penalty: Wrapped(inner._make(penalty=penalty), **parts)).for_case(scene.case())
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic", "nts-ar"])
 def test_a_formulation_without_tangent_is_differentiated(name: str) -> None:
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5)
     formulation = wrapped(name, scene, tangent=None)
     assert "tangent" not in formulation.provides
     trace, own = solve(scene, formulation), solved(name, scene)
     documented(trace, scene)
     assert trace.end is own.end is End.CONVERGED
-    asked_not_to = solved(name, scene, own_tangent=False)
+    asked_not_to = solved(name, scene, use_tangent=False)
     assert np.array_equal(asked_not_to.q, trace.q)
     pairing = formulation.pair(scene.interface, own.z)
     matrix, floor = System(scene, formulation).matrix(own.solution, pairing)
@@ -359,7 +361,7 @@ def test_a_formulation_without_tangent_is_differentiated(name: str) -> None:
 
 
 def test_a_formulation_without_pairing() -> None:
-    scene = catalogue.made("c")
+    scene = catalogue.make_scene("c")
     trace = solve(scene, springs(scene))
     assert trace.end is End.CONVERGED
     assert (trace.changes == -1).all()
@@ -372,14 +374,14 @@ def test_a_formulation_without_pairing() -> None:
 
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced", "nts-ar"])
 def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: Callable[[], Scene] = lambda: catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
+    made: Callable[[], Scene] = lambda: catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
     scene = made()
     dense = solved(name, scene)
     matrix, floor = System(scene, on(name, scene)).matrix(
         dense.solution, on(name, scene).pair(scene.interface, dense.z)
     )
-    monkeypatch.setattr(scene_module, "DENSE", 0)
-    monkeypatch.setattr(bulk, "DENSE", 0)
+    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(bulk, "DENSE_LIMIT", 0)
     large = made()
     trace = solved(name, large)
     documented(trace, large)
@@ -391,7 +393,7 @@ def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("verb", ["pair", "residual", "tangent"])
 def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
-    scene = catalogue.made("c", penalty=1e4, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
     calls = 0
     inner = getattr(subject("vts-ppt-basic")._make(penalty=1e4), verb)
 
@@ -410,8 +412,8 @@ def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
 def test_unsymmetric_matrices_are_solved_right(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE", 0)
-    scene = catalogue.made("c", sides="free", penalty=1e5, lowered=0.05)
+        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+    scene = catalogue.make_scene("c", sides="free", penalty=1e5, lowered=0.05)
     system = System(scene, on("vts-ppt", scene))
     q = scene.start + 1e-3 * np.sin(np.arange(scene.n_free))
     pairing = system.pair(q)
@@ -467,14 +469,14 @@ def iterations_for(decades: int, name: str, scene: Scene) -> int:
 )
 def test_iterations_of_figure_30(ratio: float, basic: tuple[int, ...], consistent: tuple[int, ...]) -> None:
     """For 14 decades. The paper prints no materials: equal, nearly so, and one body twice as stiff as the other."""
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=ratio, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=ratio, lowered=0.0)
     assert iterations_for(14, "vts-ppt-basic", scene) in basic
     assert iterations_for(14, "vts-ppt", scene) in consistent
     assert iterations_for(12, "vts-me", scene) == 3
 
 
 def test_iterations_down_to_roundoff() -> None:
-    scene = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
     consistent, basic = solved("vts-ppt", scene), solved("vts-ppt-basic", scene)
     assert consistent.end is basic.end is End.CONVERGED
     assert consistent.n_iterations == 4
@@ -483,7 +485,7 @@ def test_iterations_down_to_roundoff() -> None:
 
 @pytest.mark.parametrize("sides", ["free", "rollers"])
 def test_the_basic_version_converges_at_the_rate_of_its_spectral_radius(sides: Any) -> None:
-    scene = catalogue.made("c", penalty=1e4, sides=sides, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=1e4, sides=sides, lowered=0.0)
     exact, consistent, basic = at_the_solution(scene)
     rate = spectral_radius(consistent, basic)
     assert 0.12 <= round(rate, 2) <= 0.14
@@ -497,11 +499,11 @@ def test_the_basic_version_converges_at_the_rate_of_its_spectral_radius(sides: A
 @pytest.mark.parametrize("sides", ["free", "rollers"])
 @pytest.mark.parametrize(("over_young", "rate"), [(0.1, 0.03), (1e4, 0.37)])
 def test_the_rate_of_the_basic_version_with_the_penalty(over_young: float, rate: float, sides: Any) -> None:
-    scene = catalogue.made("c", penalty=over_young * 1e4, sides=sides, lowered=0.0)
+    scene = catalogue.make_scene("c", penalty=over_young * 1e4, sides=sides, lowered=0.0)
     _, consistent, basic = at_the_solution(scene)
     assert round(spectral_radius(consistent, basic), 2) == rate  # to the digits that are printed
 
 
 def test_every_end_has_its_number_and_its_words() -> None:
-    assert len({end.words for end in End}) == len(End) == 6
+    assert len({end.label for end in End}) == len(End) == 6
     assert [int(end) for end in End] == list(range(6))

@@ -13,7 +13,7 @@ import skfem
 
 from contactverif import oracle
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body, block, rigid
+from contactverif.contract.body import Body, block, rigid_surface
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
@@ -66,10 +66,10 @@ SCENES: dict[str, Callable[[], Scene]] = {
     ),
     "rigid floor": lambda: pressed(rigid_master=True),
     "rigid both": lambda: Scene(
-        (rigid([[0, 0], [1, 0], [3, 0]], moved=(0, -0.5)), rigid([[4, 0], [-1, 0]])), penalty=1 / 3
+        (rigid_surface([[0, 0], [1, 0], [3, 0]], moved=(0, -0.5)), rigid_surface([[4, 0], [-1, 0]])), penalty=1 / 3
     ),
     "three": three_bodies,
-    "named": lambda: catalogue.made("c", degrees=33.0),
+    "named": lambda: catalogue.make_scene("c", degrees=33.0),
 }
 every_scene = pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 
@@ -130,7 +130,7 @@ def test_a_case_without_bodies() -> None:
 
 def test_the_interface_has_slave_nodes_first() -> None:
     scene = three_bodies()
-    assert scene.reached == (0, 2, 1)
+    assert scene.bodies_in_reach == (0, 2, 1)
     interface = scene.interface
     assert interface.nodes.tolist() == [
         *([0.5, 0], [1, 0], [3, 0]),
@@ -139,7 +139,7 @@ def test_the_interface_has_slave_nodes_first() -> None:
     ]
     assert interface.slave.segments.tolist() == [[0, 1], [1, 2], [3, 4], [4, 5]]
     assert sorted(interface.master.segments.tolist()) == [[n + 1, n] for n in range(6, 11)]
-    assert scene.part == (slice(0, 4), slice(4, 8), slice(8, 18))  # at the sides, on rollers, y alone is free
+    assert scene.slices == (slice(0, 4), slice(4, 8), slice(8, 18))  # at the sides, on rollers, y alone is free
     assert [unknowns.tolist() for unknowns in scene.unknowns[:2]] == [[1, 2, 3, 5], [1, 2, 3, 5]]
 
 
@@ -154,7 +154,9 @@ def test_positions_are_those_of_the_displaced_bodies(make: Callable[[], Scene], 
     scene = make()
     q = at_random(scene)
     displaced = scene.displacements(q, factor)
-    expected = np.vstack([(scene.bodies[k].nodes + displaced[k])[scene.bodies[k].contact_nodes] for k in scene.reached])
+    expected = np.vstack(
+        [(scene.bodies[k].nodes + displaced[k])[scene.bodies[k].contact_nodes] for k in scene.bodies_in_reach]
+    )
     positions = scene.positions(q, factor).reshape(-1, 2)
     terms = np.abs(scene.interface.nodes).max() + np.abs(q).max(initial=1.0)
     assert np.abs(positions - expected).max() <= 8 * UNIT_ROUNDOFF * terms  # a sum of four products at most
@@ -163,7 +165,7 @@ def test_positions_are_those_of_the_displaced_bodies(make: Callable[[], Scene], 
 @every_scene
 def test_spread_is_the_derivative_of_positions(make: Callable[[], Scene]) -> None:
     scene = make()
-    spread = np.asarray(scene.spread)
+    spread = np.asarray(scene.transformation)
     for unknown, unit in enumerate(np.eye(scene.n_free)):
         difference = scene.positions(unit) - scene.positions(0 * unit)
         assert np.abs(difference - spread[:, unknown]).max() <= 4 * UNIT_ROUNDOFF * np.abs(scene.positions(unit)).max()
@@ -185,12 +187,12 @@ def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) ->
     dense = pressed()
     q = at_random(dense)
     positions, forces = dense.positions(q), dense.bulk_forces(q)
-    monkeypatch.setattr(scene_module, "DENSE", 0)
+    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     large = replace(dense)
     assert not isinstance(large.stiffness, np.ndarray)
-    assert not isinstance(large.spread, np.ndarray)
+    assert not isinstance(large.transformation, np.ndarray)
     assert np.array_equal(large.stiffness.toarray(), dense.stiffness)
-    assert np.array_equal(large.spread.toarray(), dense.spread)
+    assert np.array_equal(large.transformation.toarray(), dense.transformation)
     assert np.abs(large.positions(q) - positions).max() <= 2 * UNIT_ROUNDOFF * np.abs(positions).max()
     terms = np.abs(dense.stiffness) @ np.abs(q) + np.abs(dense.load)
     assert (np.abs(large.bulk_forces(q) - forces) <= 2 * len(q) * UNIT_ROUNDOFF * terms).all()
@@ -201,7 +203,7 @@ def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     "scene",
-    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.made, catalogue.BLOCKS)],
+    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.make_scene, catalogue.BLOCKS)],
     ids=lambda scene: scene.name or "pressed",
 )
 @pytest.mark.parametrize("factor", [1.0, 0.5])
@@ -229,7 +231,7 @@ def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
     free = block([200, 201], [0, 3], contact="top", pressure=0.5, free_sides=True)
     free = replace(free, fixed=free.fixed | (free.nodes[:, 1:] == 3) & [False, True])  # hangs on its contact side
     scene = replace(pressed(), bodies=(*pressed().bodies, far, free), slave=(0, 2), master=(1, 3))
-    assert scene.reached == (0, 1)
+    assert scene.bodies_in_reach == (0, 1)
     displaced = scene.displacements(scene.start)
     assert np.abs(displaced[2] - [0, -0.25]).max() <= 64 * UNIT_ROUNDOFF  # pushed from above and nothing below
     assert np.abs(scene.stresses(scene.start)[2]).max() <= 64 * UNIT_ROUNDOFF
@@ -349,14 +351,14 @@ def with_a_far_body(scene: Scene, role: str) -> Scene:
 @pytest.mark.parametrize("role", ["slave", "master"])
 @pytest.mark.parametrize("name", ALL)
 def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
-    alone = catalogue.made("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
+    alone = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
     beside = with_a_far_body(alone, role)
     assert len(beside.bodies) == 3
     answers, counts = [], []
     for scene in (alone, beside):
         subject, seen = counted(name)
         case = scene.case()
-        formulation = subject.on(case)
+        formulation = subject.for_case(case)
         pairing = formulation.pair(case.interface, case.z)
         assert pairing is not None
         tangent = formulation.tangent(case.interface, pairing, case.z)
@@ -385,7 +387,7 @@ def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
 
 
 def test_a_near_body_does_change_it() -> None:
-    alone = catalogue.made("c")
+    alone = catalogue.make_scene("c")
     near = block([13, 14], [0, 4], contact="bottom", approach=0.0)
     beside = replace(alone, bodies=(*alone.bodies, near), slave=(0, 2))
     assert len(beside.interface.slave) == len(alone.interface.slave) + 1
@@ -422,7 +424,7 @@ def test_a_far_chain_of_the_master_changes_no_bit(name: str) -> None:
     for seed in range(24):
         interface, z = bent(seed, n_master=4 + seed % 9)
         case = Case(interface, z, penalty=10.0)
-        formulation = subject.on(case)
+        formulation = subject.for_case(case)
         more = with_a_far_chain(interface, n_far=1 + seed % 7)
         pairs, forces, tangents = [], [], []
         for each in (interface, more):
@@ -468,8 +470,8 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
             for module, pair in pairs:
                 patched.setattr(module, "nearest_segment", search)
                 patched.setattr(module, "pair", pair)
-            pairing = subject.on(case).pair(case.interface, case.z)
-        assert pairing == subject.on(case).pair(case.interface, case.z)  # what was counted is what is compiled
+            pairing = subject.for_case(case).pair(case.interface, case.z)
+        assert pairing == subject.for_case(case).pair(case.interface, case.z)  # what was counted is what is compiled
         return len(evaluated), sum(evaluated)
 
     return count
@@ -477,7 +479,7 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_far_body_costs_no_evaluation(name: str, distances: Callable[[str, Case], Counts]) -> None:
-    alone = catalogue.made("c", refine=2)
+    alone = catalogue.make_scene("c", refine=2)
     expected = distances(name, alone.case())
     assert expected[0] > len(alone.interface.slave)
     for role in ("slave", "master"):

@@ -15,12 +15,12 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle import (
+    default_points,
     kink_margin,
-    nearest,
+    project_point,
     projection_cases,
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
-    usual_places,
 )
 from contactverif.scenes.named_states import named_case
 from contactverif.strategies import flat_cases, general_cases, smooth_cases
@@ -127,16 +127,16 @@ VALLEY = [(4.0, 2.0), (0.0, 0.0), (-4.0, 2.0)]
 @pytest.mark.parametrize(("line", "height"), [(ROOF, 1.0), (ROOF, -1.0), (VALLEY, 1.0), (VALLEY, -1.0)])
 def test_a_point_on_the_bisector_is_a_tie(line: list[tuple[float, float]], height: float) -> None:
     interface, z = chains([(-1, height), (1, height)], line)
-    found = nearest(interface, z, 0, 0.0)
+    found = project_point(interface, z, 0, 0.0)
     assert (found.segment, found.tied, found.undecided) == (0, (0, 1), (0, 1))
     assert kink_margin(interface, z, [0], [0.0]) == 0
-    assert nearest(interface, z, 0, 2.0**-40).undecided == (0,)
-    assert nearest(interface, z, 0, -(2.0**-40)).undecided == (1,)
+    assert project_point(interface, z, 0, 2.0**-40).undecided == (0,)
+    assert project_point(interface, z, 0, -(2.0**-40)).undecided == (1,)
 
 
 def test_in_the_cone_of_a_re_entrant_vertex_the_overshoot_decides() -> None:
     interface, z = chains([(-1, -1), (1, -1)], VALLEY)
-    found = nearest(interface, z, 0, 0.25)
+    found = project_point(interface, z, 0, 0.25)
     assert found.tied == (0, 1)
     assert (found.segment, found.undecided) == (0, (0,))
     assert found.gap_sign == -1
@@ -145,7 +145,7 @@ def test_in_the_cone_of_a_re_entrant_vertex_the_overshoot_decides() -> None:
 
 def test_a_foot_is_not_clipped_and_a_gap_is_exact() -> None:
     interface, z = chains([(5, 0.125), (6, 0.125)], [(4, 0), (0, 0)])
-    found = nearest(interface, z, 0, -1)
+    found = project_point(interface, z, 0, -1)
     assert found.xi == Fraction(-1, 4)
     assert (found.gap_sign, found.signed_squared_gap) == (1, Fraction(1, 64))
     assert found.squared_distance == 1 + Fraction(1, 64)
@@ -167,10 +167,10 @@ def test_projection_cases_by_hand() -> None:
 
 def decisions(case: Case, z: FloatArray) -> list[object]:
     """Exactly: nearest segments, signs of gaps, roles of the covered segments."""
-    segments, places, _, _ = usual_places(case.interface)
+    segments, places, _, _ = default_points(case.interface)
     found: list[object] = []
     for segment, c in zip(segments.tolist(), places.tolist(), strict=True):
-        answer = nearest(case.interface, z, segment, c)
+        answer = project_point(case.interface, z, segment, c)
         found.append((answer.segment, answer.gap_sign))
     roles = projection_cases(case.interface, z)
     return [*found, *(roles[role] for role in ("one segment", "first", "intermediate", "edge-on", "beyond an end"))]
@@ -179,7 +179,7 @@ def decisions(case: Case, z: FloatArray) -> list[object]:
 @CHECKED
 @given(st.one_of(smooth_cases(), general_cases()), st.floats(0.5, 0.99))
 def test_nothing_is_decided_otherwise_within_the_margin(case: Case, share: float) -> None:
-    margin = kink_margin(case.interface, case.z, *usual_places(case.interface))
+    margin = kink_margin(case.interface, case.z, *default_points(case.interface))
     if margin <= 2.0**-40 * case.largest_coordinate:
         return  # at a kink up to roundoff: no promise
     before = decisions(case, case.z)
@@ -204,7 +204,7 @@ def test_no_point_has_no_margin_of_its_own() -> None:
 def test_many_points_are_taken_in_parts() -> None:
     x = np.arange(601.0)
     interface, z = chains([*np.column_stack([x, 0 * x - 0.25])], [*np.column_stack([x[::-1], 0 * x])])
-    segments, places, _, _ = usual_places(interface)
+    segments, places, _, _ = default_points(interface)
     moved = z + 0.1
     assert kink_margin(interface, moved, segments, places) == min(
         kink_margin(interface, moved, segments[part::5], places[part::5]) for part in range(5)

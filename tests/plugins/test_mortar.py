@@ -14,7 +14,7 @@ from contactverif import Interface
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.catalogue import load_scene
 from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
 from contactverif_mortar.cells import WEIGHT, C, Cells, Quadrature
 from contactverif_mortar.shapes import Shapes
@@ -148,7 +148,7 @@ def test_uniform_multipliers_give_the_consistent_forces(make: Callable[..., Any]
 @pytest.mark.parametrize("name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"])
 @pytest.mark.parametrize("make", [mortar_lm, mortar_dual_lm])
 def test_the_paper_s_scenes_have_uniform_multipliers(make: Callable[..., Any], name: str) -> None:
-    trace = solve(scene := scene_named(name), Subject("", make).with_penalty(scene.penalty))
+    trace = solve(scene := load_scene(name), Subject("", make).with_penalty(scene.penalty))
     assert trace.converged
     assert trace.deficiency == 0
     pressure = 1.0 if name.startswith("example") else 100.0

@@ -18,7 +18,7 @@ from contactverif.geometry.compiled import uncompiled
 from contactverif.mechanics.newton import Trace, solve
 from contactverif.mechanics.scene import Scene
 from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import made
+from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif_nts import box3, eq6, walk
 
@@ -242,7 +242,7 @@ SCENES = sorted(RIGHT["vts_ppt_lm"])
 
 def solved(name: str, scene: Scene, *, penalty: float | None = None, **options: Any) -> Trace:
     subject = Subject(name, lambda *, penalty: getattr(contactverif_nts, name)(penalty=penalty, **options))
-    return solve(scene, subject.on(scene.case()) if penalty is None else subject.with_penalty(penalty))
+    return solve(scene, subject.for_case(scene.case()) if penalty is None else subject.with_penalty(penalty))
 
 
 def error_of(trace: Trace) -> float:
@@ -253,7 +253,7 @@ def error_of(trace: Trace) -> float:
 @pytest.mark.parametrize("scene_name", SCENES)
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_finds_the_uniform_stress(name: str, scene_name: str) -> None:
-    trace = solved(name, made(scene_name, pressure=PRESSURE))
+    trace = solved(name, make_scene(scene_name, pressure=PRESSURE))
     assert trace.converged
     if scene_name in RIGHT[name]:
         assert error_of(trace) < ROUNDOFF
@@ -267,7 +267,7 @@ def spread_of(trace: Trace) -> tuple[float, float]:
 
 
 def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
-    on_c, on_c_prime = (solved("vts_me_lm", made(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
+    on_c, on_c_prime = (solved("vts_me_lm", make_scene(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
     assert spread_of(on_c) == pytest.approx((0, 2), abs=ROUNDOFF)
     assert spread_of(on_c_prime) == pytest.approx((13 / 45, 77 / 45), abs=ROUNDOFF)
     assert on_c.deficiency == on_c_prime.deficiency == 0  # so that there are no others
@@ -275,7 +275,7 @@ def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
 
 @pytest.mark.parametrize("scene_name", ["b", "c", "c-prime", "example-1", "example-1bis"])
 def test_multipliers_of_vts_ppt_are_uniform_and_found_in_one_step(scene_name: str) -> None:
-    trace = solved("vts_ppt_lm", made(scene_name, pressure=PRESSURE))
+    trace = solved("vts_ppt_lm", make_scene(scene_name, pressure=PRESSURE))
     assert spread_of(trace) == pytest.approx((1, 1), abs=ROUNDOFF)
     assert trace.n_iterations == 1
 
@@ -298,6 +298,6 @@ def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: di
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_the_scale_of_the_decision_changes_no_solution(name: str) -> None:
-    scenes = made("b", pressure=PRESSURE)
+    scenes = make_scene("b", pressure=PRESSURE)
     soft, hard = (solved(name, scenes, penalty=scale) for scale in (1e2, 1e7))
     assert soft.u[-1] == pytest.approx(hard.u[-1], rel=1e-11, abs=1e-13)

@@ -18,7 +18,7 @@ from contactverif.mechanics.newton import Trace, solve
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import made
+from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif_nts import two_pass
 
@@ -234,7 +234,7 @@ FAILS = 1e-2
 def solved(name: str, scenes: Scene) -> Trace:
     subject = load_formulation(name)
     assert isinstance(subject, Subject)
-    trace = solve(scenes, subject.on(scenes.case()))
+    trace = solve(scenes, subject.for_case(scenes.case()))
     assert trace.converged
     return trace
 
@@ -247,7 +247,7 @@ def error_of(trace: Trace) -> float:
 @pytest.mark.parametrize("scene_name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1bis"])
 @pytest.mark.parametrize("name", ["two-pass/nts", "two-pass/nts-ar"])
 def test_springs_in_two_passes_fail(name: str, scene_name: str) -> None:
-    assert error_of(solved(name, made(scene_name))) > FAILS
+    assert error_of(solved(name, make_scene(scene_name))) > FAILS
 
 
 def blocks(slave: list[float], master: list[float]) -> Scene:
@@ -268,7 +268,7 @@ def test_they_pass_where_roles_are_symmetric(scenes: Scene) -> None:
 
 
 def test_elsewhere_they_lock_which_is_not_passing() -> None:
-    errors = [error_of(solved("two-pass/nts-ar", made("c", penalty=penalty))) for penalty in (1e6, 1e7, 1e8)]
+    errors = [error_of(solved("two-pass/nts-ar", make_scene("c", penalty=penalty))) for penalty in (1e6, 1e7, 1e8)]
     assert np.diff(np.log10(errors)) == pytest.approx(-1, abs=0.1)
 
 
@@ -278,7 +278,7 @@ def test_elsewhere_they_lock_which_is_not_passing() -> None:
 def test_nodal_multipliers_in_two_passes_pass_and_are_too_many_where_nodes_coincide(
     scene_name: str, deficiency: int
 ) -> None:
-    trace = solved("two-pass/nts-lm", made(scene_name))
+    trace = solved("two-pass/nts-lm", make_scene(scene_name))
     assert error_of(trace) < ROUNDOFF
     assert trace.deficiency == deficiency
 

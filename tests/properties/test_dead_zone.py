@@ -19,7 +19,7 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
-from contactverif.scenes.catalogue import BLOCKS, made, named_scene
+from contactverif.scenes.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.dead_zone import DEAD_ZONE
@@ -43,7 +43,7 @@ def the(name: str) -> Subject:
 
 def test_the_exact_forces_by_hand() -> None:
     """p × what lies over the master, from −3.3 to 3.3, of the shape functions of −6, −4.4, −2.1, −0.3, 1.9, 4, 6."""
-    case = named_scene("dead-zone:pressure=1")
+    case = load_scene_case("dead-zone:pressure=1")
     left, right = (2.3**2 - 1.1**2) / (2 * 2.3), (2.1**2 - 0.7**2) / (2 * 2.1)  # of the two segments that end nearby
     slave = [0, 1.2 - left, left + 0.9, 0.9 + 1.1, 1.1 + right, 1.4 - right, 0]
     master = [0.85, 0.85 + 1, 1 + 0.9, 0.9 + 0.55, 0.55]
@@ -54,7 +54,7 @@ def test_the_exact_forces_by_hand() -> None:
 
 @pytest.mark.parametrize("text", ["", ":degrees=17.3", ":refine=2,ratio=0.25,poisson=0", ":degrees=180,penalty=1e8"])
 def test_in_the_exact_solution_the_stress_is_uniform_and_needs_those_forces(text: str) -> None:
-    case = named_scene(f"dead-zone{text}")
+    case = load_scene_case(f"dead-zone{text}")
     scene, p = scene_of(case), DRAWING.pressure
     assert is_uniform(case)
     assert overhangs(case)
@@ -82,22 +82,22 @@ def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes(name: str) -> None:
-    assert solved_once(named_scene("dead-zone"), the(name)).values["stress"] <= 1e-14
+    assert solved_once(load_scene_case("dead-zone"), the(name)).values["stress"] <= 1e-14
     for text in ("dead-zone", "dead-zone:degrees=17.3,refine=2", "dead-zone:ratio=1e3,poisson=0.45"):
-        outcome = judge_case(DEAD_ZONE, named_scene(text), the(name))
+        outcome = judge_case(DEAD_ZONE, load_scene_case(text), the(name))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes_where_the_master_ends_at_a_slave_node_as_roundoff_will_have_it(name: str) -> None:
-    case = named_scene("dead-zone:degrees=33,refine=3")  # the right end
+    case = load_scene_case("dead-zone:degrees=33,refine=3")  # the right end
     outcome = judge_case(DEAD_ZONE, case, the(name))
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_who_fails(name: str) -> None:
-    found = solved_once(named_scene("dead-zone"), the(name))
+    found = solved_once(load_scene_case("dead-zone"), the(name))
     assert found.values["stress"] > 0.02
     assert {"stress", "slave forces", "master forces"} <= {
         quantity for quantity, value in found.values.items() if value > found.tolerances[quantity]
@@ -165,12 +165,12 @@ def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: s
 
 
 def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
-    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, VARIANTS], scene=named_scene("dead-zone"))
+    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, VARIANTS], scene=load_scene_case("dead-zone"))
     assert [row.verdict for row in found.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
     assert found.passed
-    (row,) = run([the("sts")], [DEAD_ZONE], scene=named_scene("c")).rows
+    (row,) = run([the("sts")], [DEAD_ZONE], scene=load_scene_case("c")).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
-    assert dead_zone_cases(made("c").case()) is None
+    assert dead_zone_cases(make_scene("c").case()) is None
 
 
 # --- what is measured -------------------------------------------------------------------------------------------
@@ -211,13 +211,13 @@ def telling(**more: Any) -> Subject:
     ],
 )
 def test_which_points_count(more: dict[str, Any], wrong: set[str]) -> None:
-    found = solved_once(named_scene("dead-zone"), telling(**more))
+    found = solved_once(load_scene_case("dead-zone"), telling(**more))
     assert {name for name, value in found.values.items() if value > found.tolerances[name]} == wrong
 
 
 def test_what_overhangs_may_bend() -> None:
     """The gap is asked for where there are two surfaces."""
-    case = named_scene("dead-zone")
+    case = load_scene_case("dead-zone")
     n_slave = case.interface.n_slave_nodes
     penetration = DRAWING.pressure / case.penalty
     flat = case.interface.nodes - penetration * np.where(np.arange(n_slave + 5) < n_slave, 1.0, 0.0)[:, None] * [0, 1]
@@ -234,7 +234,7 @@ def test_what_overhangs_may_bend() -> None:
 
 
 def test_a_part_of_the_slave_bears_the_rounding_of_all() -> None:
-    case = named_scene("dead-zone")
+    case = load_scene_case("dead-zone")
     plain, found = (measure(case, the("sts")) for measure in (solved_once, DEAD_ZONE.measure))
     assert found.values == plain.values
     for name, tolerance in plain.tolerances.items():

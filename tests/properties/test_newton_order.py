@@ -19,7 +19,7 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import named_scene
+from contactverif.scenes.catalogue import load_scene_case
 from contactverif_properties.newton import (
     DISTANCES,
     NEWTON_HISTORY,
@@ -81,9 +81,9 @@ def test_noise_at_short_distances_is_not_taken_for_a_law() -> None:
 )
 def test_the_rate_of_the_basic_version_is_the_spectral_radius(scene: str, low: float, high: float) -> None:
     """Fig. 30: 0.12 to 0.14 at ε̂/E = 1, and 0.03 at 0.1."""
-    case = named_scene(scene)
-    trace = solve(scene_of(case), the("vts-ppt-basic").on(case))
-    system = System(scene_of(case), the("vts-ppt-basic").on(case))
+    case = load_scene_case(scene)
+    trace = solve(scene_of(case), the("vts-ppt-basic").for_case(case))
+    system = System(scene_of(case), the("vts-ppt-basic").for_case(case))
     radius = spectral_radius(system, trace.solution, system.pair(trace.solution))
     assert low - 1e-3 < radius < high
     tail = trace.residuals[4:-1]
@@ -91,15 +91,15 @@ def test_the_rate_of_the_basic_version_is_the_spectral_radius(scene: str, low: f
 
 
 def test_the_exact_tangent_leaves_no_radius() -> None:
-    case = named_scene("c-prime:penalty=1e4,sides=free,ratio=0.5,lowered=0")
-    trace = solve(scene_of(case), the("vts-ppt").on(case))
-    system = System(scene_of(case), the("vts-ppt").on(case))
+    case = load_scene_case("c-prime:penalty=1e4,sides=free,ratio=0.5,lowered=0")
+    trace = solve(scene_of(case), the("vts-ppt").for_case(case))
+    system = System(scene_of(case), the("vts-ppt").for_case(case))
     assert trace.end is End.CONVERGED
     assert spectral_radius(system, trace.solution, system.pair(trace.solution)) < 1e-7
 
 
 def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
-    case = named_scene("example-1bis")
+    case = load_scene_case("example-1bis")
     exact, basic = (one_step(case, the(name)) for name in ("vts-ppt", "vts-ppt-basic"))
     assert exact.values["order of one step"] >= 1.9
     assert basic.values["order of one step"] == pytest.approx(1.0, abs=0.1)
@@ -108,7 +108,7 @@ def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
 
 
 def test_a_solution_that_is_not_found_is_undecided() -> None:
-    case = named_scene("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
+    case = load_scene_case("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
     outcome = judge_case(NEWTON_ORDER, case, the("vts-me"))
     assert outcome.verdict is Verdict.UNDECIDED
     assert "2-cycle" in outcome.reason
@@ -116,9 +116,9 @@ def test_a_solution_that_is_not_found_is_undecided() -> None:
 
 
 def test_the_whole_trajectory_is_kept() -> None:
-    case = named_scene("example-1bis:pressure=100,lowered=0")
+    case = load_scene_case("example-1bis:pressure=100,lowered=0")
     found = trajectory(case, the("vts-ppt-basic"))
-    trace = solve(scene_of(case), the("vts-ppt-basic").on(case))
+    trace = solve(scene_of(case), the("vts-ppt-basic").for_case(case))
     assert found.series.keys() == SERIES.keys()
     assert np.array_equal(found.series["residual"], trace.residuals)
     assert np.array_equal(found.series["energy norm"], trace.energies, equal_nan=True)
@@ -126,13 +126,13 @@ def test_the_whole_trajectory_is_kept() -> None:
 
 
 def test_a_piecewise_linear_problem_is_finite() -> None:
-    found = trajectory(named_scene("c-prime"), the("vts-ppt"))
+    found = trajectory(load_scene_case("c-prime"), the("vts-ppt"))
     assert found.details["finite"] == 1
     assert found.values["iterations at the end"] <= 1
 
 
 def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
-    case = named_scene("example-1bis:pressure=300,penalty=1e4")
+    case = load_scene_case("example-1bis:pressure=300,penalty=1e4")
 
     def make(*, penalty: float) -> Any:
         inner = contactverif_nts.vts_ppt(penalty=penalty)

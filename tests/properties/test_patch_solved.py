@@ -18,7 +18,7 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import pressure_of, two_blocks
-from contactverif.scenes.catalogue import named_scene
+from contactverif.scenes.catalogue import load_scene_case
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
 from contactverif_properties.solved import FLAT_SOLVE, SLOPE, VARIANTS, at_penalty, solved
@@ -54,19 +54,19 @@ def test_the_pressure_is_that_of_springs_in_series() -> None:
 def test_the_recovered_stress_is_that_pressure(name: str) -> None:
     case = textbook()
     scene = scene_of(case)
-    stresses = scene.stresses(solve(scene, the(name).on(case)).solution)
+    stresses = scene.stresses(solve(scene, the(name).for_case(case)).solution)
     for body in stresses:
         assert np.abs(-body[..., 1] - 0.017369727047).max() <= 1e-12
 
 
 def test_nts_on_a1_passes_as_the_penalty_grows_because_it_locks() -> None:
-    found = solved(named_scene("a1"), the("nts"))
+    found = solved(load_scene_case("a1"), the("nts"))
     assert found.details[SLOPE] == pytest.approx(-1, abs=0.05)
     assert judge(FLAT_SOLVE, found)[0] is Verdict.FAIL
 
 
 def test_nts_ar_on_c_fails_at_any_penalty() -> None:
-    found = solved(named_scene("c-prime"), the("nts-ar"))
+    found = solved(load_scene_case("c-prime"), the("nts-ar"))
     assert found.details[SLOPE] > -0.5
     assert found.values["stress, high penalty"] > 1e-2
 
@@ -93,7 +93,7 @@ def test_a_wrong_tangent_is_no_reason_to_accuse_a_right_residual(wrong: str) -> 
         return Turned(inner, tangent=tangent)
 
     for scene in ("c-prime:lowered=0,degrees=17.3", "example-1bis"):
-        outcome = judge_case(FLAT_SOLVE, named_scene(scene), Subject(wrong, make))
+        outcome = judge_case(FLAT_SOLVE, load_scene_case(scene), Subject(wrong, make))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -105,7 +105,7 @@ def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
         return Turned(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
 
     lost = Subject("lost", make)
-    found = at_penalty(named_scene("c-prime"), lost, named_scene("c-prime").penalty)
+    found = at_penalty(load_scene_case("c-prime"), lost, load_scene_case("c-prime").penalty)
     assert judge(VARIANTS, found)[0] is Verdict.FAIL
     assert found.values["master forces"] > 1e6 * found.tolerances["master forces"]
 
@@ -121,14 +121,14 @@ def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
 
         return Turned(inner, contact_points=contact_points)
 
-    found = solved(named_scene(scene), Subject("boaster", make))
+    found = solved(load_scene_case(scene), Subject("boaster", make))
     wrong = {name for name, value in found.values.items() if value > found.tolerances[name]}
     assert wrong == {"pressure", "pressure, high penalty"}
 
 
 def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
-    assert variant_cases(named_scene("c:sides=free")) is None
-    found = run([the("vts-ppt")], [FLAT_SOLVE], scene=named_scene("c:sides=free"))
+    assert variant_cases(load_scene_case("c:sides=free")) is None
+    found = run([the("vts-ppt")], [FLAT_SOLVE], scene=load_scene_case("c:sides=free"))
     assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
 
 
@@ -145,9 +145,9 @@ def test_every_variant_is_drawn() -> None:
 
 @pytest.mark.parametrize("question", [FLAT_SOLVE, VARIANTS])
 def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
-    (row,) = run([the("vts-me")], [question], scene=named_scene("b")).rows
+    (row,) = run([the("vts-me")], [question], scene=load_scene_case("b")).rows
     assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)
-    (row,) = run([the("vts-me")], [question], scene=named_scene("c")).rows
+    (row,) = run([the("vts-me")], [question], scene=load_scene_case("c")).rows
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
 
 

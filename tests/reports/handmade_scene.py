@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import Body, block, rigid
+from contactverif.contract.body import Body, block, rigid_surface
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
@@ -20,7 +20,7 @@ def bodies(*, wide: float = 0.0, angle: float = 0.0, rigid_master: bool = False)
     places = np.array([-wide, 2.0, 6.0 + wide])
     if rigid_master:
         turned = np.column_stack([places[::-1], 0 * places]) @ upper.frame.T
-        return upper, rigid(turned, axis=axis, name="master")
+        return upper, rigid_surface(turned, axis=axis, name="master")
     over = (0.0, 6.0)
     lower = block(places, [-3, 0], contact="top", approach=0.0, pressure=PRESSURE, over=over, axis=axis, name="master")
     return upper, lower

@@ -10,7 +10,7 @@ import pytest
 from contactverif.contract.body import block
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw.scene_figures import draw_scene
 from contactverif_reports.draw.scene_meshes import close_up, magnifications
@@ -20,12 +20,12 @@ from contactverif_reports.draw.solved_scene import SolvedScene
 
 @pytest.fixture(scope="module")
 def disk() -> SolvedScene:
-    return solve_scene(scene_named("example-2").case(), [load_formulation("vts-ppt")])
+    return solve_scene(load_scene("example-2").case(), [load_formulation("vts-ppt")])
 
 
 @pytest.mark.parametrize("width", [40, 72, 120])
 def test_silhouettes_are_to_scale(width: int) -> None:
-    scene = scene_named("example-2")
+    scene = load_scene("example-2")
     slave, master = scene.bodies
     lines = silhouettes_as_text(scene.case(), slave, master, width).splitlines()
     assert max(map(len, lines)) <= width
@@ -62,7 +62,7 @@ def test_a_small_contact_is_drawn_from_near(disk: SolvedScene) -> None:
 
 @pytest.mark.parametrize("name", ["c", "c-prime:sides=free", "example-1", "b:degrees=33"])
 def test_a_contact_as_wide_as_its_bodies_is_not(name: str) -> None:
-    assert close_up(solve_scene(scene_named(name).case(), [load_formulation("nts-ar")])) is None
+    assert close_up(solve_scene(load_scene(name).case(), [load_formulation("nts-ar")])) is None
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])

@@ -41,7 +41,7 @@ def sizes(most: int = 60) -> st.SearchStrategy[Case]:
 
 def measured(case: Case, subject: Subject) -> Measurement:
     """The residual against what it ought to be, 0."""
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     forces = formulation.residual(case.interface, pairing, case.z)
     return Measurement({"error": float(np.abs(forces).max())}, {"error": 1e-6})

@@ -10,7 +10,7 @@ import pytest
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import parsed, unknown
+from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.newton import System
@@ -18,7 +18,7 @@ from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
-from contactverif.scenes.catalogue import BLOCKS, OPTIONS, SCENES, made, options_of, scene_named
+from contactverif.scenes.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
 from contactverif.scenes.disk import disk_on_foundation
 
 every_name = pytest.mark.parametrize("name", BLOCKS)
@@ -49,10 +49,10 @@ def printed(name: str) -> tuple[list[float], list[float]]:
 @pytest.mark.parametrize("text", ["", ":refine=2", ":degrees=17.3,ratio=0.25", ":penalty=1e8,poisson=0"])
 def test_every_scene_solves(name: str, text: str) -> None:
     """With a formulation that passes: the pressure is the one on top, in every body."""
-    scene = scene_named(name + text)
+    scene = load_scene(name + text)
     subject = load_formulation("vts-ppt-balanced")
     assert isinstance(subject, Subject)
-    formulation = subject.on(scene.case())
+    formulation = subject.for_case(scene.case())
     trace = newton.solve(scene, formulation)
     assert trace.converged
     p = BLOCKS[name].pressure
@@ -67,13 +67,13 @@ def test_every_scene_solves(name: str, text: str) -> None:
     for body, stresses in zip(scene.bodies, scene.stresses(trace.solution), strict=True):
         if not body.rigid:
             expected = [-p * body.poisson / (1 - body.poisson), -p, 0]
-            assert np.abs(stresses - expected).max() <= 2 * body.oedometer * off / shortest
+            assert np.abs(stresses - expected).max() <= 2 * body.oedometric_modulus * off / shortest
     assert np.abs(trace.solution - exact_unknowns(scene, p, scene.penalty)).max() <= 2 * off
 
 
 @every_name_of_the_paper
 def test_what_is_known_of_a_scene(name: str) -> None:
-    drawing, scene = BLOCKS[name], made(name)
+    drawing, scene = BLOCKS[name], make_scene(name)
     assert scene.name == name
     assert drawing.summary
     assert drawing.source
@@ -92,7 +92,7 @@ def test_what_is_known_of_a_scene(name: str) -> None:
 
 
 def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
-    drawing, scene = BLOCKS["dead-zone"], made("dead-zone")
+    drawing, scene = BLOCKS["dead-zone"], make_scene("dead-zone")
     assert (drawing.source, scene.name) == ("", "dead-zone")
     slave, master = coordinates(scene)
     assert slave == pytest.approx([-6, -4.4, -2.1, -0.3, 1.9, 4, 6], abs=1e-15)
@@ -102,7 +102,7 @@ def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
     upper, lower = (body.load[:, 1].sum() for body in scene.bodies)
     assert upper == pytest.approx(-drawing.pressure * 6.6, rel=1e-14)  # what the master is pressed with
     assert lower == 0
-    assert not any(overhangs(made(name).case()) for name in BLOCKS if name != "dead-zone")
+    assert not any(overhangs(make_scene(name).case()) for name in BLOCKS if name != "dead-zone")
 
 
 def under(name: str, points: FloatArray) -> set[float]:
@@ -130,34 +130,34 @@ def test_the_punch_is_symmetrical() -> None:
 @every_name
 @pytest.mark.parametrize("refine", [2, 3, 7])
 def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> None:
-    fine = made(name, refine=refine)
+    fine = make_scene(name, refine=refine)
     for here, there in zip(coordinates(fine), printed(name), strict=True):
         assert here[::refine] == there
         assert len(here) == refine * (len(there) - 1) + 1
         gaps = np.diff(here).reshape(-1, refine)
         assert np.abs(gaps - gaps.mean(axis=1, keepdims=True)).max() <= 4 * UNIT_ROUNDOFF * np.abs(there).max()
     assert len(fine.bodies[0].cells) == 2 * refine * refine * len(BLOCKS[name].slave)
-    assert fine.penalty == pytest.approx(refine * made(name).penalty, rel=4 * UNIT_ROUNDOFF, abs=0)
+    assert fine.penalty == pytest.approx(refine * make_scene(name).penalty, rel=4 * UNIT_ROUNDOFF, abs=0)
 
 
 @pytest.mark.parametrize(
     ("degrees", "turn"), [(90, [[0, -1], [1, 0]]), (180, [[-1, 0], [0, -1]]), (270, [[0, 1], [-1, 0]])]
 )
 def test_quarter_turns_are_exact(degrees: int, turn: list[list[int]]) -> None:
-    upright = made("c-prime")
+    upright = make_scene("c-prime")
     for angle in (degrees, float(degrees), degrees - 360, degrees + 720):
-        turned = made("c-prime", degrees=angle)
+        turned = make_scene("c-prime", degrees=angle)
         for one, other in zip(turned.bodies, upright.bodies, strict=True):
             assert np.array_equal(one.nodes, other.nodes @ np.transpose(turn))
             assert np.array_equal(one.frame, turn)
             assert np.array_equal(one.load, other.load)
-    assert np.array_equal(made("c-prime", degrees=360).bodies[0].nodes, upright.bodies[0].nodes)
+    assert np.array_equal(make_scene("c-prime", degrees=360).bodies[0].nodes, upright.bodies[0].nodes)
 
 
 def test_any_other_turn() -> None:
     angle = np.radians(17.3)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    upright, turned = made("b"), made("b", degrees=17.3)
+    upright, turned = make_scene("b"), make_scene("b", degrees=17.3)
     for one, other in zip(turned.bodies, upright.bodies, strict=True):
         assert np.abs(one.nodes - other.nodes @ turn.T).max() <= 4 * UNIT_ROUNDOFF * 12 * np.sqrt(2)
         assert np.abs(one.frame - turn).max() <= UNIT_ROUNDOFF
@@ -166,14 +166,16 @@ def test_any_other_turn() -> None:
 def test_the_disk() -> None:
     """By name it is what `disk` makes, with the paper's numbers; no pressure is known of it."""
     assert SCENES["example-2"].source
-    one, other = made("example-2"), disk_on_foundation()
+    one, other = make_scene("example-2"), disk_on_foundation()
     for body, same in zip(one.bodies, other.bodies, strict=True):
         assert np.array_equal(body.nodes, same.nodes)
         assert (body.young, body.poisson) == (same.young, same.poisson)
     assert one.penalty == other.penalty
     assert one.name == "example-2"
     assert not is_uniform(one.case())
-    stiffer = made("example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2)
+    stiffer = make_scene(
+        "example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2
+    )
     assert [body.young for body in stiffer.bodies] == [2e8, 4e8]
     assert [body.poisson for body in stiffer.bodies] == [0.25, 0.25]
     assert (stiffer.penalty, stiffer.bodies[0].load.sum()) == (2e9, -3e6)
@@ -203,23 +205,26 @@ def test_options_from_text_are_those_of_python() -> None:
     }
     assert {option for options in texts.values() for option in options} == set(OPTIONS)
     for text, options in texts.items():
-        one, other = scene_named(text).case().to_arrays(), made(text.partition(":")[0], **options).case().to_arrays()
+        one, other = (
+            load_scene(text).case().to_arrays(),
+            make_scene(text.partition(":")[0], **options).case().to_arrays(),
+        )
         assert all(np.array_equal(one[key], other[key]) for key in one), text
 
 
 def test_what_options_do() -> None:
-    plain = made("c")
-    assert made("c", young=2e4).penalty == 2 * plain.penalty
-    assert [body.young for body in made("c", young=2e3, ratio=0.5).bodies] == [2e3, 1e3]
-    assert [body.poisson for body in made("c", poisson=0.1).bodies] == [0.1, 0.1]
-    assert made("c", penalty=3.0).penalty == 3
-    assert made("c", pressure=7.0).bodies[0].load.sum() == -7 * 12
+    plain = make_scene("c")
+    assert make_scene("c", young=2e4).penalty == 2 * plain.penalty
+    assert [body.young for body in make_scene("c", young=2e3, ratio=0.5).bodies] == [2e3, 1e3]
+    assert [body.poisson for body in make_scene("c", poisson=0.1).bodies] == [0.1, 0.1]
+    assert make_scene("c", penalty=3.0).penalty == 3
+    assert make_scene("c", pressure=7.0).bodies[0].load.sum() == -7 * 12
     assert plain.bodies[0].start.tolist() == [0, -100 / plain.penalty]
-    assert made("c", lowered=0).bodies[0].start.tolist() == [0, 0]
-    assert made("c", lowered=0.5).bodies[0].start.tolist() == [0, -0.5]
+    assert make_scene("c", lowered=0).bodies[0].start.tolist() == [0, 0]
+    assert make_scene("c", lowered=0.5).bodies[0].start.tolist() == [0, -0.5]
     assert plain.bodies[0].fixed[:, 0].sum() == 6
-    assert made("c", sides="free").bodies[0].fixed.sum() == 1
-    assert not is_uniform(made("c", sides="free").case())
+    assert make_scene("c", sides="free").bodies[0].fixed.sum() == 1
+    assert not is_uniform(make_scene("c", sides="free").case())
 
 
 NAMES = "a1, a2-graded, a2-uniform, b, c, c-prime, dead-zone, example-1, example-1bis, example-2"
@@ -278,7 +283,7 @@ WRONG = {
 @pytest.mark.parametrize(("text", "message"), WRONG.items(), ids=lambda text: text[:24])
 def test_what_is_no_scene(text: str, message: str) -> None:
     with pytest.raises(MisuseError) as error:
-        scene_named(text)
+        load_scene(text)
     assert str(error.value) == message
     assert "\n" not in message
 
@@ -298,12 +303,12 @@ def test_what_is_no_scene(text: str, message: str) -> None:
 )
 def test_what_is_no_scene_in_python(name: str, options: dict[str, Any], message: str) -> None:
     with pytest.raises(MisuseError) as error:
-        made(name, **options)
+        make_scene(name, **options)
     assert str(error.value) == message
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    made("c", refine=np.int64(2), young=np.float32(8), degrees=np.int32(90))
+    make_scene("c", refine=np.int64(2), young=np.float32(8), degrees=np.int32(90))
 
 
 # --- names ------------------------------------------------------------------------------------------------------
@@ -325,17 +330,23 @@ def test_numbers_of_numpy_are_numbers() -> None:
     ],
 )
 def test_names_with_options(text: str, name: str, options: dict[str, Any]) -> None:
-    found = parsed("formulation", text)
+    found = parse_name("formulation", text)
     assert found == (name, options)
     assert [type(value) for value in found[1].values()] == [type(value) for value in options.values()]
 
 
 def test_an_unknown_name_suggests_the_nearest_or_lists_all() -> None:
     names = ["vts-ppt", "vts-me", "nts"]
-    assert str(unknown("formulation", "vts-pt", names)).startswith(
+    assert str(unknown_name_error("formulation", "vts-pt", names)).startswith(
         "formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt"
     )
-    assert str(unknown("formulation", "xyz", names)) == "formulation: found 'xyz'; needed one of nts, vts-me, vts-ppt"
-    assert str(unknown("formulation", "xyz", [])) == "formulation: found 'xyz'; needed a name, but there is none"
-    assert unknown("formulation", "nts", ["nts-ar", "nts"]).found == "'nts'"
-    assert catalogue.MODERATE == 10
+    assert (
+        str(unknown_name_error("formulation", "xyz", names))
+        == "formulation: found 'xyz'; needed one of nts, vts-me, vts-ppt"
+    )
+    assert (
+        str(unknown_name_error("formulation", "xyz", []))
+        == "formulation: found 'xyz'; needed a name, but there is none"
+    )
+    assert unknown_name_error("formulation", "nts", ["nts-ar", "nts"]).found == "'nts'"
+    assert catalogue.MODERATE_PENALTY == 10

@@ -16,11 +16,11 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.newton import End
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.catalogue import made
-from contactverif.scenes.disk import Problem, disk_mesh, disk_on_foundation, graded
+from contactverif.scenes.catalogue import make_scene
+from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, graded
 from contactverif_paper.disk_study import Pressed, difference, over_slopes, pressed
 
-PAPER = Problem()
+PAPER = DiskProblem()
 BASE = disk_on_foundation()
 PENALTY_METHODS = ("nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced")
 
@@ -149,7 +149,7 @@ def test_the_papers_numbers(name: str, solved: dict[str, Pressed]) -> None:
     assert found.converged
     assert found.iterations == 4
     assert found.peak == pytest.approx(1.61e6, rel=0.03)
-    assert found.half_width == pytest.approx(PAPER.on_layer().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
+    assert found.half_width == pytest.approx(PAPER.winkler_contact().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
 
 
 def test_what_transfer_to_the_master_changes(solved: dict[str, Pressed]) -> None:
@@ -168,10 +168,10 @@ def test_the_other_half_is_symmetrical(name: str, solved: dict[str, Pressed]) ->
 
 
 def test_nodal_forces_carry_the_load() -> None:
-    scene = made("example-2")
+    scene = make_scene("example-2")
     subject = load_formulation("vts-me")
     assert isinstance(subject, Subject)
-    trace = newton.solve(scene, subject.on(scene.case()))
+    trace = newton.solve(scene, subject.for_case(scene.case()))
     forces = scene.nodal_forces(trace.solution)
     n_slave = scene.interface.n_slave_nodes
     assert forces[:n_slave, 1].sum() == pytest.approx(1e6, rel=1e-9)
@@ -186,7 +186,9 @@ def test_what_is_left_of_the_difference_falls_with_the_mesh_and_is_the_current_l
     steep, flat = over_slopes(("vts-me",), (1.0, 0.5), refine=1)
     left = [one.over_layer - coarse for one in (steep, flat)]
     assert left[0] / left[1] == pytest.approx(2, rel=0.05)
-    assert left[0] == pytest.approx(PAPER.on_layer().peak / PAPER.young[0], rel=0.15)  # the surface's strain, p/E
+    assert left[0] == pytest.approx(
+        PAPER.winkler_contact().peak / PAPER.young[0], rel=0.15
+    )  # the surface's strain, p/E
 
 
 def test_how_it_begins() -> None:
@@ -195,11 +197,11 @@ def test_how_it_begins() -> None:
     assert isinstance(subject, Subject)
 
     def ended(scene: Scene) -> End:
-        return newton.solve(scene, subject.on(scene.case())).end
+        return newton.solve(scene, subject.for_case(scene.case())).end
 
     assert ended(replace_start(BASE, -1e-3)) is End.SINGULAR
     assert ended(BASE) is End.CONVERGED
-    assert BASE.bodies[0].start.tolist() == [0, -(PAPER.on_layer().half_width ** 2) / 20]
+    assert BASE.bodies[0].start.tolist() == [0, -(PAPER.winkler_contact().half_width ** 2) / 20]
 
 
 def replace_start(scene: Scene, lowered: float) -> Scene:

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.scenes import hertz
-from contactverif.scenes.hertz import on_layer
+from contactverif.scenes.hertz import solve_winkler_contact
 
 FORCE, RADIUS, PENALTY = 1e6, 10.0, 1e9
 STIFFNESS = 1 / (1 / 1e8 + 1 / 1e9)
@@ -32,7 +32,7 @@ def test_the_pressure_of_hertz_carries_the_force() -> None:
 
 
 def test_the_layer_of_example_2() -> None:
-    found = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY)
+    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY)
     assert found.peak == pytest.approx(1.586e6, abs=500)
     assert found.half_width == pytest.approx(0.4291, abs=5e-5)
     assert found.force == pytest.approx(FORCE, rel=1e-13)
@@ -40,7 +40,7 @@ def test_the_layer_of_example_2() -> None:
 
 def test_the_layer_converges() -> None:
     """Each half as many terms more: the peak settles like a high power, the half-width like a lower one."""
-    found = [on_layer(FORCE, RADIUS, STIFFNESS, PENALTY, terms) for terms in (12, 24, 48, 96)]
+    found = [solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, terms) for terms in (12, 24, 48, 96)]
     peaks, widths = (np.array([getattr(one, word) for one in found]) for word in ("peak", "half_width"))
     assert (np.abs(np.diff(peaks))[1:] <= np.abs(np.diff(peaks))[:-1] / 20).all()
     assert (np.abs(np.diff(widths))[1:] <= np.abs(np.diff(widths))[:-1] / 8).all()
@@ -50,7 +50,7 @@ def test_the_layer_converges() -> None:
 
 def test_the_equation_holds_between_the_collocation_points() -> None:
     """p/ε̂ − (2/πE*) ∫ p ln|x − s| ds + x²/2R is the same at all x, by another quadrature."""
-    found = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY, 48)
+    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, 48)
     a = found.half_width
 
     def left(x: float) -> float:
@@ -67,7 +67,7 @@ def test_the_equation_holds_between_the_collocation_points() -> None:
 @pytest.mark.parametrize(("ratio", "shortfall"), SHORTFALLS.items())
 def test_a_stiff_layer_lowers_the_peak(ratio: float, shortfall: float) -> None:
     a, p = hertz.half_width(FORCE, RADIUS, STIFFNESS), hertz.peak(FORCE, RADIUS, STIFFNESS)
-    found = on_layer(FORCE, RADIUS, STIFFNESS, STIFFNESS / (ratio * a), 48)
+    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, STIFFNESS / (ratio * a), 48)
     assert (1 - found.peak / p) / ratio == pytest.approx(shortfall, abs=1e-3)
     assert found.half_width > a
 
@@ -77,7 +77,7 @@ def test_a_soft_layer_is_alone() -> None:
     for over in (1e2, 1e4):
         penalty = STIFFNESS / (over * hertz.half_width(FORCE, RADIUS, STIFFNESS))
         a = hertz.layer_half_width(FORCE, RADIUS, penalty)
-        found = on_layer(FORCE, RADIUS, STIFFNESS, penalty)
+        found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, penalty)
         assert abs(found.half_width / a - 1) <= over ** (-2 / 3)
         assert abs(found.peak / (penalty * a**2 / (2 * RADIUS)) - 1) <= over ** (-2 / 3)
 
@@ -85,8 +85,10 @@ def test_a_soft_layer_is_alone() -> None:
 @pytest.mark.parametrize(("length", "force"), [(2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**60)])
 def test_units_change_nothing(length: float, force: float) -> None:
     """F is a force per length, E* and p are forces per length², ε̂ one per length³."""
-    plain = on_layer(FORCE, RADIUS, STIFFNESS, PENALTY)
+    plain = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY)
     stress = force / length**2
-    other = on_layer(FORCE * force / length, RADIUS * length, STIFFNESS * stress, PENALTY * stress / length)
+    other = solve_winkler_contact(
+        FORCE * force / length, RADIUS * length, STIFFNESS * stress, PENALTY * stress / length
+    )
     assert other.half_width / length == pytest.approx(plain.half_width, rel=1e4 * UNIT_ROUNDOFF)
     assert other.peak / stress == pytest.approx(plain.peak, rel=1e5 * UNIT_ROUNDOFF)

@@ -16,9 +16,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import scene_of
-from contactverif.oracle import kink_margin, projection_cases, usual_places
+from contactverif.oracle import default_points, kink_margin, projection_cases
 from contactverif.scenes.blocks import is_uniform, overhangs
-from contactverif.scenes.catalogue import named_scene
+from contactverif.scenes.catalogue import load_scene_case
 from contactverif.scenes.named_states import NAMED, named_case
 from contactverif.strategies import flat_cases, general_cases, smooth_cases, tie_cases
 from contactverif.strategies.parts import lengths
@@ -140,7 +140,7 @@ def test_smooth_cases_are_away_from_kinks() -> None:
 
 
 def _relative_margin(case: Case) -> float:
-    return kink_margin(case.interface, case.z, *usual_places(case.interface)) / case.shortest_segment
+    return kink_margin(case.interface, case.z, *default_points(case.interface)) / case.shortest_segment
 
 
 def test_ties_are_at_kinks() -> None:
@@ -206,7 +206,7 @@ def test_in_a_dead_zone_the_master_ends_inside_a_slave_segment(dead_zones: list[
 
 def test_a_scene_is_asked_where_its_overhang_belongs() -> None:
     """The dead zone is nothing for who promises the patch test on an interface that is covered, nor the other way."""
-    covered, overhanging, bent = map(named_scene, ("c", "dead-zone", "dead-zone:sides=free"))
+    covered, overhanging, bent = map(load_scene_case, ("c", "dead-zone", "dead-zone:sides=free"))
     for strategy in (block_cases, variant_cases):
         assert strategy(overhanging) is None
         assert drawn(strategy(covered), 2)[0] is covered

@@ -19,7 +19,7 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import End, solve
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.comparison_study import compared, differing
 from contactverif.studies.evaluation_cost import measured, state
 from contactverif_properties.newton import NEWTON_ORDER, ended
@@ -268,7 +268,7 @@ def test_the_shared_state_is_in_contact_everywhere() -> None:
     assert (case.positions[: case.interface.n_slave_nodes, 1] < 0).all()
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)
-    formulation = subject.on(case)
+    formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     assert formulation.contact_points(case.interface, pairing, case.z).active.all()
 
@@ -579,9 +579,9 @@ def test_a_page_escapes_what_a_plugin_calls_itself() -> None:
 def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -> None:
     """They share no code, so they must share words: else columns would be empty, and nobody would notice."""
     assert NEWTON_ORDER.quantities[0].name == ORDER == SLOPE.name
-    scene = scene_named("c")
+    scene = load_scene("c")
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)
-    told = ended(solve(scene, subject.on(scene.case())))
+    told = ended(solve(scene, subject.for_case(scene.case())))
     assert {ITERATIONS, END} <= set(told)
     assert told[END] == CONVERGED == End.CONVERGED

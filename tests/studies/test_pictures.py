@@ -18,7 +18,7 @@ from contactverif.run.driver import draw_cases
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import scene_named
+from contactverif.scenes.catalogue import load_scene
 from contactverif.scenes.named_states import named_case
 from contactverif.strategies.solids import block_cases
 from contactverif.studies.solved_scenes import solve_scene
@@ -70,7 +70,7 @@ def to_infinity(*, penalty: float) -> Any:
 
 @pytest.mark.parametrize("text", ["c", "b:degrees=30", "a2-graded", "example-1", "example-1bis:degrees=90,refine=2"])
 def test_a_formulation_that_is_right_shows_the_exact_pressure_everywhere(text: str) -> None:
-    scene = scene_named(text)
+    scene = load_scene(text)
     found = solve_scene(scene.case(), [installed("vts-ppt")])
     (one,) = found.solutions
     assert not found.failures
@@ -106,7 +106,7 @@ def test_forces_of_multipliers_that_no_case_holds_are_not_drawn(name: str) -> No
 
 
 def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
-    found = solve_scene(scene_named("c").case(), [installed("nts"), installed("vts-ppt")])
+    found = solve_scene(load_scene("c").case(), [installed("nts"), installed("vts-ppt")])
     wrong, right = found.solutions
     assert wrong.points is None  # a nodal method has forces, not pressures
     assert np.ptp(found.node_pressures(wrong)) > 1
@@ -114,13 +114,13 @@ def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
 
 
 def test_it_is_the_trace_that_is_drawn() -> None:
-    scene = scene_named(FIG_30)
+    scene = load_scene(FIG_30)
     names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
     found = solve_scene(scene.case(), [installed(name) for name in names])
     assert [one.formulation for one in found.solutions] == names
     assert np.isnan(found.solutions[0].pressure)
     for one in found.solutions:
-        trace = solve(scene, installed(one.formulation).on(scene.case()))
+        trace = solve(scene, installed(one.formulation).for_case(scene.case()))
         assert (one.end, one.n_iterations, one.converged) == ("converged", trace.n_iterations, True)
         np.testing.assert_array_equal(one.residuals, trace.residuals)
         np.testing.assert_array_equal(one.energies, trace.energies)
@@ -133,7 +133,7 @@ def test_it_is_the_trace_that_is_drawn() -> None:
 
 
 def test_the_interface_knows_whose_its_nodes_are() -> None:
-    scene = scene_named("c:refine=2,degrees=20")
+    scene = load_scene("c:refine=2,degrees=20")
     found = solve_scene(scene.case(), [installed("vts-ppt")])
     for body, on, moved in zip(found.bodies, found.on_interface, found.solutions[0].displacements, strict=True):
         np.testing.assert_array_equal(found.case.interface.nodes[on], body.nodes[body.contact_nodes])
@@ -142,7 +142,7 @@ def test_the_interface_knows_whose_its_nodes_are() -> None:
 
 
 def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
-    near = scene_named("c")
+    near = load_scene("c")
     far = two_blocks([100, 101], [0, 1], [100, 101], [-1, 0], young=(1e4, 1e4), approach=0.0, penalty=1e4).bodies[1]
     scene = Scene((*near.bodies, far), (0,), (1, 2), near.penalty, near.facts, "c and another")
     found = solve_scene(scene.case(), [installed("vts-ppt")])
@@ -158,7 +158,7 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
     ],
 )
 def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., Any], end: str, remark: str) -> None:
-    (one,) = solve_scene(scene_named("c").case(), [Subject("mine", make)]).solutions
+    (one,) = solve_scene(load_scene("c").case(), [Subject("mine", make)]).solutions
     assert end in one.end
     assert one.converged == (not end)
     assert one.remark.startswith(remark)
@@ -168,9 +168,7 @@ def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., 
 
 def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
     bad = Subject("raising", raising)
-    found = solve_scene(
-        scene_named("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), installed("vts-ppt")]
-    )
+    found = solve_scene(load_scene("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), installed("vts-ppt")])
     assert [one.formulation for one in found.solutions] == ["vts-ppt"]
     assert found.failures == {
         "raising": "residual: RuntimeError: no licence\nleft",
@@ -179,6 +177,6 @@ def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
 
 
 def test_an_interface_alone_cannot_be_solved() -> None:
-    case = scene_named("c").case()
+    case = load_scene("c").case()
     with pytest.raises(MisuseError, match="an interface without bodies"):
         solve_scene(Case(case.interface, case.z), [installed("vts-ppt")])

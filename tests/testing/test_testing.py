@@ -29,7 +29,7 @@ def a_case(size):
     return Case(interface, interface.nodes.ravel())
 
 def measured(case, subject):
-    forces = subject.on(case).residual(case.interface, None, case.z)
+    forces = subject.for_case(case).residual(case.interface, None, case.z)
     return Measurement({"error": float(np.abs(forces).max())}, {"error": 1e-6})
 
 def cases(interface):

@@ -12,7 +12,7 @@ from math import inf, nan
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, frozen
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.property import Outcome, Property, Verdict, excess
 from contactverif.contract.result import Row
 from contactverif_reports.netcdf.summary_group import worst
@@ -80,16 +80,16 @@ class Cell:
             unexpected=row.unexpected,
             reason=row.reason,
             planned=row.planned,
-            verdicts=frozen(np.array([int(outcome.verdict) for outcome in outcomes], dtype=np.int64), np.int64),
-            margins=frozen(np.array([margin(row.question, outcome) for outcome in outcomes]), np.float64),
-            orders=frozen(np.array(orders), np.float64),
+            verdicts=freeze(np.array([int(outcome.verdict) for outcome in outcomes], dtype=np.int64), np.int64),
+            margins=freeze(np.array([margin(row.question, outcome) for outcome in outcomes]), np.float64),
+            orders=freeze(np.array(orders), np.float64),
             details={
-                name: frozen(np.array([nan if m is None else m.details.get(name, nan) for m in measured]), np.float64)
+                name: freeze(np.array([nan if m is None else m.details.get(name, nan) for m in measured]), np.float64)
                 for name in names
             },
             worst_value=nan if found_worst is None else found_worst.value,
             worst_quantity="" if found_worst is None else found_worst.quantity.name,
-            kinds=frozen(np.array([_kind(outcome) for outcome in outcomes]).reshape(-1, 5), np.float64),
+            kinds=freeze(np.array([_kind(outcome) for outcome in outcomes]).reshape(-1, 5), np.float64),
             seconds=float(np.median([outcome.seconds for outcome in outcomes])) if outcomes else nan,
         )
 
@@ -208,8 +208,8 @@ class Paired:
             equal=int(same.sum()),
             worse=int(worse.sum()),
             ratio=_median_ratio(a[both], b[both]),
-            decades=frozen(np.where(both, _decades(a, b), nan), np.float64),
-            apart=frozen(apart, np.bool_),
+            decades=freeze(np.where(both, _decades(a, b), nan), np.float64),
+            apart=freeze(apart, np.bool_),
         )
 
     def furthest(self, sizes: FloatArray) -> int | None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray, frozen
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.property import Quantity, Verdict, excess
 from contactverif_reports.compare.cells import ORDER, Cell, margin_of
 from contactverif_reports.netcdf import schema
@@ -125,17 +125,17 @@ class _Table:
             unexpected=str(summary["unexpected"][ij]),
             reason=str(summary["reason"][ij]),
             planned=int(summary["planned"][ij]),
-            verdicts=frozen(verdicts, np.int64),
-            margins=frozen(np.array(margins), np.float64),
-            orders=frozen(values[:, orders[0]] if orders else np.full(n_cases, nan), np.float64),
+            verdicts=freeze(verdicts, np.int64),
+            margins=freeze(np.array(margins), np.float64),
+            orders=freeze(values[:, orders[0]] if orders else np.full(n_cases, nan), np.float64),
             details={
-                detail: frozen(details[:, k], np.float64)
+                detail: freeze(details[:, k], np.float64)
                 for k, detail in enumerate(self._details)
                 if not np.isnan(details[:, k]).all()
             },
             worst_value=float(summary["worst_value"][ij]),
             worst_quantity=str(summary["worst_quantity"][ij]),
-            kinds=frozen(np.column_stack(kinds), np.float64),
+            kinds=freeze(np.column_stack(kinds), np.float64),
             seconds=seconds,
         )
 
