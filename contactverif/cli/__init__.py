@@ -1,4 +1,4 @@
-"""The command line: one file a command, and what they show in a terminal. Nothing of the house imports it."""
+"""The command line: one file a command, and the tables that a terminal shows. Nothing else in the house imports it."""
 
 from contactverif.cli.app import main
 

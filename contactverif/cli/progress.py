@@ -1,7 +1,7 @@
-"""The progress bar of a run, on standard error so that a table can be piped; nothing where nobody watches.
+"""The progress bar of a run. It is written to standard error, so that a table can be piped, and only to a terminal.
 
-While it is up Ctrl-C ends the run at the next case at the latest: where Python itself drops the interrupt, in a
-callback of the garbage collector or of compiled code, the run would go on to its end otherwise.
+While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
+callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from contactverif.run import runner
 
 
 class Bar:
-    """A bar that is told how far something is."""
+    """A progress bar, up as long as its `with` block lasts."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
@@ -33,33 +33,39 @@ class Bar:
         )
         self._task: TaskID | None = None
         self._interrupted = False
-        self._before: Any = None
+        self._previous_handler: Any = None
 
     def __enter__(self) -> Bar:
-        if threading.current_thread() is threading.main_thread():  # nobody else may ask for signals
-            self._before = signal.signal(signal.SIGINT, self._interrupt)
+        if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
+            self._previous_handler = signal.signal(signal.SIGINT, self._interrupt)
         self._progress.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self._progress.stop()
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        if self._previous_handler is not None:
+            signal.signal(signal.SIGINT, self._previous_handler)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         self._interrupted = True
         raise KeyboardInterrupt
 
-    def told(self, step: runner.Progress) -> None:
-        """One more case is done."""
-        self.at(f"{step.formulation}  {step.property_id}  {step.phase}", step.done, step.planned)
+    def show_progress(self, step: runner.Progress) -> None:
+        """Show how far a run is; the runner calls this after every case."""
+        self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.done, step.planned)
 
-    def at(self, description: str, done: int, planned: int) -> None:
-        """So many of so many are done, and this comes next."""
+    def update(self, description: str, n_finished: int, n_planned: int) -> None:
+        """Show how many of the planned steps are finished, and what comes next.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If the user has pressed Ctrl-C.
+        """
         if self._interrupted:
             raise KeyboardInterrupt
         if self._progress.disable:
             return
         if self._task is None:
             self._task = self._progress.add_task(description)
-        self._progress.update(self._task, description=description, completed=done, total=planned)
+        self._progress.update(self._task, description=description, completed=n_finished, total=n_planned)

@@ -87,6 +87,7 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
         pressure=pressure,
         stress_error=stress_error(scene, at_gauss_points, pressure),
         remark=remark,
+        advice="" if trace.converged else trace.end.advice,
     )
 
 

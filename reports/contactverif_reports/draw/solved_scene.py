@@ -72,6 +72,8 @@ class Solution:
         Largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
     remark : str
         What did not come out as it should, empty if all did.
+    advice : str
+        What happened and what to try next, where Newton's method did not converge; else empty.
     """
 
     formulation: str
@@ -89,6 +91,7 @@ class Solution:
     pressure: float = np.nan
     stress_error: float = np.nan
     remark: str = ""
+    advice: str = ""
 
     @property
     def n_iterations(self) -> int:

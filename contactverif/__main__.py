@@ -1,0 +1,5 @@
+"""Run the command line as `python -m contactverif`."""
+
+from contactverif.cli.app import main
+
+main()

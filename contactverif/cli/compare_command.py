@@ -1,0 +1,138 @@
+"""The command `compare`: formulations against a reference, or an old report and a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.shared_options import PlaceOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.contract.errors import MisuseError
+
+
+def compare(
+    *,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Formulations; or two reports, OLD.nc NEW.nc.", metavar="NAME", autocompletion=complete_formulation
+        ),
+    ] = None,
+    against: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="The one formulation to compare with.", metavar="NAME", autocompletion=complete_formulation
+        ),
+    ] = None,
+    properties: PropertyGlobs = None,
+    sampling: SamplingOptions,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
+        ),
+    ] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Draw the meshes on which they differ into this folder.", metavar="FOLDER")
+    ] = None,
+    place: PlaceOptions,
+) -> None:
+    """Compare formulations with a reference, on the same cases; or two reports.
+
+    An argument that ends in .nc is a report, and so is any other file that
+    no formulation is named after.
+
+    \bExit status, for formulations
+      0  compared, and every candidate keeps its promises
+      1  a candidate breaks a promise, cannot be judged or does not load.
+         A candidate that is worse than the reference is a result and no
+         error. Promises of the reference itself do not count here
+    \bExit status, for two reports
+      0  nothing got worse; being slower does not count as worse
+      1  a property passed and fails now, a promise was kept and is broken
+         now, an error beyond the tolerance more than doubled, or more cases
+         are undecided or do not converge than roundoff can explain. What is
+         only worth a look is printed and does not count
+    \bFor both
+      2  the command line is wrong; one line says what is needed
+
+    \bExamples
+      contactverif compare mine --against vts-ppt
+      contactverif compare mine nts-ar --against vts-ppt --seed 7 --out mine.html
+      contactverif compare old.nc new.nc
+    """
+    reference = _only_one("--against", against or [])
+    reports = _reports_among(names or [])
+    if reports:
+        _check_no_run_options(reference, sampling, place, pictures)
+        files = OutputFiles.check(out or [], (PAGE,))
+        from contactverif.cli.report_comparison import compare_reports
+
+        raise typer.Exit(0 if compare_reports(reports, properties or [], files) else 1)
+    scene, interface = place.make_scene(), place.read_interface()
+    if reference is None:
+        raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
+    files = OutputFiles.check(out or [], (REPORT, PAGE))
+    folder = PictureFolder.make(pictures)
+    from contactverif.cli.formulation_comparison import compare_formulations, load_contest
+
+    contest = load_contest(names or [], reference, properties or ["*"])
+    kept = compare_formulations(contest, sampling, interface, scene, files, folder)
+    raise typer.Exit(0 if kept else 1)
+
+
+def _only_one(option: str, values: Sequence[str]) -> str | None:
+    """Return the value of an option that typer would take several times, None without one."""
+    if len(values) > 1:
+        raise MisuseError(option, f"{len(values)}: {', '.join(values)}", "one")
+    return values[0] if values else None
+
+
+def _reports_among(names: Sequence[str]) -> list[Path]:
+    """Return the two reports, if the names are those of reports; nothing if they are those of formulations.
+
+    Raises
+    ------
+    MisuseError
+        If the names are of both kinds, or not those of two reports.
+    """
+    reports = [name for name in names if _is_report(name)]
+    if not reports:
+        return []
+    others = [name for name in names if name not in reports]
+    if others:
+        raise MisuseError("NAME", f"{others[0]} and the report {reports[0]}", "formulations alone, or two reports")
+    if len(reports) != 2:
+        raise MisuseError("NAME", f"{len(reports)} report{'s' * (len(reports) > 1)}", "two, OLD.nc NEW.nc")
+    return [Path(name) for name in reports]
+
+
+def _is_report(name: str) -> bool:
+    """Return whether a name is that of a report: it ends in .nc, or is a file and no installed formulation."""
+    from contactverif.run.registry import formulation_names
+
+    return name.lower().endswith(REPORT) or (name not in formulation_names() and Path(name).is_file())
+
+
+def _check_no_run_options(
+    reference: str | None, sampling: SamplingOptions, place: PlaceOptions, pictures: Path | None
+) -> None:
+    """Refuse what two reports cannot be asked any more."""
+    values: dict[str, Any] = {
+        "against": reference,
+        "profile": sampling.profile,
+        "examples": sampling.examples,
+        "seed": sampling.seed,
+        "mesh": place.mesh,
+        "slave": place.slave,
+        "master": place.master,
+        "flip": place.flip or None,
+        "scene": place.scene,
+        "pictures": pictures,
+    }
+    for option, value in values.items():
+        if value is not None:
+            raise MisuseError(f"--{option}", "two reports beside it", "formulations: a report has been judged already")

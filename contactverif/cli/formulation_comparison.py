@@ -1,0 +1,157 @@
+"""What `compare` does with formulations: one run on the same cases, then tables, meshes, a page and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import typer
+
+from contactverif.cli.case_pictures import draw_outcome
+from contactverif.cli.comparison_tables import DRAWN, SideBySide, last_line, mesh
+from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.progress import Bar
+from contactverif.cli.run_tables import show, show_as_it_is
+from contactverif.cli.shared_options import SamplingOptions
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Property
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.scene import has_bodies
+from contactverif.run.one_case import forces_on
+from contactverif.run.registry import formulation_names, load_formulation, load_properties
+from contactverif.studies.comparison_study import Study, compared
+from contactverif.studies.solved_scenes import solve_scene
+from contactverif_reports.compare.comparison import Differing
+from contactverif_reports.html.comparison_page import Drawing, comparison_page
+from contactverif_reports.html.pages import write_page
+from contactverif_reports.netcdf.schema import case_id
+from contactverif_reports.netcdf.write import write
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contest:
+    """Who is compared with whom, and by which properties."""
+
+    reference: Subject
+    candidates: Sequence[Subject | NotLoaded]
+    properties: Sequence[Property | NotLoaded]
+
+    @property
+    def subjects(self) -> dict[str, Subject]:
+        """{name: formulation} of the reference and of all candidates that load."""
+        return {item.name: item for item in (self.reference, *self.candidates) if isinstance(item, Subject)}
+
+
+def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]) -> Contest:
+    """Load the formulations and the properties.
+
+    Parameters
+    ----------
+    names : Sequence[str]
+        The candidates, as typed on the command line.
+    reference_name : str
+        The formulation to compare them with.
+    globs : Sequence[str]
+        Patterns of property ids.
+
+    Raises
+    ------
+    MisuseError
+        If there is no candidate, a name or a pattern matches nothing, or the reference does not load.
+    """
+    if not names:
+        others = ", ".join(name for name in formulation_names() if name != reference_name)
+        raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
+    properties = load_properties(globs)
+    try:
+        reference = load_formulation(reference_name)
+    except MisuseError as error:
+        raise MisuseError("--against", error.found, error.needed) from None
+    if isinstance(reference, NotLoaded):
+        raise MisuseError("--against", f"{reference_name}, which does not load ({reference.reason})", "one that loads")
+    return Contest(reference, [load_formulation(name) for name in names], properties)
+
+
+def compare_formulations(
+    contest: Contest,
+    sampling: SamplingOptions,
+    interface: Interface | None,
+    scene: Case | None,
+    files: OutputFiles,
+    folder: PictureFolder | None,
+) -> bool:
+    """Run all properties, show the tables and write the files.
+
+    Returns
+    -------
+    bool
+        Whether every candidate keeps its promises.
+    """
+    with Bar() as bar:
+        study = compared(
+            contest.reference,
+            contest.candidates,
+            contest.properties,
+            profile=sampling.profile or "dev",
+            examples=sampling.examples,
+            seed=sampling.seed,
+            interface=interface,
+            scene=scene,
+            progress=bar.show_progress,
+        )
+    if REPORT in files.paths:  # before anything is shown, so that nothing that was judged is lost
+        write(study.run, files.paths[REPORT])
+    if PAGE in files.paths:
+        drawings = [_page_drawing(differing, contest) for differing in study.differing]
+        page = comparison_page(study.comparison, study.differing, drawings, study.costs)
+        write_page(files.paths[PAGE], page, "--out")
+    show(SideBySide(study))
+    _show_meshes(study, contest, folder, on_a_page=PAGE in files.paths)
+    files.announce()
+    show(last_line(study.comparison))
+    return study.comparison.kept
+
+
+def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *, on_a_page: bool) -> None:
+    """Print the meshes that tell most, and draw all of them into the folder, if there is one."""
+    for place, differing in enumerate(study.differing):
+        if place < DRAWN:
+            show_as_it_is(mesh(differing, contest.reference.name))
+        if folder is not None:
+            for name in _draw_pictures(differing, contest, folder):
+                typer.echo(f"    picture: {folder.name / name}")
+    rest = study.differing[DRAWN:]
+    if rest and folder is None and not on_a_page:
+        ids = ", ".join(differing.question.id for differing in rest)
+        show(f"\nThey also differ on {ids}: --out FILE.html or --pictures FOLDER draws those meshes.")
+
+
+def _page_drawing(differing: Differing, contest: Contest) -> Drawing:
+    """Return what the page's picture of a case needs: its scene solved by both, or the forces of both."""
+    candidate, reference = contest.subjects[differing.formulation], contest.reference
+    if has_bodies(differing.case):
+        return Drawing(solved=solve_scene(differing.case, [candidate, reference]))
+    exact = differing.question.exact(differing.case) if differing.question.exact is not None else None
+    return Drawing(forces_on(differing.case, candidate), forces_on(differing.case, reference), exact)
+
+
+def _draw_pictures(differing: Differing, contest: Contest, folder: PictureFolder) -> list[str]:
+    """Draw the bodies as both solve them, or the case with the forces of each; return the files' names."""
+    candidate, reference = contest.subjects[differing.formulation], contest.reference
+    if has_bodies(differing.case):
+        from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
+
+        scene = solve_scene(differing.case, [candidate, reference])
+        name = f"{case_id(candidate.name, differing.question.id)}.png"
+        if scene.solutions:
+            draw_scene(scene, folder.path / name, title=f"{differing.question.id}, case {differing.number}")
+        return [name] if scene.solutions else []
+    names = []
+    for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
+        name = f"{case_id(subject.name, differing.question.id)}.png"
+        draw_outcome(subject, differing.question, outcome, folder.path / name, argument="--pictures")
+        names.append(name)
+    return names

@@ -1,0 +1,25 @@
+"""The command `list`: what is installed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def list_installed(
+    traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
+) -> None:
+    """List the installed formulations with their promises, and the properties.
+
+    A promise is what a formulation says of itself; verify checks it. A
+    witness is a named case on which a formulation says that it fails.
+
+    \bExit status
+      0  listed
+    """
+    from contactverif.cli.run_tables import formulations_table, properties_table, show
+    from contactverif.run.registry import load_formulations, load_properties
+
+    show(formulations_table(load_formulations(), every_trait=traits))
+    show(properties_table(load_properties()))

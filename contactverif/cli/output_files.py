@@ -1,0 +1,113 @@
+"""The files that a command writes: `--out FILE`, repeatable, where the suffix says what is written.
+
+Rule: everything that can be wrong with a name is said here, before anything takes long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from contactverif.contract.errors import MisuseError
+
+REPORT = ".nc"
+PAGE = ".html"
+PICTURES = (".png", ".svg")
+SOLVED_SCENE = ".vtu"
+LABELS = {REPORT: "report", PAGE: "page", ".png": "picture", ".svg": "picture", SOLVED_SCENE: "for ParaView"}
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFiles:
+    """The files of one command, at most one of each suffix.
+
+    Attributes
+    ----------
+    names : Mapping[str, Path]
+        {suffix: name as the user typed it}.
+    paths : Mapping[str, Path]
+        {suffix: absolute path}. A plugin may change the working folder while it runs.
+    """
+
+    names: Mapping[str, Path]
+    paths: Mapping[str, Path]
+
+    @classmethod
+    def check(cls, names: Sequence[Path], suffixes: Sequence[str]) -> OutputFiles:
+        """Return the files, once it is sure that they can be written.
+
+        Parameters
+        ----------
+        names : Sequence[Path]
+            What the user typed behind each `--out`.
+        suffixes : Sequence[str]
+            The kinds of files that the command writes, such as ".nc".
+
+        Raises
+        ------
+        MisuseError
+            If a name ends otherwise, two names end alike, or a file cannot be written.
+        """
+        from contactverif_reports.files import check_writable
+
+        by_suffix: dict[str, Path] = {}
+        for name in names:
+            suffix = name.suffix.lower()
+            if suffix not in suffixes:
+                raise MisuseError("--out", f"{str(name)!r}", f"a name that ends in {_either(suffixes)}")
+            if suffix in by_suffix:
+                raise MisuseError("--out", f"{by_suffix[suffix]} and {name}", f"one file that ends in {suffix}")
+            check_writable(name, "--out", f"FILE{suffix}")
+            by_suffix[suffix] = name
+        return cls(by_suffix, {suffix: name.absolute() for suffix, name in by_suffix.items()})
+
+    def pictures(self) -> Iterator[Path]:
+        """Yield the absolute path of each picture."""
+        yield from (path for suffix, path in self.paths.items() if suffix in PICTURES)
+
+    def announce(self) -> None:
+        """Print the name of each file that was written, a line each."""
+        for suffix, label in LABELS.items():
+            if suffix in self.names:
+                typer.echo(f"{label}: {self.names[suffix]}")
+
+
+@dataclass(frozen=True, slots=True)
+class PictureFolder:
+    """The folder that `--pictures` names, which exists.
+
+    Attributes
+    ----------
+    name : Path
+        The folder as the user typed it.
+    path : Path
+        The same as an absolute path.
+    """
+
+    name: Path
+    path: Path
+
+    @classmethod
+    def make(cls, name: Path | None) -> PictureFolder | None:
+        """Make the folder if it is not there; return None without a name.
+
+        Raises
+        ------
+        MisuseError
+            If the folder cannot be made.
+        """
+        if name is None:
+            return None
+        from contactverif_reports.files import made_folder
+
+        made_folder(name, "--pictures")
+        return cls(name, name.absolute())
+
+
+def _either(suffixes: Sequence[str]) -> str:
+    """Return the suffixes in words: `.png, .svg or .vtu`."""
+    *others, last = suffixes
+    return f"{', '.join(others)} or {last}" if others else last

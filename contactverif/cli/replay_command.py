@@ -1,0 +1,64 @@
+"""The command `replay`: one stored counterexample, judged again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from contactverif.cli.output_files import PICTURES, OutputFiles
+from contactverif.cli.shared_options import CaseId, ReportPath, complete_formulation
+
+
+def replay(
+    report: ReportPath,
+    case: CaseId = None,
+    formulation: Annotated[
+        str | None,
+        typer.Option(
+            help="Judge this formulation instead of the one that failed.",
+            metavar="NAME",
+            autocompletion=complete_formulation,
+        ),
+    ] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option("--out", help="Draw the case to FILE.png or FILE.svg. Repeatable.", metavar="FILE"),
+    ] = None,
+) -> None:
+    """Judge one stored counterexample again. Without --case, list their ids.
+
+    \bExit status
+      0  the case does not fail any more
+      1  the case fails again
+      2  the command line is wrong; one line says what is needed
+
+    \bExamples
+      contactverif replay ppt.nc
+      contactverif replay ppt.nc --case vts-ppt.balance.force
+      contactverif replay ppt.nc --case vts-ppt.balance.force --out case.svg
+      contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
+    """
+    from contactverif.cli.case_pictures import draw_outcome
+    from contactverif.cli.run_tables import replayed, show
+    from contactverif.contract.property import Verdict
+    from contactverif.run.one_case import judged, the_formulation, the_property
+    from contactverif_reports.draw import as_text
+    from contactverif_reports.netcdf.read import case_ids, read_case
+
+    files = OutputFiles.check(out or [], PICTURES)
+    if case is None:
+        ids = case_ids(report)
+        typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
+        return
+    stored = read_case(report, case)
+    subject = the_formulation(formulation or stored.formulation)
+    question = the_property(stored.property_id)
+    outcome = judged(question, stored.case, subject)
+    for picture in files.pictures():  # before anything is printed, in case a file cannot be written
+        draw_outcome(subject, question, outcome, picture, argument="--out")
+    typer.echo(as_text(stored.case))
+    show(replayed(stored, subject.name, outcome))
+    files.announce()
+    raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)

@@ -1,0 +1,156 @@
+"""What the command `draw` does: it solves a scene, or takes a stored case, and writes pictures and a small table."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+from rich.table import Table
+
+from contactverif.cli.case_pictures import draw_outcome
+from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
+from contactverif.cli.run_tables import plain_table, show
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.mechanics.scene import has_bodies
+from contactverif.run.one_case import judged, the_formulation, the_property
+from contactverif.run.registry import formulation_names, load_formulation
+from contactverif.scenes.catalogue import load_scene
+from contactverif.studies.solved_scenes import solve_scene
+from contactverif_reports.draw import as_text
+from contactverif_reports.draw.solved_scene import SolvedScene
+from contactverif_reports.netcdf.read import StoredCase, read_case
+
+_NARROW = 80  # The largest number of columns of a remark.
+
+
+def draw_scene_or_case(
+    report: Path | None, case_id: str | None, scene: str | None, names: Sequence[str], files: OutputFiles
+) -> bool:
+    """Draw a named scene, or a counterexample of a report.
+
+    Parameters
+    ----------
+    report, case_id : Path | None or str | None
+        The counterexample; both or none of them.
+    scene : str | None
+        The scene with its options, such as "c:refine=2".
+    names : Sequence[str]
+        The formulations. For a counterexample none means the one that failed.
+    files : OutputFiles
+        Pictures, and at most one .vtu file.
+
+    Returns
+    -------
+    bool
+        Whether every formulation loaded and kept its contract.
+
+    Raises
+    ------
+    MisuseError
+        If it is not clear what is to be drawn.
+    """
+    for name in names:
+        if list(names).count(name) > 1:
+            raise MisuseError("--formulation", f"{name} twice", "each formulation once")
+    if scene is not None:
+        _check_alone(scene, report, case_id)
+        case = load_scene(scene).case()
+        if not names:
+            raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
+        return _draw_solved(case, names, scene, files)
+    stored = _read_stored(report, case_id)
+    if has_bodies(stored.case):
+        return _draw_solved(stored.case, names or [stored.formulation], f"{case_id}: {stored.reason}", files)
+    _draw_stored(stored, names, files)
+    return True
+
+
+def _check_alone(scene: str, report: Path | None, case_id: str | None) -> None:
+    """Refuse a scene beside a counterexample."""
+    for option, value in (("--case", case_id), ("REPORT", report)):
+        if value is not None:
+            raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
+
+
+def _read_stored(report: Path | None, case_id: str | None) -> StoredCase:
+    """Read the counterexample that the user names."""
+    if report is None and case_id is None:
+        raise MisuseError("--scene", "nothing to draw", "--scene NAME, or REPORT --case ID")
+    if report is None:
+        raise MisuseError("REPORT", f"none, but --case {case_id}", "the report that holds the case")
+    if case_id is None:
+        raise MisuseError("--case", "nothing", f"--case ID; `contactverif replay {report}` lists the ids")
+    return read_case(report, case_id)
+
+
+def solutions_table(scene: SolvedScene) -> Table:
+    """Return a table of how Newton's method ended for each formulation, a line each."""
+    table = plain_table("")
+    columns = ["formulation", "end", "iterations", "residual"]
+    if any(solution.stress_error == solution.stress_error for solution in scene.solutions):
+        columns.append("stress error")
+    for column in columns:
+        table.add_column(column, justify="right" if column in columns[2:] else "left", no_wrap=True)
+    for solution in scene.solutions:
+        error = f"{solution.stress_error:.2g}" if solution.stress_error == solution.stress_error else "–"
+        numbers = f"{solution.n_iterations}", f"{solution.residuals[-1]:.2g}", error
+        table.add_row(*[solution.formulation, solution.end, *numbers][: len(columns)])
+    return table
+
+
+def _draw_stored(stored: StoredCase, names: Sequence[str], files: OutputFiles) -> None:
+    """Draw a case without bodies, as `replay --out` draws it."""
+    if SOLVED_SCENE in files.names:
+        raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
+    if len(names) > 1:
+        raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
+    subject, question = the_formulation((names or [stored.formulation])[0]), the_property(stored.property_id)
+    outcome = judged(question, stored.case, subject)
+    if not files.paths:
+        typer.echo(as_text(stored.case))
+    for picture in files.pictures():
+        draw_outcome(subject, question, outcome, picture, argument="--out")
+    files.announce()
+
+
+def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles) -> bool:
+    """Solve a scene with each formulation and write the files; return whether all could be used."""
+    if SOLVED_SCENE in files.names and len(names) > 1:
+        found = f"{files.names[SOLVED_SCENE]} for {len(names)} formulations"
+        raise MisuseError("--out", found, "one --formulation: a .vtu file holds one solution")
+    scene = solve_scene(case, [load_formulation(name) for name in names])
+    if scene.solutions:
+        _write_files(scene, title, files)
+    if not (scene.solutions and files.paths):
+        typer.echo(as_text(case))
+    if scene.solutions:
+        show(solutions_table(scene))
+    for line in _remarks(scene):
+        typer.echo(line)
+    if scene.solutions:
+        files.announce()
+    return not scene.failures
+
+
+def _write_files(scene: SolvedScene, title: str, files: OutputFiles) -> None:
+    """Write each picture and the file for ParaView."""
+    for picture in files.pictures():
+        from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
+
+        draw_scene(scene, picture, title=title)
+    if SOLVED_SCENE in files.paths:
+        from contactverif_reports.draw.vtu import write_vtu
+
+        write_vtu(scene, scene.solutions[0], files.paths[SOLVED_SCENE])
+
+
+def _remarks(scene: SolvedScene) -> list[str]:
+    """Return what the user should know: advice where Newton's method failed, remarks, formulations without solution."""
+    remarks = []
+    for solution in scene.solutions:
+        remarks += [(solution.formulation, text) for text in (solution.advice, solution.remark) if text]
+    remarks += scene.failures.items()
+    return ["\n".join(textwrap.wrap(f"{name}: {text}", _NARROW, subsequent_indent="  ")) for name, text in remarks]

@@ -1,0 +1,169 @@
+"""The options that several commands share, each defined once.
+
+A group of options is a frozen dataclass. Every field is one option, and its annotation holds what typer shows of it.
+A command takes the group as one parameter; `spell_out_groups` shows typer the single options and hands the command
+the group again.
+
+Rules for the next editor: two groups of one command have no field of the same name, and nothing that takes long to
+import is imported at the top, because every `--help` imports this file.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.contract.case import Case
+    from contactverif.contract.interface import Interface
+
+PROFILE_HELP = (
+    "dev: 100 cases of each property, new ones in every run. ci: 100 cases, always the same. "
+    "nightly: 2000 cases, new ones in every run. (default: dev)"
+)
+
+
+def complete_formulation(incomplete: str) -> list[str]:
+    """Return the installed formulations whose name begins so, for the shell."""
+    from contactverif.run.registry import formulation_names
+
+    return [name for name in formulation_names() if name.startswith(incomplete)]
+
+
+def complete_property(incomplete: str) -> list[str]:
+    """Return the installed properties whose id begins so, for the shell."""
+    from contactverif.run.registry import property_ids
+
+    return [property_id for property_id in property_ids() if property_id.startswith(incomplete)]
+
+
+PropertyGlobs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--property",
+        "-p",
+        help="Check only the properties whose id matches. Repeatable.",
+        metavar="GLOB",
+        autocompletion=complete_property,
+    ),
+]
+ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
+CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
+
+
+@dataclass(frozen=True, slots=True)
+class SamplingOptions:
+    """How many random cases a run draws, and with which seed; None where the user leaves it to the profile."""
+
+    examples: Annotated[int | None, typer.Option(help="Number of random cases of each property.", metavar="N")] = None
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", metavar="N")] = None
+    profile: Annotated[str | None, typer.Option(help=PROFILE_HELP, metavar="NAME")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceOptions:
+    """Where the properties are checked, if not on random interfaces: on a mesh of the user or on a scene."""
+
+    mesh: Annotated[
+        Path | None,
+        typer.Option(help="Check on the interface of this mesh file, with random states.", metavar="FILE"),
+    ] = None
+    slave: Annotated[
+        str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")
+    ] = None
+    master: Annotated[
+        str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")
+    ] = None
+    flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's lines.")] = False
+    scene: Annotated[
+        str | None, typer.Option(help="Check on this scene: c or c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")
+    ] = None
+
+    def read_interface(self) -> Interface | None:
+        """Return the interface of the mesh, None without a mesh.
+
+        Raises
+        ------
+        MisuseError
+            If the file or a group of it cannot be read, or a group is named without a mesh.
+        """
+        if self.mesh is None:
+            for option, value in (("--slave", self.slave), ("--master", self.master), ("--flip", self.flip or None)):
+                if value is not None:
+                    raise MisuseError("--mesh", f"none, but {option}", "--mesh FILE, which the tags belong to")
+            return None
+        if self.slave is None or self.master is None:
+            missing = "--slave" if self.slave is None else "--master"
+            raise MisuseError(missing, "nothing", f"{missing} TAG, a physical group of line elements of {self.mesh}")
+        from contactverif.meshes.mesh_file import read_interface
+
+        return read_interface(self.mesh, slave=self.slave, master=self.master, flip=self.flip)
+
+    def make_scene(self) -> Case | None:
+        """Return the case of the scene, None without a scene.
+
+        Raises
+        ------
+        MisuseError
+            If there is no such scene or option, or a mesh too.
+        """
+        if self.scene is None:
+            return None
+        if self.mesh is not None:
+            raise MisuseError("--scene", f"{self.scene} and --mesh {self.mesh}", "one of the two")
+        from contactverif.scenes.catalogue import load_scene
+
+        return load_scene(self.scene).case()
+
+
+def spell_out_groups(command: Callable[..., None]) -> Callable[..., None]:
+    """Return the command with each group of options replaced by its options, as typer needs it.
+
+    Parameters
+    ----------
+    command : Callable[..., None]
+        A command whose parameters may be annotated with a dataclass from this file.
+
+    Returns
+    -------
+    Callable[..., None]
+        The same command, called with keyword arguments only.
+    """
+    hints = typing.get_type_hints(command, include_extras=True)
+    groups = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+
+    @functools.wraps(command)
+    def spelled_out(**values: Any) -> None:
+        for name, group in groups.items():
+            values[name] = typing.cast("type[Any]", group)(
+                **{field.name: values.pop(field.name) for field in fields(group)}
+            )
+        command(**values)
+
+    parameters = list(_single_options(command, hints, groups))
+    spelled_out.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    spelled_out.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return spelled_out
+
+
+def _single_options(
+    command: Callable[..., None], hints: dict[str, Any], groups: dict[str, Any]
+) -> Iterator[inspect.Parameter]:
+    """Yield the parameters of the command, with the fields of a group in its place."""
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    for name, parameter in inspect.signature(command).parameters.items():
+        if name not in groups:
+            yield inspect.Parameter(name, keyword, default=parameter.default, annotation=hints[name])
+            continue
+        annotations = typing.get_type_hints(groups[name], include_extras=True)
+        for field in fields(groups[name]):
+            yield inspect.Parameter(field.name, keyword, default=field.default, annotation=annotations[field.name])

@@ -1,0 +1,166 @@
+"""The command `verify`: it checks every property of some formulations and shows a table, drawings and files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.shared_options import PlaceOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.contract.result import NotLoaded, Row, Run
+    from contactverif.contract.subject import Subject
+
+
+def verify(
+    *,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.",
+            metavar="NAME",
+            autocompletion=complete_formulation,
+        ),
+    ] = None,
+    all_: Annotated[
+        bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")
+    ] = False,
+    properties: PropertyGlobs = None,
+    sampling: SamplingOptions,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
+        ),
+    ] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Draw each counterexample into this folder.", metavar="FOLDER")
+    ] = None,
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="A known failure, with its reason. Repeatable.", metavar="ID=REASON"),
+    ] = None,
+    place: PlaceOptions,
+) -> None:
+    """Check every property of a formulation: print a table, draw what fails.
+
+    \bExit status
+      0  every promise is kept, and every property was judged
+      1  a promise is broken, a property could not be judged, or a plugin
+         does not load
+      2  the command line is wrong; one line says what is needed
+
+    \bExamples
+      contactverif verify vts-ppt --out vts-ppt.nc --out vts-ppt.html
+      contactverif verify nts -p 'patch.*' --seed 7
+      contactverif verify mine --mesh punch.msh --slave punch --master base
+      contactverif verify vts-me --scene c -p 'patch.*'
+    """
+    from contactverif.cli.progress import Bar
+    from contactverif.cli.run_tables import RunTable, how_to_keep, show, summary
+    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.run.runner import run
+
+    names = _chosen_names(names or [], all_)
+    files = OutputFiles.check(out or [], (REPORT, PAGE))
+    folder = PictureFolder.make(pictures)
+    scene = place.make_scene()
+    interface = place.read_interface()
+    questions = load_properties(properties or ["*"])
+    subjects = [load_formulation(name) for name in names]
+    reasons = dict(_known_failure(text) for text in known or [])
+    with Bar() as bar:
+        result = run(
+            subjects,
+            questions,
+            profile=sampling.profile or "dev",
+            examples=sampling.examples,
+            seed=sampling.seed,
+            interface=interface,
+            scene=scene,
+            known=reasons,
+            progress=bar.show_progress,
+        )
+    write_results(result, files)  # before anything is shown, so that nothing that was judged is lost
+    show(RunTable(result))
+    _show_counterexamples(result, subjects, files, folder)
+    files.announce()
+    if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
+        show(advice)
+    show(summary(result))
+    raise typer.Exit(0 if result.passed else 1)
+
+
+def write_results(result: Run, files: OutputFiles) -> None:
+    """Write the report and the page that the user wants."""
+    from contactverif_reports.netcdf.write import write
+
+    report, page = files.paths.get(REPORT), files.paths.get(PAGE)
+    if report is not None:
+        write(result, report)
+    if page is None:
+        return
+    import tempfile
+
+    from contactverif_reports.html.pages import write_page
+    from contactverif_reports.html.report_page import report_page
+    from contactverif_reports.netcdf.stored import read_report
+
+    with tempfile.TemporaryDirectory() as folder:
+        if report is None:
+            report = Path(folder) / "FILE.nc"
+            write(result, report)
+        write_page(page, report_page(read_report(report)), "--out")
+
+
+def _show_counterexamples(
+    result: Run, subjects: Sequence[Subject | NotLoaded], files: OutputFiles, folder: PictureFolder | None
+) -> None:
+    """Print the smallest mesh of each failure, and draw it if the user named a folder."""
+    from contactverif.cli.run_tables import counterexample, show_as_it_is
+
+    for row in result.rows:
+        text = counterexample(row, files.names.get(REPORT))
+        if text:
+            show_as_it_is(text)
+            if folder is not None:
+                _draw_counterexample(row, subjects, folder)
+
+
+def _draw_counterexample(row: Row, subjects: Sequence[Subject | NotLoaded], folder: PictureFolder) -> None:
+    from contactverif.cli.case_pictures import draw_outcome
+    from contactverif.contract.subject import Subject
+    from contactverif_reports.netcdf.schema import case_id
+
+    subject = next(item for item in subjects if isinstance(item, Subject) and item.name == row.formulation)
+    outcome = row.shrunk or row.witness
+    assert outcome is not None
+    name = f"{case_id(row.formulation, row.question.id)}.png"
+    draw_outcome(subject, row.question, outcome, folder.path / name, argument="--pictures")
+    typer.echo(f"    picture: {folder.name / name}")
+
+
+def _chosen_names(names: list[str], every: bool) -> list[str]:
+    """Return the formulations that the user named, or all of them."""
+    from contactverif.run.registry import formulation_names, standalone_names
+
+    if every and names:
+        raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")
+    if every:
+        return list(standalone_names())
+    if not names:
+        raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
+    return names
+
+
+def _known_failure(text: str) -> tuple[str, str]:
+    """Return the property and the reason of ID=REASON."""
+    property_id, equals, reason = text.partition("=")
+    if not (property_id and equals and reason):
+        raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
+    return property_id, reason
