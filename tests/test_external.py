@@ -80,7 +80,7 @@ def test_it_is_found(site: Path, ask: Ask) -> None:
 
 
 def test_its_report_says_what_is_not_provided(site: Path, ask: Ask, tmp_path: Path) -> None:
-    answer = ask("contactverif", "verify", "mine", "--profile", "ci", "--examples", QUICK, "--report", "mine.nc")
+    answer = ask("contactverif", "verify", "mine", "--profile", "ci", "--examples", QUICK, "--out", "mine.nc")
     assert answer.returncode == 0, answer.stdout + answer.stderr
     with xr.open_datatree(tmp_path / "mine.nc") as report:
         summary = report["summary"].to_dataset().sel(formulation="mine")
@@ -133,7 +133,7 @@ def test_an_exact_tangent_is_judged(site: Path, ask: Ask, tmp_path: Path) -> Non
     assert ("tangent.directional", "passes", "pass") in rows(blocks("text", section(title))[0])
     answer = ask(
         *("contactverif", "verify", "mine-exact", "-p", "tangent.*", "--profile", "ci", "--examples", QUICK),
-        *("--report", "exact.nc"),
+        *("--out", "exact.nc"),
     )
     assert answer.returncode == 0, answer.stdout + answer.stderr
     with xr.open_datatree(tmp_path / "exact.nc") as report:

@@ -65,7 +65,7 @@ def test_the_first_command_is_made_of_what_is_there() -> None:
     assert install == [".venv/bin/pip", "install", "."]
     assert verify[:2] == [".venv/bin/contactverif", "verify"]
     assert verify[2] in formulation_names()
-    assert verify[3] == "--report"
+    assert verify[3] == "--out"
 
 
 @pytest.mark.parametrize("title", ["## Run", "## What a counterexample looks like"])
@@ -97,7 +97,7 @@ def test_the_comparison_is_what_the_command_prints(
     (shown,) = blocks("text", section(title))
     monkeypatch.setenv("COLUMNS", "140")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", [*shlex.split(command), "--examples", "5", "--html", "c.html"])
+    monkeypatch.setattr("sys.argv", [*shlex.split(command), "--examples", "5", "--out", "c.html"])
     with pytest.raises(SystemExit) as ended:
         cli.main()
     printed = capsys.readouterr().out

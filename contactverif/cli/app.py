@@ -11,6 +11,7 @@ import io
 import os
 import signal
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -32,7 +33,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-COMMANDS = {
+COMMANDS: dict[str, Callable[..., None]] = {
     "list": list_installed,
     "verify": verify,
     "compare": compare,
@@ -77,7 +78,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # A terminal that has no ≤ shows a question mark.
             stream.reconfigure(errors="replace")
     try:
-        status = app(standalone_mode=False)
+        status = app(prog_name="contactverif", standalone_mode=False)
         sys.stdout.flush()
     except Exception as error:
         status = _exit_status(error)

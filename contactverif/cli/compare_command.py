@@ -23,9 +23,7 @@ def compare(
     ] = None,
     against: Annotated[
         list[str] | None,
-        typer.Option(
-            help="The one formulation to compare with.", metavar="NAME", autocompletion=complete_formulation
-        ),
+        typer.Option(help="The one formulation to compare with.", metavar="NAME", autocompletion=complete_formulation),
     ] = None,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,

@@ -10,7 +10,7 @@ from contactverif.cli.comparison_tables import DRAWN, ChangesTable, outcome_of, 
 from contactverif.cli.output_files import PAGE, OutputFiles
 from contactverif.cli.run_tables import show, show_as_it_is
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown
+from contactverif.contract.names import unknown_name_error
 from contactverif_reports.compare.regression import Changes
 from contactverif_reports.html.comparison_page import changes_page
 from contactverif_reports.html.pages import write_page
@@ -71,7 +71,7 @@ def _select(report: StoredCells, globs: Sequence[str], both: Sequence[StoredCell
     every = dict.fromkeys(id_ for one in both for id_ in one.properties)
     for glob in globs:
         if not any(fnmatchcase(id_, glob) for id_ in every):
-            raise unknown("--property", glob, every)
+            raise unknown_name_error("--property", glob, every)
     return report.only([id_ for id_ in every if not globs or any(fnmatchcase(id_, glob) for glob in globs)])
 
 

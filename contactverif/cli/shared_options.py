@@ -77,12 +77,8 @@ class PlaceOptions:
         Path | None,
         typer.Option(help="Check on the interface of this mesh file, with random states.", metavar="FILE"),
     ] = None
-    slave: Annotated[
-        str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")
-    ] = None
-    master: Annotated[
-        str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")
-    ] = None
+    slave: Annotated[str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")] = None
+    master: Annotated[str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")] = None
     flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's lines.")] = False
     scene: Annotated[
         str | None, typer.Option(help="Check on this scene: c or c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")

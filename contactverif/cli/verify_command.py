@@ -27,9 +27,7 @@ def verify(
             autocompletion=complete_formulation,
         ),
     ] = None,
-    all_: Annotated[
-        bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")
-    ] = False,
+    all_: Annotated[bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")] = False,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
     out: Annotated[

@@ -25,7 +25,7 @@ def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument
     return target
 
 
-def check_writable(path: str | os.PathLike[str], argument: str = "--report", form: str = "FILE.nc") -> None:
+def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: str = "FILE.nc") -> None:
     """Says before something takes long what would stop its file from being written after it.
 
     Parameters

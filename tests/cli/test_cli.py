@@ -63,7 +63,7 @@ def rows(out: str) -> dict[tuple[str, str], list[str]]:
 def nts_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of NTS failing the patch test."""
     path = tmp_path_factory.mktemp("reports") / "nts.nc"
-    arguments = ["verify", "nts", "-p", "patch.flat.transmission", "--seed", "1", "--examples", "20", "--report", path]
+    arguments = ["verify", "nts", "-p", "patch.flat.transmission", "--seed", "1", "--examples", "20", "--out", path]
     subprocess.run(command(*arguments), env=environment(), capture_output=True, check=True)
     return path
 
@@ -104,9 +104,11 @@ MISTAKES = [
     (["verify", "nts", "--seed", "-1"], r"--seed: found -1; needed a whole number ≥ 0"),
     (["verify", "nts", "--exampels", "5"], r"No such option: --exampels.*--examples.* \(see .*--help\)"),
     (["verfy"], r"No such command 'verfy'.* \(see contactverif --help\)"),
-    (["verify", "nts", "--report", ""], r"--report: found .*; needed .*"),
-    (["verify", "nts", "--report", "no/such/folder/nts.nc"], r"--report: .* is no folder; needed a folder that exists"),
-    (["verify", "nts", "--report", "."], r"--report: found .*, a folder; needed the name of a file, FILE.nc"),
+    (["verify", "nts", "--out", ""], r"--out: found '.'; needed a name that ends in .nc or .html"),
+    (["verify", "nts", "--out", "no/such/folder/nts.nc"], r"--out: .* is no folder; needed a folder that exists"),
+    (["verify", "nts", "--out", "nts.txt"], r"--out: found 'nts.txt'; needed a name that ends in .nc or .html"),
+    (["verify", "nts", "--out", "a.nc", "--out", "b.NC"], r"--out: found a.nc and b.NC; needed one file .* .nc"),
+    (["verify", "nts", "--report", "nts.nc"], r"--report: found an option of an earlier version; needed --out.*"),
     (["verify", "nts", "--pictures", str(PUNCH)], r"--pictures: found .*punch.msh, which is no folder; needed .*"),
     (["verify", "nts", "--mesh", "no.msh", "--slave", "a", "--master", "b"], r"--mesh: found 'no.msh', .*; needed .*"),
     (["verify", "nts", "--mesh", str(PUNCH), "--slave", "punch"], r"--master: found nothing; needed --master TAG, .*"),
@@ -140,8 +142,8 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
     [
         (["--case", "nts.patch.flat"], rf"--case: found 'nts.patch.flat'; needed an id like {CASE}"),
         (["--case", CASE, "--formulation", "vts-pt"], "formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
-        (["--case", CASE, "--picture", "nts.xyz"], "--picture: found 'nts.xyz'; needed a .* .png or .svg"),
-        (["--case", CASE, "--picture", "no/such/a.png"], "--picture: found .*No such file.*; needed a file .*"),
+        (["--case", CASE, "--out", "nts.xyz"], "--out: found 'nts.xyz'; needed a .* .png or .svg"),
+        (["--case", CASE, "--out", "no/such/a.png"], "--out: found .* is no folder; needed a folder that exists"),
     ],
 )  # fmt: skip
 def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: Sequence[str], said: str) -> None:
@@ -151,7 +153,7 @@ def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: 
 
 
 def test_a_mistake_in_a_process_of_its_own_has_no_traceback() -> None:
-    for arguments in (["verify", "nope"], ["verify", "nts", "--report", "/no/such/folder/r.nc"], ["replay", "no.nc"]):
+    for arguments in (["verify", "nope"], ["verify", "nts", "--out", "/no/such/folder/r.nc"], ["replay", "no.nc"]):
         done = subprocess.run(command(*arguments), env=environment(), capture_output=True, text=True, check=False)
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr.startswith("contactverif: ")
@@ -257,7 +259,7 @@ def test_a_plugin_that_does_not_load_is_a_row_and_the_others_run(ask: Ask) -> No
 @pytest.mark.usefixtures("strangers")
 def test_a_plugin_that_raises_or_returns_nan_is_an_outcome(ask: Ask, tmp_path: Path) -> None:
     report = tmp_path / "r.nc"
-    options = ("-p", "balance.force", "--examples", "3", "--seed", "1", "--report", report)
+    options = ("-p", "balance.force", "--examples", "3", "--seed", "1", "--out", report)
     answer = ask("verify", "raising", "nan", "nts", *options)
     assert answer.status == 1
     assert rows(answer.out)["raising", "balance.force"][1] == "crashed"
@@ -273,7 +275,7 @@ def test_a_plugin_that_raises_or_returns_nan_is_an_outcome(ask: Ask, tmp_path: P
 @pytest.mark.usefixtures("strangers")
 def test_a_case_is_replayed_with_what_cannot_be_asked(ask: Ask, tmp_path: Path) -> None:
     report = tmp_path / "r.nc"
-    options = ("-p", "tangent.*", "--examples", "30", "--seed", "1", "--report", report)
+    options = ("-p", "tangent.*", "--examples", "30", "--seed", "1", "--out", report)
     assert ask("verify", "vts-ppt-basic", *options).status == 0
     answer = ask("replay", report, "--case", "vts-ppt-basic.tangent.directional", "--formulation", "nan")
     assert answer.status == 0
@@ -370,7 +372,7 @@ def test_lists_fit_the_terminal_and_lose_nothing(ask: Ask, columns: int) -> None
 def test_a_line_to_be_copied_is_never_folded(ask: Ask, tmp_path: Path) -> None:
     folder = tmp_path / "a folder with a name that is far too long for a line of a narrow terminal, as names are"
     folder.mkdir()
-    options = ("-p", "patch.flat.transmission", "--examples", "5", "--seed", "1", "--report", folder / "r.nc")
+    options = ("-p", "patch.flat.transmission", "--examples", "5", "--seed", "1", "--out", folder / "r.nc")
     answer = ask("verify", "nts", *options, columns=80)
     assert f"    contactverif replay '{folder / 'r.nc'}' --case {CASE}\n" in answer.out
 
@@ -434,7 +436,7 @@ def test_replay_gives_the_same_verdict_and_the_drawing(ask: Ask, nts_report: Pat
 @pytest.mark.parametrize(("suffix", "begins"), [("png", PNG), ("svg", SVG)])
 def test_replay_draws_a_picture(ask: Ask, nts_report: Path, tmp_path: Path, suffix: str, begins: bytes) -> None:
     picture = tmp_path / f"nts.{suffix}"
-    answer = ask("replay", nts_report, "--case", CASE, "--picture", picture)
+    answer = ask("replay", nts_report, "--case", CASE, "--out", picture)
     assert answer.status == 1
     assert answer.out.endswith(f"picture: {picture}\n")
     assert picture.read_bytes().startswith(begins)
@@ -462,7 +464,7 @@ def test_the_same_seed_gives_the_same_report(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         reports[name] = folder / "r.nc"
-        arguments = ["verify", "nts", "-p", "p*", "--seed", seed, "--examples", "8", "--report", reports[name]]
+        arguments = ["verify", "nts", "-p", "p*", "--seed", seed, "--examples", "8", "--out", reports[name]]
         variables = environment(PYTHONHASHSEED=hashes)
         subprocess.run(command(*arguments), cwd=folder, env=variables, capture_output=True, check=True)
     assert same_data(reports["a"], reports["b"]) == []
@@ -498,11 +500,11 @@ def slow_plugin(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def running(slow_plugin: Path, tmp_path: Path, nts_report: Path) -> Iterator[subprocess.Popen[str]]:
-    """`verify slow --report r.nc` over a report that is there already, in the middle of its first case."""
+    """`verify slow --out r.nc` over a report that is there already, in the middle of its first case."""
     folder = tmp_path / "here"
     folder.mkdir()
     shutil.copy(nts_report, folder / "r.nc")
-    arguments = command("verify", "slow", "-p", "purity", "--examples", "3", "--seed", "1", "--report", "r.nc")
+    arguments = command("verify", "slow", "-p", "purity", "--examples", "3", "--seed", "1", "--out", "r.nc")
     variables = environment(PYTHONPATH=str(slow_plugin))
     with subprocess.Popen(
         arguments, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -562,7 +564,7 @@ def test_help_teaches_and_fits_the_terminal(ask: Ask, page: list[str]) -> None:
 
 @pytest.mark.parametrize(
     "line", [line.strip() for name in ("verify", "replay", "draw", "scenes")
-             for line in (getattr(cli, name).__doc__ or "").splitlines() if line.strip().startswith("contactverif ")],
+             for line in (cli.COMMANDS[name].__doc__ or "").splitlines() if line.strip().startswith("contactverif ")],
 )  # fmt: skip
 def test_the_examples_of_the_help_parse(ask: Ask, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each gets as far as to a file or a formulation that is not there, or runs."""

@@ -100,7 +100,7 @@ def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
 
 def test_all_that_is_asked_for_is_written(ask: Ask, tmp_path: Path) -> None:
     report, html, pictures = tmp_path / "r.nc", tmp_path / "r.html", tmp_path / "new" / "pictures"
-    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--report", report, "--html", html, "--pictures", pictures)
+    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--out", report, "--out", html, "--pictures", pictures)
     assert answer.status == 0
     write(found(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
     assert same_data(report, tmp_path / "v.nc") == []  # as verify writes it
@@ -151,7 +151,7 @@ def test_equal_reports_have_no_regression(ask: Ask, reports: Path) -> None:
 
 def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: Path) -> None:
     html = tmp_path / "r.html"
-    answer = ask(reports / "old.nc", reports / "worse.nc", "--html", html)
+    answer = ask(reports / "old.nc", reports / "worse.nc", "--out", html)
     assert answer.status == 1
     assert "pass → fail" in answer.out
     told = " ".join(answer.out.split())  # it is long, and wrapped
@@ -211,18 +211,18 @@ MISTAKES = [
     (["nts", "--against", "vts-ppt", "-p", "pach.*"], r"property: found 'pach.\*'; needed .*"),
     (["nts", "--against", "vts-ppt", "--examples", "0"], r"--examples: found 0; needed at least 1"),
     (["nts", "--against", "vts-ppt", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nightly"),
-    (["nts", "--against", "vts-ppt", "--report", "no/r.nc"], r"--report: .* is no folder; needed a folder that exists"),
-    (["nts", "--against", "vts-ppt", "--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
-    (["nts", "--against", "vts-ppt", "--html", "r.pdf"], r"--html: found 'r.pdf'; needed a name that ends in .html .*"),
+    (["nts", "--against", "vts-ppt", "--out", "no/r.nc"], r"--out: .* is no folder; needed a folder that exists"),
+    (["nts", "--against", "vts-ppt", "--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
+    (["nts", "--against", "vts-ppt", "--out", "r.pdf"], r"--out: found 'r.pdf'; needed .* .nc or .html"),
     (["nts", "--against", "vts-ppt", "--pictures", str(PUNCH)], r"--pictures: found .* needed a folder that can be .*"),
     (["nts", "--against", "vts-ppt", "--flip"], r"--mesh: found none, but --flip; needed --mesh FILE, .*"),
     (["a.nc"], r"NAME: found 1 report; needed two, OLD.nc NEW.nc"),
     (["a.nc", "b.nc", "c.nc"], r"NAME: found 3 reports; needed two, OLD.nc NEW.nc"),
     (["a.nc", "nts"], r"NAME: found nts and the report a.nc; needed formulations alone, or two reports"),
     ([str(PUNCH), "nts"], r"NAME: found nts and the report .*punch.msh; needed formulations alone, or two reports"),
-    (["a.nc", "b.nc", "--against", "nts"], r"--against: found two reports beside it; needed formulations, which .*"),
-    (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations, which .*"),
-    (["a.nc", "b.nc", "--report", "r.nc"], r"--report: found two reports beside it; needed formulations, which .*"),
+    (["a.nc", "b.nc", "--against", "nts"], r"--against: found two reports beside it; needed formulations: a report .*"),
+    (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations: a report .*"),
+    (["a.nc", "b.nc", "--out", "r.nc"], r"--out: found 'r.nc'; needed a name that ends in .html"),
     (["a.nc", "b.nc"], r"OLD.nc: found a.nc, which does not exist; needed a report that .*"),
     ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file .*; needed a report \(netCDF-4\)"),
 ]  # fmt: skip
@@ -248,7 +248,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
         ("nts.nc", [], r"NEW.nc: found no formulation that OLD.nc has too \(vts-ppt and nts\); needed two reports .*"),
         ("purity.nc", [], r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
         ("old.nc", ["-p", "purity"], r"--property: found 'purity'; needed one of patch.flat.transmission"),
-        ("old.nc", ["--html", "no/r.html"], r"--html: .* is no folder; needed a folder that exists"),
+        ("old.nc", ["--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
         ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
         ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0; needed schema 1"),
         (

@@ -19,7 +19,7 @@ def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
     """A report of NTS, which fails the patch test as it says, and what `verify` printed."""
     path = tmp_path / "nts.nc"
     asked = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3")
-    return path, ask("verify", "nts", "vts-ppt", *asked, "--report", path)
+    return path, ask("verify", "nts", "vts-ppt", *asked, "--out", path)
 
 
 def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
@@ -35,7 +35,7 @@ def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> 
 def test_a_page_of_the_report(ask: Ask, run: tuple[Path, Answer], tmp_path: Path) -> None:
     path, _ = run
     page = tmp_path / "nts.html"
-    answer = ask("report", path, "--html", page)
+    answer = ask("report", path, "--out", page)
     assert (answer.status, answer.out, answer.err) == (0, f"page: {page}\n", "")
     text = page.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
@@ -43,7 +43,7 @@ def test_a_page_of_the_report(ask: Ask, run: tuple[Path, Answer], tmp_path: Path
     assert f"contactverif replay {path} --case nts.patch.flat.transmission" in text
     assert not re.search(r'(?:src|href)="(?!#)', text)
     first = page.read_bytes()
-    ask("report", path, "--html", page)
+    ask("report", path, "--out", page)
     assert page.read_bytes() == first
 
 
@@ -58,7 +58,7 @@ def test_a_report_with_failures_is_shown_all_the_same(ask: Ask, tmp_path: Path) 
     answer = ask("report", path)
     assert answer.status == 0
     assert "patch.flat.transmission" in answer.out
-    assert ask("report", path, "--html", tmp_path / "wrong.html").status == 0
+    assert ask("report", path, "--out", tmp_path / "wrong.html").status == 0
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_a_report_with_failures_is_shown_all_the_same(ask: Ask, tmp_path: Path) 
         ("nowhere.nc", None, "contactverif: REPORT: found nowhere.nc, which does not exist; needed a report that"),
         (".", None, "contactverif: REPORT: found ., which is a folder; needed a report that"),
         ("words.nc", None, "contactverif: REPORT: found words.nc, which is no netCDF file"),
-        ("words.nc", "page.pdf", "contactverif: --html: found 'page.pdf'; needed a name that ends in .html or .htm"),
-        ("words.nc", "none/page.html", "contactverif: --html: found none/page.html in "),
+        ("words.nc", "page.pdf", "contactverif: --out: found 'page.pdf'; needed a name that ends in .html"),
+        ("words.nc", "none/page.html", "contactverif: --out: found none/page.html in "),
         ("words.nc", "page.html", "contactverif: REPORT: found words.nc, which is no netCDF file"),
     ],
 )
@@ -77,7 +77,7 @@ def test_what_cannot_be_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("words.nc").write_text("no report")
-    answer = ask("report", report, *(["--html", html] if html else []))
+    answer = ask("report", report, *(["--out", html] if html else []))
     assert (answer.status, answer.out) == (2, "")
     assert answer.err.startswith(line)
     assert answer.err.count("\n") == 1

@@ -32,7 +32,7 @@ def test_a_full_disk_is_one_line() -> None:
     with open("/dev/full", "w") as full:
         answer = asked("list", stdout=full)
     assert answer.returncode == 2
-    assert answer.stderr == "contactverif: what was found cannot be written: No space left on device\n"
+    assert answer.stderr == "contactverif: the output cannot be written: No space left on device\n"
 
 
 def test_who_has_seen_enough_may_close_the_pipe() -> None:
@@ -49,11 +49,11 @@ def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
     """As in a callback of the garbage collector, where nothing can be raised."""
     before = signal.getsignal(signal.SIGINT)
     with Bar() as bar:
-        bar.at("one", 0, 3)
+        bar.update("one", 0, 3)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
-            bar.at("two", 1, 3)
+            bar.update("two", 1, 3)
     assert signal.getsignal(signal.SIGINT) is before
 
 

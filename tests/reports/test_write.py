@@ -267,7 +267,7 @@ def test_what_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
     }.items():
         with pytest.raises(MisuseError, match=words) as error:
             check_writable(path)
-        assert error.value.argument == "--report"
+        assert error.value.argument == "--out"
     for path_ in ("", "folder/"):
         with pytest.raises(MisuseError, match="names no file"):
             check_writable(path_)

@@ -51,7 +51,7 @@ def render(template_name: str, *, package: str = "contactverif_reports.html", **
     return _with_distinct_ids(_environment(package).get_template(template_name).render(context))
 
 
-def check_page(path: str | os.PathLike[str], argument: str = "--html") -> None:
+def check_page(path: str | os.PathLike[str], argument: str = "--out") -> None:
     """Says before something takes long what would stop the page from being written after it.
 
     Raises
@@ -63,7 +63,7 @@ def check_page(path: str | os.PathLike[str], argument: str = "--html") -> None:
     check_writable(path, argument, "FILE.html")
 
 
-def write_page(path: str | os.PathLike[str], html: str, argument: str = "--html") -> None:
+def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out") -> None:
     """Writes a page, whole or not at all, as UTF-8.
 
     Parameters

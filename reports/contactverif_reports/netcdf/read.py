@@ -118,7 +118,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
     found = os.fspath(path)
     if not Path(path).is_file():
         what = "which is a folder" if Path(path).is_dir() else "which does not exist"
-        raise MisuseError(_ARGUMENT, f"{found}, {what}", "a report that `contactverif verify --report` wrote")
+        raise MisuseError(_ARGUMENT, f"{found}, {what}", "a report that `contactverif verify --out FILE.nc` wrote")
     try:
         report = netCDF4.Dataset(Path(path).resolve())
     except (OSError, RuntimeError) as error:
@@ -139,7 +139,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
 
 def _check_schema(report: Any, path: str) -> None:
     if str(getattr(report, "title", "")) != schema.TITLE or not hasattr(report, "schema"):
-        needed = "a report that `contactverif verify --report` wrote"
+        needed = "a report that `contactverif verify --out FILE.nc` wrote"
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", needed)
     if str(report.schema) != schema.SCHEMA:
         raise MisuseError(_ARGUMENT, f"{path} of schema {report.schema}", f"schema {schema.SCHEMA}")
