@@ -78,8 +78,8 @@ def compare(
     from contactverif.cli.formulation_comparison import compare_formulations, load_contest
 
     contest = load_contest(names or [], reference, properties or ["*"])
-    kept = compare_formulations(contest, sampling, interface, scene, files, folder)
-    raise typer.Exit(0 if kept else 1)
+    promises_kept = compare_formulations(contest, sampling, interface, scene, files, folder)
+    raise typer.Exit(0 if promises_kept else 1)
 
 
 def _only_one(option: str, values: Sequence[str]) -> str | None:
@@ -118,7 +118,7 @@ def _is_report(name: str) -> bool:
 def _check_no_run_options(
     reference: str | None, sampling: SamplingOptions, place: PlaceOptions, pictures: Path | None
 ) -> None:
-    """Refuse what two reports cannot be asked any more."""
+    """Refuse the options of a run beside two reports, which have been judged already."""
     values: dict[str, Any] = {
         "against": reference,
         "profile": sampling.profile,

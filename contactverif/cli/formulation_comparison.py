@@ -1,4 +1,4 @@
-"""What `compare` does with formulations: one run on the same cases, then tables, meshes, a page and pictures."""
+"""The comparison of formulations: one run on the same cases, then tables, meshes, a page and pictures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from contactverif_reports.netcdf.write import write
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contest:
-    """Who is compared with whom, and by which properties."""
+    """A reference, its candidates and the properties by which they are compared."""
 
     reference: Subject
     candidates: Sequence[Subject | NotLoaded]

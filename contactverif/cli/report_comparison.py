@@ -1,4 +1,4 @@
-"""What `compare` does with an old report and a new one: tables of what changed, and the meshes of what got worse."""
+"""The comparison of an old report with a new one: tables of the changes, and the meshes of what got worse."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _smallest_failing(changes: Changes) -> dict[str, StoredCase]:
 
 def _select(report: StoredCells, globs: Sequence[str], both: Sequence[StoredCells]) -> StoredCells:
     """Return the report without the properties that no pattern names."""
-    every = dict.fromkeys(id_ for one in both for id_ in one.properties)
+    every = dict.fromkeys(id_ for report_ in both for id_ in report_.properties)
     for glob in globs:
         if not any(fnmatchcase(id_, glob) for id_ in every):
             raise unknown_name_error("--property", glob, every)

@@ -1,4 +1,4 @@
-"""What the command `draw` does: it solves a scene, or takes a stored case, and writes pictures and a small table."""
+"""The pictures of `draw`: a scene is solved, or a stored case judged again, and drawn; a small table goes with it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from contactverif_reports.draw import as_text
 from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.netcdf.read import StoredCase, read_case
 
-_NARROW = 80  # The largest number of columns of a remark.
+_WIDEST = 80  # The largest number of columns of a remark.
 
 
 def draw_scene_or_case(
@@ -119,8 +119,8 @@ def _draw_stored(stored: StoredCase, names: Sequence[str], files: OutputFiles) -
 def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles) -> bool:
     """Solve a scene with each formulation and write the files; return whether all could be used."""
     if SOLVED_SCENE in files.names and len(names) > 1:
-        found = f"{files.names[SOLVED_SCENE]} for {len(names)} formulations"
-        raise MisuseError("--out", found, "one --formulation: a .vtu file holds one solution")
+        file_for_many = f"{files.names[SOLVED_SCENE]} for {len(names)} formulations"
+        raise MisuseError("--out", file_for_many, "one --formulation: a .vtu file holds one solution")
     scene = solve_scene(case, [load_formulation(name) for name in names])
     if scene.solutions:
         _write_files(scene, title, files)
@@ -153,4 +153,4 @@ def _remarks(scene: SolvedScene) -> list[str]:
     for solution in scene.solutions:
         remarks += [(solution.formulation, text) for text in (solution.advice, solution.remark) if text]
     remarks += scene.failures.items()
-    return ["\n".join(textwrap.wrap(f"{name}: {text}", _NARROW, subsequent_indent="  ")) for name, text in remarks]
+    return ["\n".join(textwrap.wrap(f"{name}: {text}", _WIDEST, subsequent_indent="  ")) for name, text in remarks]

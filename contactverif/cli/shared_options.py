@@ -62,7 +62,7 @@ CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the 
 
 @dataclass(frozen=True, slots=True)
 class SamplingOptions:
-    """How many random cases a run draws, and with which seed; None where the user leaves it to the profile."""
+    """Number and seed of the random cases of a run; None leaves them to the profile."""
 
     examples: Annotated[int | None, typer.Option(help="Number of random cases of each property.", metavar="N")] = None
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", metavar="N")] = None
@@ -71,7 +71,7 @@ class SamplingOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlaceOptions:
-    """Where the properties are checked, if not on random interfaces: on a mesh of the user or on a scene."""
+    """The mesh of the user or the scene on which the properties are checked, instead of random interfaces."""
 
     mesh: Annotated[
         Path | None,

@@ -1,9 +1,11 @@
-"""All that drives hypothesis: the planned cases of a property, and the shrinking of one that failed.
+"""The use of hypothesis: it draws the planned cases of a property, and shrinks a case that fails.
 
-Hypothesis sees a formulation only while it shrinks. The planned cases are drawn first, in full, by a function that
-never fails; so every formulation of a run is judged on the same cases, and a failure ends nothing early. The same seed
-gives the same cases whoever asks, from whichever folder, with whatever else imported: every setting is spelled out
-here (profiles of a user's own tests would leak in otherwise), nothing is stored, and see `_reproducible`.
+The planned cases are drawn first, all of them, by a function that never fails. So every formulation of a run is judged
+on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
+
+Rule: the same seed gives the same cases, in pytest and on the command line, from any folder and with any other modules
+imported. Therefore every setting is spelled out here (or the settings of a user's own tests would leak in), nothing is
+stored, and `_reproducible` takes away what depends on the imported modules.
 """
 
 from __future__ import annotations
@@ -23,19 +25,20 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 
-SHRINK_CALLS = 2000  # judgements spent on one counterexample; hypothesis itself stops after 500 shrinks or 300 s
+# The largest number of judgements for one counterexample. Hypothesis itself stops after 500 shrinks or 300 s.
+SHRINK_CALLS = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedCases:
-    """The planned cases.
+    """The planned cases of a property.
 
     Attributes
     ----------
     cases : tuple[Case, ...]
-        In the order in which they were drawn.
+        The cases in the order in which they were drawn.
     exhausted : bool
-        There are no others, so fewer than asked are all there are.
+        Whether the strategy has no other cases, so that there may be fewer than planned.
     """
 
     cases: tuple[Case, ...]
@@ -45,10 +48,23 @@ class PlannedCases:
 def draw_cases(
     strategy: SearchStrategy[Case], *, seed: str, examples: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
-    """As many different cases as asked, or all there are.
+    """Draw different cases, or all cases if the strategy has fewer.
 
-    `progress` is told how many there are. The first is the simplest that the strategy makes; what the strategy
-    filters out is not counted.
+    Parameters
+    ----------
+    strategy : SearchStrategy[Case]
+        The strategy. A case that it filters out is not counted.
+    seed : str
+        The same seed gives the same cases.
+    examples : int
+        The number of cases.
+    progress : Callable[[int], None] | None
+        Called with the number of cases after each.
+
+    Returns
+    -------
+    PlannedCases
+        The cases; the first is the simplest that the strategy makes.
     """
     cases: list[Case] = []
     stopped: list[str] = []
@@ -61,11 +77,11 @@ def draw_cases(
         if progress is not None:
             progress(len(cases))
 
-    statistics: Any = collector  # hypothesis types it as holding None for ever
+    statistics: Any = collector  # Hypothesis declares it as None.
     with _reproducible(), statistics.with_value(lambda facts: stopped.append(facts.get("stopped-because", ""))):
         try:
             take()
-        except Unsatisfiable:  # no case came through the filters: nothing to judge, which the caller sees
+        except Unsatisfiable:  # The strategy filters out every case; the caller sees that there is nothing to judge.
             return PlannedCases((), exhausted=False)
     return PlannedCases(tuple(cases), exhausted=stopped == ["nothing left to do"])
 
@@ -79,51 +95,68 @@ def shrink(
     fails: Callable[[Case], bool],
     limit: int = SHRINK_CALLS,
 ) -> None:
-    """Ask `fails` about smaller and smaller cases; the last one of which it says True is the smallest found.
+    """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
 
-    The cases are drawn again as `draw_cases` drew them; those before number `first` are known not to fail and not
-    asked again. A formulation that answers differently each time ends this early. So does the limit, which counts
-    questions and not seconds, so that a slow machine finds the same case as a fast one.
+    A formulation that answers differently each time ends the search early.
+
+    Parameters
+    ----------
+    strategy : SearchStrategy[Case]
+        The strategy of the planned cases.
+    seed, examples : str or int
+        The arguments of `draw_cases`, so that the same cases are drawn again.
+    first : int
+        The number of the first case that fails. The cases before it are not judged again.
+    fails : Callable[[Case], bool]
+        The judgement of a case.
+    limit : int
+        The largest number of judgements. It counts calls and not seconds, so that a slow machine ends at the same case
+        as a fast one.
+
+    Raises
+    ------
+    Exception
+        If `fails` raises it.
     """
-    drawn = asked = 0
+    n_drawn = n_judged = 0
 
     @seeded(seed)
     @_settings(examples, Phase.generate, Phase.shrink)
     @given(strategy)
     def attempt(case: Case) -> None:
-        nonlocal drawn, asked
-        drawn += 1
-        if drawn <= first:
+        nonlocal n_drawn, n_judged
+        n_drawn += 1
+        if n_drawn <= first:
             return
-        asked += 1
-        if asked > limit:
-            raise _Enough
+        n_judged += 1
+        if n_judged > limit:
+            raise _LimitReached
         try:
             failed = fails(case)
         except Exception as error:
-            raise _Trouble(error) from None
+            raise _ForeignError(error) from None
         if failed:
             raise _Failed
 
     with _reproducible():
         try:
             attempt()
-        except _Trouble as trouble:
-            raise trouble.error from None
-        except (_Failed, _Enough, Flaky):
+        except _ForeignError as carrier:
+            raise carrier.error from None
+        except (_Failed, _LimitReached, Flaky):
             pass
 
 
 class _Failed(Exception):
-    """What hypothesis takes for the failure; it never leaves this file."""
+    """The exception that hypothesis takes for the failure. It never leaves this file."""
 
 
-class _Enough(BaseException):
-    """Ends the shrinking; no Exception, or hypothesis would take it for another failure."""
+class _LimitReached(BaseException):
+    """The end of the search. It is no Exception, because hypothesis would take that for another failure."""
 
 
-class _Trouble(BaseException):
-    """Carries an exception of our own out of hypothesis, which would run the case twice more and add its notes."""
+class _ForeignError(BaseException):
+    """A carrier for an exception of `fails`. Hypothesis itself would run the case twice more and add its notes."""
 
     def __init__(self, error: Exception) -> None:
         self.error = error
@@ -146,13 +179,13 @@ def _settings(examples: int, *phases: Phase) -> settings:
 
 @contextmanager
 def _reproducible() -> Iterator[None]:
-    """Keep hypothesis from drawing constants that it found in the source of loaded modules.
+    """Keep hypothesis from drawing constants that stand in the source of imported modules.
 
-    One integer in twenty is otherwise one of the literals of all modules outside site-packages that happen to be
-    imported, so that the same seed would mean other cases in pytest than on the command line, and other cases once a
-    user edits a file; and the literals are cached in a folder `.hypothesis` wherever one stands. Hypothesis 6.131 to
-    6.170 have no setting for it. Where a later one has no such function any more, nothing is done; the test of
-    determinism then tells.
+    Otherwise one integer in twenty is a literal of some imported module outside site-packages. Then the same seed would
+    mean other cases in pytest than on the command line, and other cases once a user edits a file; and hypothesis would
+    write the literals to a folder `.hypothesis` in the working folder. Hypothesis 6.131 to 6.170 have no setting for
+    it. If a later version lacks the function that is replaced here, nothing is replaced, and the test of determinism
+    shows whether that matters.
     """
     name = "_get_local_constants"
     original = getattr(providers, name, None)

@@ -1,4 +1,7 @@
-"""How much a run asks: `dev` while one works, `ci` the same every time, `nightly` twenty times as much."""
+"""Profiles: how many cases a run draws and with which seed, under one name.
+
+`dev` draws new cases in every run, `ci` the same cases every time, `nightly` twenty times as many.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,16 @@ from contactverif.contract.names import unknown_name_error
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """How much is asked.
+    """The size of a run.
 
     Attributes
     ----------
     name : str
-        On the command line.
+        The name on the command line.
     examples : int
-        Planned cases of a property.
+        The number of planned cases of each property.
     seed : int | None
-        Of all cases; None is a fresh one each run.
+        The seed of all cases; None means a fresh seed in every run.
     """
 
     name: str
@@ -29,13 +32,23 @@ class Profile:
 
     @property
     def derandomised(self) -> bool:
-        """Whether every run asks the same."""
+        """Return whether every run draws the same cases."""
         return self.seed is not None
 
     def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
-        """The profile with the caller's own numbers and a seed, which can be printed and given again.
+        """Return the profile with the numbers of the user and with a seed, which can be printed and used again.
 
-        Where neither the caller nor the profile names a seed, it is `fresh`, or a new one.
+        Parameters
+        ----------
+        examples, seed : int | None
+            The numbers of the user; None keeps those of the profile.
+        fresh : int | None
+            The seed if neither the user nor the profile names one; None draws a new one.
+
+        Returns
+        -------
+        Profile
+            A profile whose seed is a number.
 
         Raises
         ------
@@ -60,7 +73,13 @@ PROFILES = {
 
 
 def profile_named(name: str) -> Profile:
-    """One of `PROFILES`; a `MisuseError` that suggests the nearest if there is none."""
+    """Return the profile of that name.
+
+    Raises
+    ------
+    MisuseError
+        If there is none; the error suggests the nearest name.
+    """
     if name not in PROFILES:
         raise unknown_name_error("profile", name, PROFILES)
     return PROFILES[name]

@@ -1,4 +1,4 @@
-"""Where a run comes from: the root attributes of a report, all of them strings."""
+"""The origin of a run: versions, commit, machine, time and command, as text for the root of a report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,22 @@ PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba
 
 
 def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
-    """Versions, commit, machine, time and command, with what the run was asked for."""
+    """Return the versions, the commit, the machine, the time, the command and the size of a run.
+
+    Parameters
+    ----------
+    profile : str
+        The name of the profile.
+    examples : int
+        The number of planned cases of each property.
+    seed : int
+        The seed of all cases.
+
+    Returns
+    -------
+    dict[str, str]
+        {attribute of the report: value}.
+    """
     return {
         **{f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES},
         "python_version": platform.python_version(),
@@ -37,15 +52,15 @@ def _version(package: str) -> str:
 
 
 def _commit() -> str:
-    """The commit that was installed: as pip noted it, or that of the working copy of an editable install."""
+    """Return the installed commit: the one that pip recorded, or that of the working copy of an editable install."""
     try:
-        noted = json.loads(metadata.distribution("contactverif").read_text("direct_url.json") or "{}")
+        record = json.loads(metadata.distribution("contactverif").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):
         return "unknown"
-    if commit := noted.get("vcs_info", {}).get("commit_id"):
+    if commit := record.get("vcs_info", {}).get("commit_id"):
         return str(commit)
-    url = urlparse(noted.get("url", ""))
-    if url.scheme != "file" or not noted.get("dir_info", {}).get("editable"):
+    url = urlparse(record.get("url", ""))
+    if url.scheme != "file" or not record.get("dir_info", {}).get("editable"):
         return "unknown"
     describe = ["git", "-C", unquote(url.path), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
     try:

@@ -1,8 +1,10 @@
-"""Finds formulations and properties through entry points; loads one when it is asked for, never before.
+"""The registry: it finds formulations and properties through entry points, and loads each when it is needed.
 
 On the command line a formulation is a name with options, `vts-me:n=4`, or a wrapper around one,
-`two-pass/nts-ar:area=reference`. What the caller wrote wrong is a `MisuseError`; what the plugin did wrong is a
-`NotLoaded`, a row of the report, so that the others run.
+`two-pass/nts-ar:area=reference`.
+
+Rule: a mistake of the user is a `MisuseError`; a mistake of a plugin is a `NotLoaded`, which becomes a row of the
+report, so that the other plugins run.
 """
 
 from __future__ import annotations
@@ -27,51 +29,83 @@ FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
-_RESERVED = ("penalty", "inner")  # given by the harness, never as options
+_RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
+_NEEDED_VALUES = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
+_FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
 
 @dataclass(frozen=True, slots=True)
 class Wrapper:
-    """What is a formulation only around another one, `name/NAME`; `summary` is the first line that its factory says."""
+    """A formulation that works only around another one, `name/NAME`.
+
+    Attributes
+    ----------
+    name : str
+        The name of the entry point.
+    summary : str
+        The first line of the factory's docstring.
+    """
 
     name: str
     summary: str
 
 
 def formulation_names() -> tuple[str, ...]:
-    """The names of the installed formulations and wrappers, sorted; nothing is loaded."""
-    return tuple(_installed(FORMULATIONS))
+    """Return the names of the installed formulations and wrappers, sorted; nothing is loaded."""
+    return tuple(_entries_by_name(FORMULATIONS))
 
 
 def standalone_names() -> tuple[str, ...]:
-    """The names without those of wrappers, sorted; all are loaded, since their factories tell which is which."""
-    return tuple(name for name in formulation_names() if _wrapper(name) is None)
+    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which."""
+    return tuple(name for name in formulation_names() if _load_wrapper(name) is None)
 
 
 def property_ids() -> tuple[str, ...]:
-    """The ids of the installed properties, sorted; nothing is loaded."""
-    return tuple(_installed(PROPERTIES))
+    """Return the ids of the installed properties, sorted; nothing is loaded."""
+    return tuple(_entries_by_name(PROPERTIES))
 
 
 def load_formulation(text: str) -> Subject | NotLoaded:
-    """The formulation that the text names, with its options.
+    """Load the formulation that the text names, with its options.
+
+    Parameters
+    ----------
+    text : str
+        A name as on the command line, such as `vts-me:n=4`.
+
+    Returns
+    -------
+    Subject | NotLoaded
+        The formulation, or the reason why the plugin does not load.
 
     Raises
     ------
     MisuseError
         If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
-    make = _factory(text)
+    make = _load_factory(text)
     return make if isinstance(make, NotLoaded) else subject_of(text, make)
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
-    """A factory `make(*, penalty)` put on trial; a `NotLoaded` if it raises or makes no formulation.
+    """Call a factory `make(*, penalty)` once, and return its formulation with every answer checked.
+
+    Parameters
+    ----------
+    name : str
+        The name under which the formulation is shown.
+    make : Callable[..., Any]
+        The factory.
+
+    Returns
+    -------
+    Subject | NotLoaded
+        `NotLoaded` if the factory raises an error or makes no formulation.
 
     Raises
     ------
     MisuseError
-        If the factory raises one, which it does for the value of an option.
+        If the factory raises one, as it does for a wrong value of an option.
     """
     try:
         return Subject(name, make)
@@ -82,12 +116,22 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
 
 
 def load_formulations() -> tuple[Subject | Wrapper | NotLoaded, ...]:
-    """All installed formulations with their own choice of options, for a list; one that needs more is not loaded."""
-    return tuple(_by_its_name(name) for name in formulation_names())
+    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
+    return tuple(_load_with_defaults(name) for name in formulation_names())
 
 
 def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded, ...]:
-    """The properties whose id matches one of the patterns (all, if there are none), sorted by id.
+    """Load the properties whose id matches one of the patterns, sorted by id.
+
+    Parameters
+    ----------
+    globs : Sequence[str]
+        Patterns such as `patch.*`; none at all means all properties.
+
+    Returns
+    -------
+    tuple[Property | NotLoaded, ...]
+        The properties, or why one does not load.
 
     Raises
     ------
@@ -99,21 +143,21 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
         if not any(fnmatchcase(name, glob) for name in names):
             raise unknown_name_error("property", glob, names)
     chosen = [name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs)]
-    return tuple(_property(name) for name in chosen)
+    return tuple(_load_property(name) for name in chosen)
 
 
-def _installed(group: str) -> dict[str, list[EntryPoint]]:
-    """Entry points by name, sorted; more than one under a name where two of them disagree."""
-    found: dict[str, list[EntryPoint]] = {}
+def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
+    """Return the entry points by name, sorted. A name has several where distributions disagree about it."""
+    by_name: dict[str, list[EntryPoint]] = {}
     for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value)):
-        same_name = found.setdefault(entry.name, [])
-        if entry.value not in [other.value for other in same_name]:  # a distribution may be on the path twice
+        same_name = by_name.setdefault(entry.name, [])
+        if entry.value not in [other.value for other in same_name]:  # A distribution may be on the path twice.
             same_name.append(entry)
-    return found
+    return by_name
 
 
-def _loaded(name: str, entries: Sequence[EntryPoint]) -> Any:
-    """What the entry point refers to, or a NotLoaded."""
+def _load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
+    """Return the object that the entry point refers to, or a NotLoaded."""
     if len(entries) > 1:
         return NotLoaded(name, f"registered {len(entries)} times: {', '.join(map(_origin, entries))}")
     try:
@@ -128,29 +172,28 @@ def _origin(entry: EntryPoint) -> str:
     return f"{entry.value} of {entry.dist.name}" if entry.dist is not None else entry.value
 
 
-def _property(name: str) -> Property | NotLoaded:
-    found = _loaded(name, _installed(PROPERTIES)[name])
-    if isinstance(found, NotLoaded | Property) and getattr(found, "id", name) == name:
-        return found
-    what = f"the property {found.id!r}" if isinstance(found, Property) else f"a {type(found).__name__}"
-    return NotLoaded(
-        name, f"the entry point gives {what}; needed a contactverif.contract.property.Property with the id {name}"
-    )
+def _load_property(name: str) -> Property | NotLoaded:
+    loaded = _load_entry(name, _entries_by_name(PROPERTIES)[name])
+    if isinstance(loaded, NotLoaded | Property) and getattr(loaded, "id", name) == name:
+        return loaded
+    description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
+    needed = f"a contactverif.contract.property.Property with the id {name}"
+    return NotLoaded(name, f"the entry point gives {description}; needed {needed}")
 
 
-def _by_its_name(name: str) -> Subject | Wrapper | NotLoaded:
-    wrapper = _wrapper(name)
+def _load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
+    wrapper = _load_wrapper(name)
     if wrapper is not None:
         return wrapper
     try:
         return load_formulation(name)
-    except MisuseError as error:  # an option without a default
+    except MisuseError as error:  # The factory has an option without a default.
         return NotLoaded(name, str(error))
 
 
-def _wrapper(name: str) -> Wrapper | None:
-    """None where the name is that of a formulation, or of what does not load."""
-    make = _loaded(name, _installed(FORMULATIONS)[name])
+def _load_wrapper(name: str) -> Wrapper | None:
+    """Return the wrapper of that name; None if the name is that of a formulation or does not load."""
+    make = _load_entry(name, _entries_by_name(FORMULATIONS)[name])
     if not callable(make) or not _wraps(_parameters(make)):
         return None
     return Wrapper(name, (inspect.getdoc(make) or "").partition("\n")[0].rstrip("."))
@@ -160,14 +203,14 @@ def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
     return "inner" in parameters
 
 
-def _factory(text: str) -> Callable[..., Any] | NotLoaded:
-    """`make(*, penalty)` for the text, options and inner formulation filled in."""
+def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
+    """Return `make(*, penalty)` for the text, with its options and its inner formulation filled in."""
     outer, slash, inner_text = text.partition("/")
     name, options = parse_name("formulation", outer, _FORM)
-    installed = _installed(FORMULATIONS)
+    installed = _entries_by_name(FORMULATIONS)
     if name not in installed:
         raise unknown_name_error("formulation", name, installed)
-    make = _loaded(name, installed[name])
+    make = _load_entry(name, installed[name])
     if isinstance(make, NotLoaded):
         return NotLoaded(text, make.reason)
     if not callable(make):
@@ -179,62 +222,72 @@ def _factory(text: str) -> Callable[..., Any] | NotLoaded:
         raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
     if slash and not wraps:
         raise MisuseError("formulation", repr(text), f"a wrapper before the '/'; {name} wraps nothing")
-    if wraps:
-        inner = _factory(inner_text)
-        if not isinstance(inner, NotLoaded):
-            trial = subject_of(inner_text, inner)
-            inner = trial if isinstance(trial, NotLoaded) else inner
-        if isinstance(inner, NotLoaded):
-            return NotLoaded(text, f"{inner_text}: {inner.reason}")
-        options["inner"] = inner
-    return partial(make, **options)
+    if not wraps:
+        return partial(make, **options)
+    inner = _load_inner(inner_text)
+    if isinstance(inner, NotLoaded):
+        return NotLoaded(text, f"{inner_text}: {inner.reason}")
+    return partial(make, **options, inner=inner)
+
+
+def _load_inner(text: str) -> Callable[..., Any] | NotLoaded:
+    """Return the factory of the formulation behind the '/', after one trial."""
+    make = _load_factory(text)
+    if isinstance(make, NotLoaded):
+        return make
+    trial = subject_of(text, make)
+    return trial if isinstance(trial, NotLoaded) else make
 
 
 def _parameters(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
     try:
         return inspect.signature(make).parameters
-    except (TypeError, ValueError):  # written in C: it has to say itself what it does not like
+    except (TypeError, ValueError):  # A factory written in C has no signature and checks its options itself.
         return {}
 
 
 def _check_options(
     text: str, make: Callable[..., Any], parameters: Mapping[str, inspect.Parameter], options: Mapping[str, Any]
 ) -> None:
-    """What can be said about options without calling the factory: their names, and values against annotations."""
-    takes_any = not parameters or any(entry.kind is entry.VAR_KEYWORD for entry in parameters.values())
+    """Refuse unknown and missing options, and values that do not fit their annotation, without calling the factory."""
     known = {
         name: entry
         for name, entry in parameters.items()
         if name not in _RESERVED and entry.kind in (entry.KEYWORD_ONLY, entry.POSITIONAL_OR_KEYWORD)
     }
-    has = f"it has {', '.join(known)}" if known else "it has none"
+    names = f"it has {', '.join(known)}" if known else "it has none"
+    takes_any = not parameters or any(entry.kind is entry.VAR_KEYWORD for entry in parameters.values())
     for option, value in options.items():
         if option in _RESERVED:
-            raise MisuseError(f"option {option} of {text!r}", repr(value), f"nothing: the harness gives it; {has}")
-        if option not in known and not takes_any:
+            raise MisuseError(f"option {option} of {text!r}", repr(value), f"nothing: the harness sets it; {names}")
+        if option in known:
+            _check_value(text, make, option, value, names)
+        elif not takes_any:
             near = difflib.get_close_matches(option, known, n=1)
             nearest = f" (nearest: {near[0]})" if near else ""
-            raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {has}{nearest}")
-        needed = _refused(make, known.get(option), value)
-        if needed:
-            raise MisuseError(f"option {option} of {text!r}", repr(value), f"{needed}; {has}")
+            raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
     missing = [name for name, entry in known.items() if entry.default is entry.empty and name not in options]
     if missing:
-        raise MisuseError(f"options of {text!r}", f"no {missing[0]}", f"{missing[0]}=VALUE; {has}")
+        raise MisuseError(f"options of {text!r}", f"no {missing[0]}", f"{missing[0]}=VALUE; {names}")
 
 
-def _refused(make: Callable[..., Any], parameter: inspect.Parameter | None, value: Any) -> str:
-    """Empty, or what the annotation of the option wants instead of the value; silent where it cannot tell."""
-    if parameter is None:
-        return ""
+def _check_value(text: str, make: Callable[..., Any], option: str, value: Any, names: str) -> None:
+    """Refuse a value that does not fit the annotation of its option."""
+    needed = _needed_value(make, option, value)
+    if needed:
+        raise MisuseError(f"option {option} of {text!r}", repr(value), f"{needed}; {names}")
+
+
+def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:
+    """Return what the annotation of an option needs instead of the value; empty if the value may fit."""
     try:
-        wanted = typing.get_type_hints(make).get(parameter.name)
-    except Exception:  # a hint that cannot be evaluated is no reason to refuse anything
+        annotation = typing.get_type_hints(make).get(option)
+    except Exception:  # An annotation that cannot be evaluated is no reason to refuse a value.
         return ""
-    if typing.get_origin(wanted) is Literal:
-        choices = typing.get_args(wanted)
+    if typing.get_origin(annotation) is Literal:
+        choices = typing.get_args(annotation)
         return "" if value in choices else "one of " + ", ".join(map(str, choices))
-    fits = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
-    if wanted not in fits or (isinstance(value, fits[wanted]) and (wanted is bool or not isinstance(value, bool))):
+    if annotation not in _FITTING_TYPES:
         return ""
-    return {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}[wanted]
+    fits = isinstance(value, _FITTING_TYPES[annotation]) and (annotation is bool or not isinstance(value, bool))
+    return "" if fits else _NEEDED_VALUES[annotation]

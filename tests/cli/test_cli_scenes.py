@@ -59,19 +59,19 @@ def test_scenes_lists_all_with_drawings_and_fits(ask: Ask, columns: int) -> None
     assert max(map(len, answer.out.splitlines())) <= columns
     blocks = {block.splitlines()[0]: block for block in answer.out.split("\n\n")}
     assert list(blocks)[:-1] == list(SCENES)
-    for name, drawing_ in SCENES.items():
+    for name, entry in SCENES.items():
         words = " ".join(blocks[name].split())
-        source = f"Zavarise & De Lorenzis (2009), {drawing_.source}" if drawing_.source else "ours"
-        for said in (drawing_.summary, f"source: {source}", drawing_.chosen):
-            assert said in words
-        if not isinstance(drawing_, NamedBlocks):
+        source = f"Zavarise & De Lorenzis (2009), {entry.source}" if entry.source else "this project"
+        for words_of_scene in (entry.summary, f"source: {source}", entry.chosen):
+            assert words_of_scene in words
+        if not isinstance(entry, NamedBlocks):
             assert {"▒", "░", "↓"} <= set(blocks[name])
             assert "options: refine (1), penalty (1e+09)" in words
             continue
-        n_slave = len(drawing_.slave) + 1
+        n_slave = len(entry.slave) + 1
         assert blocks[name].count("●") == n_slave
         assert "┌" in blocks[name]
-        assert ("/////" in blocks[name]) == drawing_.rigid_master
+        assert ("/////" in blocks[name]) == entry.rigid_master
     options = list(blocks.values())[-1]
     assert all(re.search(rf"^  {option} ", options, re.M) for option in OPTIONS)
     assert "ratio     E of the master over E of the slave (1)" in options
