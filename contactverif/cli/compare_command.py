@@ -63,23 +63,30 @@ def compare(
       contactverif compare old.nc new.nc
     """
     reference = _only_one("--against", against or [])
+    globs = properties or []
     reports = _reports_among(names or [])
     if reports:
         _check_no_run_options(reference, sampling, place, pictures)
-        files = OutputFiles.check(out or [], (PAGE,))
-        from contactverif.cli.report_comparison import compare_reports
-
-        raise typer.Exit(0 if compare_reports(reports, properties or [], files) else 1)
+        nothing_worse = _compare_reports(reports, globs, out)
+        raise typer.Exit(0 if nothing_worse else 1)
     scene, interface = place.make_scene(), place.read_interface()
     if reference is None:
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
-    files = OutputFiles.check(out or [], (REPORT, PAGE))
+    files = OutputFiles.check(out, (REPORT, PAGE))
     folder = PictureFolder.make(pictures)
     from contactverif.cli.formulation_comparison import compare_formulations, load_contest
 
-    contest = load_contest(names or [], reference, properties or ["*"])
+    contest = load_contest(names or [], reference, globs or ["*"])
     promises_kept = compare_formulations(contest, sampling, interface, scene, files, folder)
     raise typer.Exit(0 if promises_kept else 1)
+
+
+def _compare_reports(reports: Sequence[Path], globs: Sequence[str], out: Sequence[Path] | None) -> bool:
+    """Compare two reports; return whether nothing got worse."""
+    files = OutputFiles.check(out, (PAGE,))
+    from contactverif.cli.report_comparison import compare_reports
+
+    return compare_reports(reports, globs, files)
 
 
 def _only_one(option: str, values: Sequence[str]) -> str | None:

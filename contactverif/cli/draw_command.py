@@ -57,7 +57,7 @@ def draw(
       contactverif draw --scene c:degrees=30 -f nts -f vts-ppt --out both.svg
       contactverif draw ppt.nc --case vts-ppt.balance.force --out case.png
     """
-    files = OutputFiles.check(out or [], (*PICTURES, SOLVED_SCENE))
+    files = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE))
     from contactverif.cli.scene_drawing import draw_scene_or_case
 
     complete = draw_scene_or_case(report, case, scene, formulation or [], files)

@@ -36,13 +36,13 @@ class OutputFiles:
     paths: Mapping[str, Path]
 
     @classmethod
-    def check(cls, names: Sequence[Path], suffixes: Sequence[str]) -> OutputFiles:
+    def check(cls, names: Sequence[Path] | None, suffixes: Sequence[str]) -> OutputFiles:
         """Return the files, once it is sure that they can be written.
 
         Parameters
         ----------
-        names : Sequence[Path]
-            What the user typed behind each `--out`.
+        names : Sequence[Path] | None
+            The name behind each `--out` of the command line.
         suffixes : Sequence[str]
             The kinds of files that the command writes, such as ".nc".
 
@@ -54,7 +54,7 @@ class OutputFiles:
         from contactverif_reports.files import check_writable
 
         by_suffix: dict[str, Path] = {}
-        for name in names:
+        for name in names or ():
             suffix = name.suffix.lower()
             if suffix not in suffixes:
                 raise MisuseError("--out", f"{str(name)!r}", f"a name that ends in {_either(suffixes)}")

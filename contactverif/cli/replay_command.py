@@ -47,7 +47,7 @@ def replay(
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case
 
-    files = OutputFiles.check(out or [], PICTURES)
+    files = OutputFiles.check(out, PICTURES)
     if case is None:
         ids = case_ids(report)
         typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")

@@ -34,7 +34,7 @@ def report(
     from contactverif.cli.run_tables import StoredTable, show, stored_summary
     from contactverif_reports.netcdf.stored import read_report
 
-    files = OutputFiles.check(out or [], (PAGE,))
+    files = OutputFiles.check(out, (PAGE,))
     if not files.paths:
         stored = read_report(path)
         show(StoredTable(stored))

@@ -20,7 +20,6 @@ from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Outcome, Property, Verdict, excess
 from contactverif.contract.result import NotLoaded, Result, Row, Run, result_of
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-from contactverif.mechanics.newton import End
 from contactverif.run.registry import Wrapper
 from contactverif_reports.draw import as_text
 from contactverif_reports.netcdf.read import StoredCase
@@ -390,14 +389,17 @@ def _details(details: Mapping[str, float]) -> list[str]:
         what, _, which = name.partition(", ")
         behind = f" ({which})" if which else ""
         iterations = details.get(name.replace("end", "iterations", 1))
-        if what == "end" and value in list(End) and iterations is not None:
-            lines.append(f"Newton's method{behind}: {_ending(End(int(value)), iterations)}")
+        if what == "end" and iterations is not None:
+            lines.append(f"Newton's method{behind}: {_ending(value, iterations)}")
         elif what != "iterations":
             others.append(f"{what}{behind}: {value:.3g}")
     return lines + (["; ".join(others)] if others else [])
 
 
-def _ending(end: End, iterations: float) -> str:
+def _ending(value: float, iterations: float) -> str:
     """Say how a solution ended and, if it did not converge, what to try next."""
+    from contactverif.mechanics.newton import End  # only where a property has solved a scene
+
+    end = End(int(value))
     after = f"after {iterations:g} iteration{'s' * (iterations != 1)}"
     return f"{end.label} {after}" if end is End.CONVERGED else f"{end.label} {after}: {end.advice}"

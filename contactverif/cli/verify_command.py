@@ -65,13 +65,13 @@ def verify(
     from contactverif.run.runner import run
 
     names = _chosen_names(names or [], all_)
-    files = OutputFiles.check(out or [], (REPORT, PAGE))
+    files = OutputFiles.check(out, (REPORT, PAGE))
     folder = PictureFolder.make(pictures)
     scene = place.make_scene()
     interface = place.read_interface()
     questions = load_properties(properties or ["*"])
     subjects = [load_formulation(name) for name in names]
-    reasons = dict(_known_failure(text) for text in known or [])
+    reasons = _known_failures(known or [])
     with Bar() as bar:
         result = run(
             subjects,
@@ -156,9 +156,12 @@ def _chosen_names(names: list[str], every: bool) -> list[str]:
     return names
 
 
-def _known_failure(text: str) -> tuple[str, str]:
-    """Return the property and the reason of ID=REASON."""
-    property_id, equals, reason = text.partition("=")
-    if not (property_id and equals and reason):
-        raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
-    return property_id, reason
+def _known_failures(texts: Sequence[str]) -> dict[str, str]:
+    """Return {property: reason} of each ID=REASON."""
+    reasons = {}
+    for text in texts:
+        property_id, _, reason = text.partition("=")
+        if not (property_id and reason):
+            raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
+        reasons[property_id] = reason
+    return reasons

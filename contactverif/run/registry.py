@@ -12,7 +12,7 @@ from __future__ import annotations
 import difflib
 import inspect
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -142,8 +142,8 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in names):
             raise unknown_name_error("property", glob, names)
-    chosen = [name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs)]
-    return tuple(_load_property(name) for name in chosen)
+    matching = [name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs)]
+    return tuple(_load_property(name) for name in matching)
 
 
 def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
@@ -250,25 +250,35 @@ def _check_options(
     text: str, make: Callable[..., Any], parameters: Mapping[str, inspect.Parameter], options: Mapping[str, Any]
 ) -> None:
     """Refuse unknown and missing options, and values that do not fit their annotation, without calling the factory."""
-    known = {
-        name: entry
-        for name, entry in parameters.items()
-        if name not in _RESERVED and entry.kind in (entry.KEYWORD_ONLY, entry.POSITIONAL_OR_KEYWORD)
-    }
+    known = _options_among(parameters)
     names = f"it has {', '.join(known)}" if known else "it has none"
-    takes_any = not parameters or any(entry.kind is entry.VAR_KEYWORD for entry in parameters.values())
+    takes_any = not parameters or any(map(_takes_any_name, parameters.values()))
     for option, value in options.items():
         if option in _RESERVED:
             raise MisuseError(f"option {option} of {text!r}", repr(value), f"nothing: the harness sets it; {names}")
         if option in known:
             _check_value(text, make, option, value, names)
         elif not takes_any:
-            near = difflib.get_close_matches(option, known, n=1)
-            nearest = f" (nearest: {near[0]})" if near else ""
-            raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
-    missing = [name for name, entry in known.items() if entry.default is entry.empty and name not in options]
-    if missing:
-        raise MisuseError(f"options of {text!r}", f"no {missing[0]}", f"{missing[0]}=VALUE; {names}")
+            raise _unknown_option_error(text, option, known, names)
+    for name, entry in known.items():
+        if entry.default is entry.empty and name not in options:
+            raise MisuseError(f"options of {text!r}", f"no {name}", f"{name}=VALUE; {names}")
+
+
+def _takes_any_name(parameter: inspect.Parameter) -> bool:
+    return parameter.kind is parameter.VAR_KEYWORD
+
+
+def _unknown_option_error(text: str, option: str, known: Iterable[str], names: str) -> MisuseError:
+    near = difflib.get_close_matches(option, known, n=1)
+    nearest = f" (nearest: {near[0]})" if near else ""
+    return MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
+
+
+def _options_among(parameters: Mapping[str, inspect.Parameter]) -> dict[str, inspect.Parameter]:
+    """Return the parameters that a user may set by name."""
+    kinds = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    return {name: entry for name, entry in parameters.items() if name not in _RESERVED and entry.kind in kinds}
 
 
 def _check_value(text: str, make: Callable[..., Any], option: str, value: Any, names: str) -> None:

@@ -1,0 +1,94 @@
+"""How the command line starts: what it imports, its version, `python -m contactverif`, and completion in a shell.
+
+Modules are counted and not seconds, so that a busy machine changes nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from contactverif import __version__
+from contactverif.cli.app import COMMANDS
+
+SCRIPT = """
+import sys
+from contactverif.cli import main
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+print("\\nmodules:", *sorted(sys.modules))
+"""
+SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshio", "pytest", "pandas"}
+FOR_SOLVING = (
+    "contactverif.mechanics",
+    "contactverif.scenes.blocks",
+    "contactverif.scenes.catalogue",
+    "contactverif.scenes.disk",
+    "contactverif.scenes.hertz",
+    "contactverif.studies",
+    "matplotlib",
+    "meshio",
+    "skfem",
+)
+
+
+def run_python(*arguments: str, **variables: str) -> str:
+    """Return what a Python process prints."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
+    environment = {**kept, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **variables}
+    finished = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=True)
+    return finished.stdout
+
+
+def modules_after(*arguments: str) -> set[str]:
+    """Return the modules that a command has imported when it ends."""
+    return set(run_python("-c", SCRIPT, *arguments).rpartition("modules: ")[2].split())
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_imports_nothing_that_takes_long(command: str) -> None:
+    modules = modules_after(*[word for word in (command, "--help") if word])
+    assert not modules & SLOW
+    after_numpy = run_python("-c", "import numpy, sys; print(len(sys.modules))")
+    assert len(modules) <= 3 * int(after_numpy)
+
+
+def test_a_run_that_solves_nothing_imports_no_mechanics() -> None:
+    modules = modules_after("verify", "nts", "-p", "balance.*", "--examples", "2", "--seed", "1")
+    assert "contactverif.run.runner" in modules
+    assert not {name for name in modules if name.startswith(FOR_SOLVING)}
+
+
+def test_a_run_that_solves_imports_mechanics() -> None:
+    modules = modules_after("verify", "vts-ppt", "-p", "patch.flat.solve", "--examples", "1", "--seed", "1")
+    assert "contactverif.mechanics.newton" in modules
+
+
+@pytest.mark.parametrize("start", [("-m", "contactverif"), ("-c", "from contactverif.cli import main; main()")])
+def test_the_version_is_told(start: tuple[str, ...]) -> None:
+    assert run_python(*start, "--version") == f"contactverif {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("contactverif ver", {"verify"}),
+        ("contactverif verify vts-pp", {"vts-ppt", "vts-ppt-basic", "vts-ppt-balanced", "vts-ppt-lm"}),
+        ("contactverif compare nts --against chen", {"chen-hisada"}),
+        ("contactverif verify nts -p balance", {"balance.force", "balance.moment"}),
+    ],
+)
+def test_a_shell_completes_commands_formulations_and_properties(words: str, expected: set[str]) -> None:
+    last = len(words.split()) - 1
+    answer = run_python(
+        *("-m", "contactverif"),
+        _CONTACTVERIF_COMPLETE="complete_bash",
+        COMP_WORDS=words,
+        COMP_CWORD=str(last),
+    )
+    assert set(answer.split()) == expected
