@@ -356,12 +356,15 @@ def test_every_package_is_typed(package: Path) -> None:
     assert (package / "__init__.py").is_file()
 
 
+OUR_DOTS = {".ci", ".github", ".gitignore", ".pre-commit-config.yaml"}
+
+
 def texts() -> Iterator[tuple[Path, str]]:
     """All files of the project that are text, those that tools leave behind excepted."""
     for path in sorted(ROOT.rglob("*")):
         parts = path.relative_to(ROOT).parts
         left_behind = any(
-            (part.startswith(".") and part != ".ci") or part.endswith((".egg-info", "~")) for part in parts
+            (part.startswith(".") and part not in OUR_DOTS) or part.endswith((".egg-info", "~")) for part in parts
         )
         if left_behind or {"__pycache__", "build", "dist", "venv"} & set(parts) or not path.is_file():
             continue
