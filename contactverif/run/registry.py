@@ -30,7 +30,7 @@ PROPERTIES = "contactverif.properties"
 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
-_NEEDED_VALUES = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
+_NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
 

@@ -1,6 +1,6 @@
-"""Tests for the project of a formulation's author: every property as a pytest test of its own.
+"""The tests that an author of a formulation writes: every property as a pytest test of its own.
 
-`parametrize_with_properties` is imported at its first use, because every run of pytest loads this package's plugin.
+The decorator is imported at its first use, because every run of pytest loads the plugin of this package.
 """
 
 from __future__ import annotations

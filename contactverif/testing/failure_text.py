@@ -1,0 +1,68 @@
+"""The text of a failed check: the promise, the numbers, the smallest mesh that fails, and a command that repeats it."""
+
+from __future__ import annotations
+
+import textwrap
+
+from contactverif.contract.property import Outcome, Property, Verdict, excess
+from contactverif.contract.result import Row
+
+
+def explain(row: Row, *, command: str) -> str:
+    """Say to a person why a row makes a run fail.
+
+    Parameters
+    ----------
+    row : Row
+        A row that is not as it was expected.
+    command : str
+        The command that runs the check again.
+
+    Returns
+    -------
+    str
+        Several lines; all but the first are indented.
+    """
+    question = row.question
+    lines = [f"{row.formulation}, {question.id}: {row.unexpected}", f"  The property: {question.summary}"]
+    if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
+        lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
+    if row.reason:
+        lines.append(f"  The worst case: {row.reason}" if row.shrunk else f"  The reason: {row.reason}")
+    outcome = row.shrunk or row.witness
+    if outcome is not None:
+        lines += _example(row, outcome)
+    lines.append(f"  To run it again: {command}")
+    return "\n".join(lines)
+
+
+def _example(row: Row, outcome: Outcome) -> list[str]:
+    """Return the numbers and the drawing of a case."""
+    lines = [
+        "  The smallest case that fails:" if row.shrunk else f"  The witness {outcome.case.name}: {outcome.verdict}"
+    ]
+    if outcome.measurement is None:
+        lines.append(f"    {outcome.reason}")
+    return [*lines, *_numbers(row.question, outcome), _drawing(outcome)]
+
+
+def _numbers(question: Property, outcome: Outcome) -> list[str]:
+    """Return each measured number against its tolerance, with the formula of the tolerance and its reason."""
+    measurement = outcome.measurement
+    if measurement is None:
+        return []
+    lines = [f"    {measurement.broken}"] if measurement.broken else []
+    for quantity in question.quantities:
+        if quantity.name not in measurement.values:
+            continue
+        value, tolerance = measurement.values[quantity.name], measurement.tolerances[quantity.name]
+        mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
+        lines.append(f"    {mark} {quantity.name}: {value:.6g}; needed: {quantity.sense} {tolerance:.3g}")
+        lines.append(f"      tolerance: {quantity.tolerance} ({quantity.reason})")
+    return lines
+
+
+def _drawing(outcome: Outcome) -> str:
+    from contactverif_reports.draw import as_text
+
+    return textwrap.indent(as_text(outcome.case), "    ")
