@@ -123,7 +123,7 @@ def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_t
     outcome = judge_case(question, scene.case(), subject)
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
-    assert outcome.measurement.values == {"multipliers too many": 7.0}
+    assert outcome.measurement.values == {"redundant multipliers": 7.0}
     trace = newton.solve(scene, subject.for_case(scene.case()))
     assert trace.converged
     assert trace.deficiency == 7

@@ -1,7 +1,16 @@
-"""The patch test solved where the slave overhangs the master inside a slave segment: forces end where the master does.
+"""Ask whether the solved patch test holds where the slave overhangs the master inside a slave segment.
 
-The pressure acts on what the master does not cover too, so the exact stress is as uniform as without an overhang. A
-method that decides about whole slave nodes, or areas of competence, has either too much slave in contact or too little.
+**Question.** The master ends inside a slave segment. Do the contact forces end where the master ends?
+
+**Why it matters.** Every punch, gasket and lap joint has such an end. A method that decides about whole slave nodes
+or whole areas of competence has too much slave in contact there, or too little.
+
+**How it is judged.** The pressure acts on what the master does not cover too, so that the exact stress is as uniform
+as without an overhang. The errors are those of `patch.flat.solve` at ε̂ = 1, 10 or 100 E/h, and gaps count where
+there is a master opposite. The tolerances are those of `patch.flat.solve` times L/A: loads on the whole slave, of
+length L, are rounded, and the part A that has the master opposite bears that.
+
+**Undecided.** Never, as in `patch.flat.solve`.
 """
 
 from __future__ import annotations
@@ -14,33 +23,43 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.strategies.solids import dead_zone_cases
-from contactverif_properties.anywhere import no_barrier
-from contactverif_properties.solved import MULTIPLIERS, QUANTITIES, exact_picture, solved_once
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.solved_patch import MULTIPLIERS, QUANTITIES, forces_to_draw, measure_once
 
 
-def overhanging(case: Case, subject: Subject) -> Measurement:
-    """As `solved_once`, L/A as tolerant: the part A of the slave's length L bears the rounding of loads on all."""
-    found = solved_once(case, subject)
+def measure_overhang(case: Case, subject: Subject) -> Measurement:
+    """Return the errors of `measure_once` with tolerances L/A times as large.
+
+    Parameters
+    ----------
+    case : Case
+        A uniform scene whose slave overhangs the master.
+    subject : Subject
+        The formulation.
+    """
+    measurement = measure_once(case, subject)
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     covered = min(slave.max(), master.max()) - max(slave.min(), master.min())
     ratio = float(np.ptp(slave) / covered)
-    return replace(found, tolerances={name: ratio * tolerance for name, tolerance in found.tolerances.items()})
+    tolerances = {name: ratio * tolerance for name, tolerance in measurement.tolerances.items()}
+    return replace(measurement, tolerances=tolerances)
 
 
-def _on_a_part(quantity: Quantity) -> Quantity:
-    why = "loads on all the slave, of length L, are rounded, and the part A that has the master opposite bears it"
-    return replace(quantity, tolerance=f"({quantity.tolerance}) L/A", reason=f"{quantity.reason}; {why}")
+def _widen_tolerance(quantity: Quantity) -> Quantity:
+    """Return the quantity with L/A times its tolerance."""
+    reason = "Loads on the whole slave, of length L, are rounded, and the part A that faces the master bears that."
+    return replace(quantity, tolerance=f"({quantity.tolerance}) L/A", reason=f"{quantity.reason} {reason}")
 
 
 DEAD_ZONE = Property(
     id="patch.dead-zone",
     family="patch",
-    summary="two elastic blocks under a uniform pressure, the slave overhanging the master inside a slave segment",
-    quantities=tuple(map(_on_a_part, (*QUANTITIES, MULTIPLIERS))),
+    summary="A uniform pressure stays exact where the slave overhangs the master inside a slave segment.",
+    quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
     cases=dead_zone_cases,
-    measure=overhanging,
+    measure=measure_overhang,
     promise=lambda traits: traits.covers_overhang,
-    applicable=no_barrier,
+    applicable=refuse_barrier,
     bodies=True,
-    exact=exact_picture,
+    exact=forces_to_draw,
 )

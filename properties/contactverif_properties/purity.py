@@ -1,92 +1,138 @@
-"""Does an answer depend on anything but the question? Calls are repeated, reordered and batched."""
+"""Ask whether an answer depends on nothing but the question.
+
+**Question.** Calls are repeated, reordered and batched. Is the answer to the same question always the same, and are
+the inputs left as they are?
+
+**Why it matters.** A formulation that remembers its last call works in a test and fails in a program that solves two
+load cases, restarts an increment, or runs in parallel.
+
+**How it is judged.** R(x1), R(x2), R(x1) must give the first answer again, also after a tangent, and by a fresh
+instance that meets the states in the other order. The measured numbers count entries that differ; the tolerance is 0,
+since the same operations on the same numbers give the same bits. A batch may sum in another order: its largest
+difference over the largest force is at most u(8X/|g| + 4N). A pairing that differs, or an interface that was changed,
+fails in words.
+
+**Undecided.** Never.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import Subject
-from contactverif_properties import roundoff
-from contactverif_properties.anywhere import any_cases, no_barrier, posed
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.roundoff import GAP_TOLERANCE, gap_tolerance, mean_penetration, ratio
 
-NEAR = 2.0**-12  # of the way to another state; and twelve binary digits of a batch's answers are their own
+NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
 
-BITWISE = "the same operations on the same numbers give the same bits"
-AGAIN = Quantity("entries that change when asked again", "1", "0", BITWISE)
-REORDERED = Quantity("entries that change with the order of calls", "1", "0", BITWISE)
+REASON = "The same operations on the same numbers give the same bits."
+REPEATED = Quantity("entries that change in a repeated call", "1", "0", REASON)
+REORDERED = Quantity("entries that change with the order of calls", "1", "0", REASON)
 BATCHED = Quantity(
-    "batch against loop", "1", roundoff.PATCH, "a batch may sum in another order; a gap is rounded to uX"
+    "difference between batch and loop",
+    "1",
+    GAP_TOLERANCE,
+    "A batch may sum in another order, and a gap is rounded to uX.",
 )
 
 
-def pure(case: Case, subject: Subject) -> Measurement:
-    """R(x1), R(x2), R(x1) gives the first again, also after a tangent and in a batch; inputs stay as they are.
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The pairing of a state, and the residual on it."""
 
-    Every state is asked with its own pairing: with another's, far from it, a right formulation may have no answer (a
-    quadratic without a root). The batch is of the state and of one so near that the pairing is nearly its own.
+    pairing: Pairing | None
+    forces: Array
+
+
+def ask(formulation: CheckedFormulation, interface: Interface, z: FloatArray) -> Answer:
+    """Return the pairing of the state z and the residual on it.
+
+    Each state is asked with its own pairing: far from the state of a pairing, a right formulation may have no answer
+    (a quadratic without a root).
     """
-    original = case
-    formulation, case = posed(original, subject)
-    interface, z = case.interface, case.z
-    random = np.random.default_rng(case.seed)
-    elsewhere = z + random.uniform(-1, 1, z.size) * case.shortest_segment / 4
+    pairing = formulation.pair(interface, z)
+    return Answer(pairing, formulation.residual(interface, pairing, z))
+
+
+def measure_purity(case: Case, subject: Subject) -> Measurement:
+    """Repeat, reorder and batch calls, and count the entries that change.
+
+    Parameters
+    ----------
+    case : Case
+        A random state.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        The entries that change in a repeated call, those that change for a fresh instance which meets the states in the
+        other order, tangents first, and the difference between a batch and a loop. The batch holds the state and one so
+        near that its pairing is nearly the same.
+    """
+    formulation, state = prepare_state(case, subject)
+    interface, z = state.interface, state.z
+    random = np.random.default_rng(state.seed)
+    distant = z + random.uniform(-1, 1, z.size) * state.shortest_segment / 4
     before = _fingerprint(interface)
 
-    pairing = formulation.pair(interface, z)
-    first = formulation.residual(interface, pairing, z)
-    pairing_elsewhere = formulation.pair(interface, elsewhere)
-    second = formulation.residual(interface, pairing_elsewhere, elsewhere)
-    pairing_again = formulation.pair(interface, z)
-    again = formulation.residual(interface, pairing_again, z)
-    fresh, _ = posed(original, subject)  # it meets the states the other way round, tangents first
-    pairing_first = fresh.pair(interface, elsewhere)
+    first = ask(formulation, interface, z)
+    second = ask(formulation, interface, distant)
+    repeated = ask(formulation, interface, z)
+    fresh, _ = prepare_state(case, subject)
+    pairing_first = fresh.pair(interface, distant)
     if "tangent" in fresh.provides:
-        fresh.tangent(interface, pairing_first, elsewhere)
-        fresh.tangent(interface, pairing, z)
-    changed = (fresh.residual(interface, pairing_first, elsewhere) != second).sum()
-    changed += (fresh.residual(interface, pairing, z) != first).sum()
-    near = z + NEAR * (elsewhere - z)
-    batch = formulation.residual(interface, pairing, np.array([[near, z], [z, z], [z, near]]))
-    alone = formulation.residual(interface, pairing, near)
+        fresh.tangent(interface, pairing_first, distant)
+        fresh.tangent(interface, first.pairing, z)
+    n_changes = (fresh.residual(interface, pairing_first, distant) != second.forces).sum()
+    n_changes += (fresh.residual(interface, first.pairing, z) != first.forces).sum()
+    near = z + NEAR * (distant - z)
+    batch = formulation.residual(interface, first.pairing, np.array([[near, z], [z, z], [z, near]]))
+    alone = formulation.residual(interface, first.pairing, near)
 
     broken = []
-    if pairing != pairing_again:
-        broken.append("the pairing of a state differs when asked again")
-    if pairing_elsewhere != pairing_first:
+    if first.pairing != repeated.pairing:
+        broken.append("the pairing of a state differs in a repeated call")
+    if second.pairing != pairing_first:
         broken.append("the pairing of a state depends on the state before it")
     if _fingerprint(interface) != before:
         broken.append("the interface was changed")
-    largest = float(max(np.abs(first).max(), np.abs(alone).max()))
-    difference = float(np.abs(batch - np.array([[alone, first], [first, first], [first, alone]])).max())
+    loop = np.array([[alone, first.forces], [first.forces, first.forces], [first.forces, alone]])
+    largest = float(max(np.abs(first.forces).max(), np.abs(alone).max()))
+    values = {
+        REPEATED.name: float((repeated.forces != first.forces).sum()),
+        REORDERED.name: float(n_changes),
+        BATCHED.name: ratio(float(np.abs(batch - loop).max()), largest),
+    }
+    rounding = gap_tolerance(state, mean_penetration(state, first.forces))
+    tolerances = {REPEATED.name: 0.0, REORDERED.name: 0.0, BATCHED.name: rounding}
+    n = interface.n_unknowns
     return Measurement(
-        {
-            AGAIN.name: float((again != first).sum()),
-            REORDERED.name: float(changed),
-            BATCHED.name: roundoff.share(difference, largest),
-        },
-        {
-            AGAIN.name: 0.0,
-            REORDERED.name: 0.0,
-            BATCHED.name: roundoff.of_gap(case, roundoff.mean_penetration(case, first)),
-        },
-        broken="; ".join(broken),
-        idle=not (first[: interface.n_unknowns].any() or alone[: interface.n_unknowns].any()),
+        values, tolerances, broken="; ".join(broken), idle=not (first.forces[:n].any() or alone[:n].any())
     )
 
 
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
+    """Return all bits of an interface."""
     return interface.nodes.tobytes(), interface.slave.segments.tobytes(), interface.master.segments.tobytes()
 
 
 PURITY = Property(
     id="purity",
     family="invariants",
-    summary="an answer depends on nothing but the question: no memory, no changed input, a batch equals a loop",
-    quantities=(AGAIN, REORDERED, BATCHED),
+    summary="An answer depends on the question alone, in a repeated call, in another order, and in a batch.",
+    quantities=(REPEATED, REORDERED, BATCHED),
     cases=any_cases,
-    measure=pure,
+    measure=measure_purity,
     promise=lambda traits: True,
-    applicable=no_barrier,
+    applicable=refuse_barrier,
 )

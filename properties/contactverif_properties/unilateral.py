@@ -1,4 +1,19 @@
-"""Contact is where surfaces penetrate and nowhere else: no force across an open gap, none far from what touches."""
+"""Ask whether contact is where the surfaces penetrate, and nowhere else.
+
+**Question.** A flat interface is lifted until all gaps are open, and until all but one end is open. Is there no force
+across an open gap, none far from the contact zone, and some where the surfaces penetrate?
+
+**Why it matters.** A force across an open gap is adhesion, or a force from nowhere. A contact that never begins lets
+bodies pass through each other.
+
+**How it is judged.** The first number is the largest nodal force across the open gap over ε̂ |g| L, with all
+multipliers 0. The second is, with springs alone, the largest force of a slave node two or more segments from the
+closed end over the largest force of a node. Both must be exactly 0: an open contact is left out, not rounded away.
+Where the surfaces penetrate and nothing begins, the case fails in words.
+
+**Undecided.** A case in which nothing begins is undecided if moving the nodes by 64 u X makes contact begin: a node
+that faces a free end exactly is over the master or not, as roundoff decides.
+"""
 
 from __future__ import annotations
 
@@ -7,102 +22,110 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray
+from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases
-from contactverif_properties.anywhere import no_barrier
-from contactverif_properties.patch import force_columns
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.directions import random_moves
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.shared.uniform_pressure import unit_forces
 
-MOVES = 8
-CLOSED = 1 / 8  # of the slave's length, at one end of an interface that is open elsewhere
-SHALLOW = 2.0**-6  # of that length, the deepest penetration there, so that it hardly tilts
-FAR = 2.0  # × the longest segment: shapes of a mortar method reach over one, on either side
-EXACTLY = "a contact that is open is left out, not rounded away"
-OPEN = Quantity("force across an open gap", "1", "0", EXACTLY)
-BEYOND = Quantity("force far from what touches", "1", "0", EXACTLY)
+N_MOVES = 8
+CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.
+SHALLOW = 2.0**-6  # The deepest penetration there over the slave's length, so that the slave hardly tilts.
+FAR = 2.0  # A distance in longest segments: the shapes of a mortar method reach over one, on either side.
+REASON = "An open contact is left out, not rounded away."
+OPEN = Quantity("force across an open gap", "1", "0", REASON)
+DISTANT = Quantity("force far from the contact zone", "1", "0", REASON)
 
 
-def open_and_closed(case: Case, subject: Subject) -> Measurement:
-    """A flat interface lifted until all gaps are as wide as the penetration was deep, and until all but an end is open.
+def measure_unilateral(case: Case, subject: Subject) -> Measurement:
+    """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
+
+    Parameters
+    ----------
+    case : Case
+        A flat case with the parameter `penetration`, a length.
+    subject : Subject
+        The formulation.
 
     Returns
     -------
     Measurement
-        Largest nodal force across the open gap over ε̂ |g| L; of a formulation with multipliers those are 0 there.
-        Far: the largest force of a slave node that is two segments or more from where it is closed, over the largest
-        force of one; of springs alone, since multipliers that pull are a matter of solutions (`complementarity`), and
-        missing where no node is that far. Broken: nothing begins where the surfaces penetrate.
-
-    Source: verification 10, for frictionless contact without adhesion.
+        The largest force across the open gap over ε̂ |g| L. The largest force far from the contact zone over the largest
+        force; missing where no node is that far, and with multipliers, since `complementarity` judges those that pull.
+        Broken: nothing begins where the surfaces penetrate.
     """
     formulation, interface = subject.for_case(case), case.interface
-    depth, n = case.parameter("penetration"), case.interface.n_unknowns
+    depth, n = case.parameter("penetration"), interface.n_unknowns
     count = formulation.n_multipliers(interface)
     size = case.penalty * depth * case.slave_length
-
-    def begins(there: Case) -> bool:
-        if not count:
-            return bool(_forces(formulation, there).any())
-        waiting = there.with_multipliers(np.zeros(count))
-        return bool(force_columns(waiting, formulation, formulation.pair(interface, waiting.z)).any())
-
-    raised = lifted(case, 2 * depth).with_multipliers(np.zeros(count))
+    raised = lift_slave(case, 2 * depth).with_multipliers(np.zeros(count))
     values = {OPEN.name: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
-    tolerances = {OPEN.name: 0.0}
-    far = beyond(case)
-    if not count and far.any():
-        forces = np.linalg.norm(_forces(formulation, nearly_open(case)).reshape(-1, 2)[: len(far)], axis=1)
-        values[BEYOND.name] = float(forces[far].max() / forces.max()) if forces.any() else 0.0
-        tolerances[BEYOND.name] = 0.0
-    broken = "" if begins(case) else "nothing begins where the surfaces penetrate"
-    undecided = "a kink: moved by roundoff, it begins" if broken and any(map(begins, _moved(case))) else ""
-    return Measurement(values, tolerances, undecided, broken)
+    distant = nodes_far_from_contact(case)
+    if not count and distant.any():
+        forces = np.linalg.norm(_forces(formulation, open_all_but_one_end(case)).reshape(-1, 2)[: len(distant)], axis=1)
+        values[DISTANT.name] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
+    broken = "" if _contact_begins(formulation, case) else "nothing begins where the surfaces penetrate"
+    undecided = ""
+    if broken and any(_contact_begins(formulation, moved) for moved in _move_by_roundoff(case)):
+        undecided = "a kink: moved by roundoff, it begins"
+    return Measurement(values, dict.fromkeys(values, 0.0), undecided, broken)
 
 
-def nearly_open(case: Case) -> Case:
-    """The case with its slave lifted so that the gap grows along it, linearly, and is closed in its first CLOSED only.
+def _contact_begins(formulation: CheckedFormulation, case: Case) -> bool:
+    """Return whether springs push in this state, or whether a multiplier could."""
+    count = formulation.n_multipliers(case.interface)
+    if not count:
+        return bool(_forces(formulation, case).any())
+    state = case.with_multipliers(np.zeros(count))
+    return bool(unit_forces(state, formulation, formulation.pair(case.interface, state.z)).any())
 
-    Nodes move across the interface alone, and every slave stays straight.
-    """
-    interface, positions = case.interface, case.positions.copy()
-    depth, place = case.parameter("penetration"), _places(case)
-    shallow = min(depth, SHALLOW * case.slave_length)
-    x, y = case.parameters["direction"]
-    positions[: interface.n_slave_nodes] += (depth + shallow * (place / CLOSED - 1))[:, None] * np.array([-y, x])
+
+def lift_slave(case: Case, height: float) -> Case:
+    """Return the case with its slave moved away from the master, across the interface, by a height (a length)."""
+    along = case.parameters["direction"]
+    positions = case.positions.copy()
+    positions[: case.interface.n_slave_nodes] += height * np.array([-along[1], along[0]])
     return replace(case, z=positions.reshape(-1))
 
 
-def beyond(case: Case) -> BoolArray:
-    """Which slave nodes (n_slave_nodes,) are then FAR or more segments from where it is closed."""
+def open_all_but_one_end(case: Case) -> Case:
+    """Return the case with its slave lifted so that the gap grows along it, and only its first eighth is closed.
+
+    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight.
+    """
+    interface, positions = case.interface, case.positions.copy()
+    depth, places = case.parameter("penetration"), _slave_places(case)
+    shallow = min(depth, SHALLOW * case.slave_length)
+    x, y = case.parameters["direction"]
+    positions[: interface.n_slave_nodes] += (depth + shallow * (places / CLOSED - 1))[:, None] * np.array([-y, x])
+    return replace(case, z=positions.reshape(-1))
+
+
+def nodes_far_from_contact(case: Case) -> BoolArray:
+    """Return which slave nodes (n_slave_nodes,) are then FAR or more segments from the closed end."""
     interface, along = case.interface, case.parameters["along"]
     slave = along[: interface.n_slave_nodes]
     longest = max(float(np.abs(np.diff(along[side.segments])).max()) for side in (interface.slave, interface.master))
-    reached: BoolArray = (_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
-    return reached
+    distant: BoolArray = (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
+    return distant
 
 
-def _places(case: Case) -> FloatArray:
-    """Of the slave's nodes along the interface, from 0 to 1."""
+def _slave_places(case: Case) -> FloatArray:
+    """Return where the slave's nodes lie along the interface (n_slave_nodes,), from 0 to 1."""
     slave = case.parameters["along"][: case.interface.n_slave_nodes]
     places: FloatArray = (slave - slave.min()) / np.ptp(slave)
     return places
 
 
-def _moved(case: Case) -> Iterator[Case]:
-    """The case with its nodes moved by roundoff: one that faces a free end exactly is over the master, or is not."""
-    reach = 64 * UNIT_ROUNDOFF * case.largest_coordinate
-    for direction in np.random.default_rng(case.seed).uniform(-1, 1, (MOVES, case.z.size)):
+def _move_by_roundoff(case: Case) -> Iterator[Case]:
+    """Yield the case with its nodes moved at random by what roundoff may do."""
+    reach = COORDINATE_ROUNDING * case.largest_coordinate
+    for direction in random_moves(case.seed, N_MOVES, case.z.size):
         yield replace(case, z=case.z + reach * direction)
-
-
-def lifted(case: Case, height: float) -> Case:
-    """The case with its slave moved away from the master, across the interface, by a length."""
-    along = case.parameters["direction"]
-    positions = case.positions.copy()
-    positions[: case.interface.n_slave_nodes] += height * np.array([-along[1], along[0]])
-    return replace(case, z=positions.reshape(-1))
 
 
 def _forces(formulation: CheckedFormulation, case: Case) -> Array:
@@ -112,10 +135,10 @@ def _forces(formulation: CheckedFormulation, case: Case) -> Array:
 UNILATERAL = Property(
     id="unilateral",
     family="invariants",
-    summary="no force across an open gap, none far from what touches, and some where surfaces penetrate",
-    quantities=(OPEN, BEYOND),
+    summary="No force acts across an open gap or far from the contact zone, and some force acts under penetration.",
+    quantities=(OPEN, DISTANT),
     cases=flat_cases,
-    measure=open_and_closed,
+    measure=measure_unilateral,
     promise=lambda traits: True,
-    applicable=no_barrier,
+    applicable=refuse_barrier,
 )

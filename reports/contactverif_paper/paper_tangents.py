@@ -54,7 +54,7 @@ def _order(member: Member, trace: newton.Trace) -> float:
     (question,) = load_properties(["newton.order"])
     assert not isinstance(question, NotLoaded)
     found = judge_case(question, trace.scene.case(), cast.subject(member)).measurement
-    return np.nan if found is None or found.undecided else found.values.get("order of one step", np.inf)
+    return np.nan if found is None or found.undecided else found.values.get("order of one Newton step", np.inf)
 
 
 def statements(found: Tangents) -> tuple[Statement, ...]:

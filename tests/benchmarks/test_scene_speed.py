@@ -23,7 +23,8 @@ from contactverif.run.runner import judge_case
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif.strategies.solids import block_cases
-from contactverif_properties.solved import FLAT_SOLVE, at_penalty
+from contactverif_properties.flat_solve import FLAT_SOLVE
+from contactverif_properties.shared.solved_patch import measure_at_penalty
 
 N_MESHES = 40
 
@@ -71,7 +72,7 @@ def solved_by_us(blocks: TwoBlocks, subject: Subject) -> float:
 
 def judged_by_us(blocks: TwoBlocks, subject: Subject) -> float:
     """All that the property asks: forces on both sides, gaps, pressures, tolerances."""
-    return at_penalty(posed(blocks).case(), subject, blocks.penalty).values["stress"]
+    return measure_at_penalty(posed(blocks).case(), subject, blocks.penalty).values["stress error"]
 
 
 def test_beside_the_plain_script(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,8 +23,11 @@ from contactverif.scenes.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.dead_zone import DEAD_ZONE
-from contactverif_properties.patch import consistent_forces
-from contactverif_properties.solved import FLAT_SOLVE, VARIANTS, gap_error, solved_once
+from contactverif_properties.flat_solve import FLAT_SOLVE
+from contactverif_properties.patch_variants import PATCH_VARIANTS
+from contactverif_properties.shared.patch_errors import gap_error
+from contactverif_properties.shared.solved_patch import measure_once
+from contactverif_properties.shared.uniform_pressure import consistent_forces
 
 RIGHT = ("sts", "mortar", "mortar-dual", "mortar-lm", "mortar-dual-lm", "vts-ppt-balanced", "vts-ppt:free_end=cover")
 WRONG = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt:free_end=extend", "chen-hisada")
@@ -82,7 +85,7 @@ def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes(name: str) -> None:
-    assert solved_once(load_scene_case("dead-zone"), the(name)).values["stress"] <= 1e-14
+    assert measure_once(load_scene_case("dead-zone"), the(name)).values["stress error"] <= 1e-14
     for text in ("dead-zone", "dead-zone:degrees=17.3,refine=2", "dead-zone:ratio=1e3,poisson=0.45"):
         outcome = judge_case(DEAD_ZONE, load_scene_case(text), the(name))
         assert outcome.verdict is Verdict.PASS, outcome.reason
@@ -97,9 +100,9 @@ def test_who_passes_where_the_master_ends_at_a_slave_node_as_roundoff_will_have_
 
 @pytest.mark.parametrize("name", WRONG)
 def test_who_fails(name: str) -> None:
-    found = solved_once(load_scene_case("dead-zone"), the(name))
-    assert found.values["stress"] > 0.02
-    assert {"stress", "slave forces", "master forces"} <= {
+    found = measure_once(load_scene_case("dead-zone"), the(name))
+    assert found.values["stress error"] > 0.02
+    assert {"stress error", "slave force error", "master force error"} <= {
         quantity for quantity, value in found.values.items() if value > found.tolerances[quantity]
     }
 
@@ -113,7 +116,7 @@ def test_the_numbers_of_the_design() -> None:
     scene = two_blocks(
         x, [0, 6], master_x, [-6, 0], young=(1e4, 1e4), poisson=(0.3, 0.3), penalty=30 * 1e4 / 2, pressure=100
     )
-    errors = {name: solved_once(scene.case(), the(name)).values["stress"] for name in (*RIGHT[:2], *WRONG)}
+    errors = {name: measure_once(scene.case(), the(name)).values["stress error"] for name in (*RIGHT[:2], *WRONG)}
     assert max(errors[name] for name in RIGHT[:2]) <= 1e-13
     assert errors["nts-ar"] == pytest.approx(0.22, rel=0.1)
     assert errors["vts-me"] == pytest.approx(8e-2, rel=0.05)
@@ -165,7 +168,7 @@ def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: s
 
 
 def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
-    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, VARIANTS], scene=load_scene_case("dead-zone"))
+    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, PATCH_VARIANTS], scene=load_scene_case("dead-zone"))
     assert [row.verdict for row in found.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
     assert found.passed
     (row,) = run([the("sts")], [DEAD_ZONE], scene=load_scene_case("c")).rows
@@ -201,17 +204,17 @@ def telling(**more: Any) -> Subject:
     [
         ({"slave_segment": 0, "c": -1.0, "active": False, "pressure": 0.0}, set()),  # idle, beside the master
         ({"slave_segment": 1, "c": -1 + 2 * 1.1 / 2.3, "active": False}, set()),  # at its end, as near as roundoff
-        ({"slave_segment": 1, "c": 0.5, "active": False}, {"pressure"}),  # idle, opposite
+        ({"slave_segment": 1, "c": 0.5, "active": False}, {"pressure error"}),  # idle, opposite
         ({"slave_segment": 1, "c": 0.5, "active": False, "weight": 0.0}, set()),
         ({"slave_segment": 1, "c": 0.5, "active": False, "master_segment": -1}, set()),
-        ({"slave_segment": 0, "c": -1.0, "active": True, "pressure": 99.0}, {"pressure"}),
-        ({"slave_segment": 0, "c": -1.0, "active": True, "master_segment": -1, "pressure": 99.0}, {"pressure"}),
-        ({"slave_segment": -1, "c": np.nan, "active": False}, {"pressure"}),  # no place on the slave: opposite
-        ({"slave_segment": 1, "c": 0.5, "gap": 0.0}, {"gap"}),
+        ({"slave_segment": 0, "c": -1.0, "active": True, "pressure": 99.0}, {"pressure error"}),
+        ({"slave_segment": 0, "c": -1.0, "active": True, "master_segment": -1, "pressure": 99.0}, {"pressure error"}),
+        ({"slave_segment": -1, "c": np.nan, "active": False}, {"pressure error"}),  # no place on the slave: opposite
+        ({"slave_segment": 1, "c": 0.5, "gap": 0.0}, {"gap error"}),
     ],
 )
 def test_which_points_count(more: dict[str, Any], wrong: set[str]) -> None:
-    found = solved_once(load_scene_case("dead-zone"), telling(**more))
+    found = measure_once(load_scene_case("dead-zone"), telling(**more))
     assert {name for name, value in found.values.items() if value > found.tolerances[name]} == wrong
 
 
@@ -235,7 +238,7 @@ def test_what_overhangs_may_bend() -> None:
 
 def test_a_part_of_the_slave_bears_the_rounding_of_all() -> None:
     case = load_scene_case("dead-zone")
-    plain, found = (measure(case, the("sts")) for measure in (solved_once, DEAD_ZONE.measure))
+    plain, found = (measure(case, the("sts")) for measure in (measure_once, DEAD_ZONE.measure))
     assert found.values == plain.values
     for name, tolerance in plain.tolerances.items():
         assert found.tolerances[name] == pytest.approx(tolerance * 12 / 6.6, rel=1e-14)

@@ -12,7 +12,8 @@ from handmade import Handmade, case, over_a_node, subject
 from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.run.runner import judge_case, run
-from contactverif_properties.invariants import OBJECTIVITY, SCALED_FORCES, SCALED_TANGENT, SCALING, scaled, turned
+from contactverif_properties.objectivity import OBJECTIVITY, measure_objectivity
+from contactverif_properties.scaling import FORCES, SCALING, TANGENT, measure_scaling
 
 SEEDS = range(1, 30)
 
@@ -46,8 +47,8 @@ class Springs(Handmade):
 @pytest.mark.parametrize("penalty", ["nodal", "distributed"])
 def test_a_penalty_that_scales_with_its_unit_changes_no_digit(penalty: str) -> None:
     for seed in SEEDS:
-        found = scaled(case(seed=seed), subject(Springs, penalty=penalty))
-        assert found.values == {SCALED_FORCES.name: 0.0, SCALED_TANGENT.name: 0.0}
+        found = measure_scaling(case(seed=seed), subject(Springs, penalty=penalty))
+        assert found.values == {FORCES.name: 0.0, TANGENT.name: 0.0}
 
 
 @pytest.mark.parametrize(("promised", "kept"), [("nodal", "distributed"), ("distributed", "nodal")])
@@ -118,7 +119,7 @@ def test_a_tangent_that_does_not_turn_is_found_where_the_forces_do() -> None:
 
     outcome = judge_case(OBJECTIVITY, case(seed=1), subject(Axis))
     assert outcome.verdict is Verdict.FAIL
-    assert outcome.reason.startswith("turned tangent")
+    assert outcome.reason.startswith("error of the tangent after a rotation")
 
 
 class Nearest(Handmade):
@@ -171,5 +172,5 @@ def over_a_node_with(offset: float, seed: int) -> Any:
 
 def test_the_same_case_is_always_turned_the_same_way() -> None:
     who = subject(Springs)
-    assert turned(case(seed=5), who) == turned(case(seed=5), who)
-    assert turned(case(seed=5), who).values != turned(case(seed=6), who).values
+    assert measure_objectivity(case(seed=5), who) == measure_objectivity(case(seed=5), who)
+    assert measure_objectivity(case(seed=5), who).values != measure_objectivity(case(seed=6), who).values

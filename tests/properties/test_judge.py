@@ -15,8 +15,9 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes.named_states import named_case
-from contactverif_properties.balance import FORCE, MOMENT
-from contactverif_properties.patch import ERROR, FLAT_TRANSMISSION
+from contactverif_properties.flat_transmission import FLAT_TRANSMISSION, FORCE_ERROR
+from contactverif_properties.force_balance import FORCE_BALANCE
+from contactverif_properties.moment_balance import MOMENT_BALANCE
 
 
 def test_the_judge_loads_no_code_of_a_plugin() -> None:
@@ -56,7 +57,7 @@ def test_exact_forces_pass() -> None:
     outcome = judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Exact))
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
-    assert outcome.measurement.values == {ERROR.name: 0.0}
+    assert outcome.measurement.values == {FORCE_ERROR.name: 0.0}
 
 
 @pytest.mark.parametrize("node", range(5))
@@ -66,7 +67,7 @@ def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) ->
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     size = [1, 2, 1, 2, 2][node]
-    assert outcome.measurement.values[ERROR.name] == pytest.approx(error * size / 4, rel=1e-3)
+    assert outcome.measurement.values[FORCE_ERROR.name] == pytest.approx(error * size / 4, rel=1e-3)
 
 
 def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
@@ -105,23 +106,23 @@ class Pair(Handmade):
 
 
 def test_forces_balance_or_lack_what_they_lack() -> None:
-    assert judge_case(FORCE, case(), subject(Pair)).verdict is Verdict.PASS
-    outcome = judge_case(FORCE, case(), subject(Pair, back=0.96))
+    assert judge_case(FORCE_BALANCE, case(), subject(Pair)).verdict is Verdict.PASS
+    outcome = judge_case(FORCE_BALANCE, case(), subject(Pair, back=0.96))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
-    assert outcome.measurement.values["force defect"] == pytest.approx(0.04)
+    assert outcome.measurement.values["force imbalance"] == pytest.approx(0.04)
 
 
 def test_a_couple_balances_in_force_and_not_in_moment() -> None:
     """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
-    outcome = judge_case(MOMENT, case(), subject(Pair))
+    outcome = judge_case(MOMENT_BALANCE, case(), subject(Pair))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     arm = 2 - (6 / 7 - 1 / 2)
-    assert outcome.measurement.values["moment defect"] == pytest.approx(arm / case().diameter)
+    assert outcome.measurement.values["moment imbalance"] == pytest.approx(arm / case().diameter)
 
 
-@pytest.mark.parametrize("question", [FORCE, MOMENT], ids=lambda question: question.id)
+@pytest.mark.parametrize("question", [FORCE_BALANCE, MOMENT_BALANCE], ids=lambda question: question.id)
 def test_no_force_balances(question: Any) -> None:
     assert judge_case(question, case(), subject(Handmade)).verdict is Verdict.PASS
 
@@ -133,4 +134,4 @@ def test_a_force_on_the_master_alone_is_seen() -> None:
             forces[-1] = 1e-100
             return forces
 
-    assert judge_case(FORCE, case(), subject(Ghost)).verdict is Verdict.FAIL
+    assert judge_case(FORCE_BALANCE, case(), subject(Ghost)).verdict is Verdict.FAIL

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
-from contactverif_properties.kinks import jump, kink_within
+from contactverif_properties.shared.kinks import find_kink, measure_jump
 
 REACH = 1e-6
 
@@ -42,7 +42,7 @@ class Springs(Handmade):
 
 
 def kink(plugin: Any, where: Case, reach: float = REACH) -> str:
-    return kink_within(where, subject(plugin).for_case(where), None, reach, np.ones(where.z.size))
+    return find_kink(where, subject(plugin).for_case(where), None, reach, np.ones(where.z.size))
 
 
 def test_a_point_over_a_master_node_is_at_a_kink() -> None:
@@ -96,10 +96,10 @@ def test_nothing_in_contact_is_no_kink() -> None:
 def test_a_jump_is_seen_from_both_sides() -> None:
     where = over_a_node(0.0)
     directions = np.ones((1, where.z.size))
-    assert jump(where, subject(Springs).for_case(where), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
+    assert measure_jump(where, subject(Springs).for_case(where), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
     beside = over_a_node(1 / 7)
-    assert jump(beside, subject(Springs).for_case(beside), REACH, directions)[0] < 1e-5
-    assert jump(beside, subject(Springs).for_case(beside), REACH, directions)[1] == 0
+    assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[0] < 1e-5
+    assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[1] == 0
 
 
 def test_a_jump_of_the_tangent_counts_too() -> None:
@@ -108,7 +108,9 @@ def test_a_jump_of_the_tangent_counts_too() -> None:
             return np.eye(z.size) * (1.0 if z[0] + z[2] > 0 else 3.0)
 
     where = over_a_node(0.0)
-    assert jump(where, subject(Stiff).for_case(where), REACH, np.ones((1, where.z.size)))[1] == pytest.approx(2.0)
+    assert measure_jump(where, subject(Stiff).for_case(where), REACH, np.ones((1, where.z.size)))[1] == pytest.approx(
+        2.0
+    )
 
 
 def test_sparse_and_dense_tangents_are_the_same() -> None:

@@ -20,16 +20,8 @@ from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import load_scene_case
-from contactverif_properties.newton import (
-    DISTANCES,
-    NEWTON_HISTORY,
-    NEWTON_ORDER,
-    SERIES,
-    one_step,
-    order,
-    spectral_radius,
-    trajectory,
-)
+from contactverif_properties.newton_history import NEWTON_HISTORY, SERIES, measure_history
+from contactverif_properties.newton_order import DISTANCES, NEWTON_ORDER, fit_order, measure_order, spectral_radius
 
 DISTANT = np.array(DISTANCES)
 
@@ -53,7 +45,7 @@ def the(name: str) -> Subject:
     ],
 )
 def test_the_slope_of_a_known_law(after: FloatArray, slope: float, rate: float | None) -> None:
-    found, found_rate = order(DISTANT, after, 1e-14)
+    found, found_rate = fit_order(DISTANT, after, 1e-14)
     assert found == (slope if slope == inf else pytest.approx(slope, abs=0.1 if slope == 1.0 else 0.02))
     if rate is not None:
         assert found_rate == pytest.approx(rate)
@@ -61,19 +53,19 @@ def test_the_slope_of_a_known_law(after: FloatArray, slope: float, rate: float |
 
 def test_a_slope_that_still_rises_decides_nothing() -> None:
     after = np.abs(DISTANT**2 - 30 * DISTANT**3)  # two contributions of opposite sign
-    told = [order(DISTANT, after, floor)[0] for floor in (1e-5, 3e-6, 1e-6)]
+    told = [fit_order(DISTANT, after, floor)[0] for floor in (1e-5, 3e-6, 1e-6)]
     assert all(isnan(slope) or slope >= 1.9 for slope in told), told
 
 
 def test_too_few_distances_decide_nothing() -> None:
-    assert isnan(order(DISTANT[:2], DISTANT[:2] ** 2, 0.0)[0])
-    assert isnan(order(DISTANT[:0], DISTANT[:0], 0.0)[0])
-    assert isnan(order(DISTANT, DISTANT**2, 0.5 * DISTANT[1] ** 2)[0])
+    assert isnan(fit_order(DISTANT[:2], DISTANT[:2] ** 2, 0.0)[0])
+    assert isnan(fit_order(DISTANT[:0], DISTANT[:0], 0.0)[0])
+    assert isnan(fit_order(DISTANT, DISTANT**2, 0.5 * DISTANT[1] ** 2)[0])
 
 
 def test_noise_at_short_distances_is_not_taken_for_a_law() -> None:
     noisy = np.maximum(DISTANT**2, 1e-8)
-    assert order(DISTANT, noisy, 3e-8)[0] == pytest.approx(2.0, abs=0.02)
+    assert fit_order(DISTANT, noisy, 3e-8)[0] == pytest.approx(2.0, abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -100,9 +92,9 @@ def test_the_exact_tangent_leaves_no_radius() -> None:
 
 def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
     case = load_scene_case("example-1bis")
-    exact, basic = (one_step(case, the(name)) for name in ("vts-ppt", "vts-ppt-basic"))
-    assert exact.values["order of one step"] >= 1.9
-    assert basic.values["order of one step"] == pytest.approx(1.0, abs=0.1)
+    exact, basic = (measure_order(case, the(name)) for name in ("vts-ppt", "vts-ppt-basic"))
+    assert exact.values["order of one Newton step"] >= 1.9
+    assert basic.values["order of one Newton step"] == pytest.approx(1.0, abs=0.1)
     # in the largest norm a rate may exceed the radius, which is that of many steps
     assert 0.1 * basic.details["spectral radius"] < basic.details["rate"] < 10 * basic.details["spectral radius"]
 
@@ -117,18 +109,18 @@ def test_a_solution_that_is_not_found_is_undecided() -> None:
 
 def test_the_whole_trajectory_is_kept() -> None:
     case = load_scene_case("example-1bis:pressure=100,lowered=0")
-    found = trajectory(case, the("vts-ppt-basic"))
+    found = measure_history(case, the("vts-ppt-basic"))
     trace = solve(scene_of(case), the("vts-ppt-basic").for_case(case))
     assert found.series.keys() == SERIES.keys()
     assert np.array_equal(found.series["residual"], trace.residuals)
     assert np.array_equal(found.series["energy norm"], trace.energies, equal_nan=True)
-    assert found.values["iterations at the end"] > found.tolerances["iterations at the end"]
+    assert found.values["final iterations"] > found.tolerances["final iterations"]
 
 
 def test_a_piecewise_linear_problem_is_finite() -> None:
-    found = trajectory(load_scene_case("c-prime"), the("vts-ppt"))
+    found = measure_history(load_scene_case("c-prime"), the("vts-ppt"))
     assert found.details["finite"] == 1
-    assert found.values["iterations at the end"] <= 1
+    assert found.values["final iterations"] <= 1
 
 
 def test_without_a_pairing_kinks_are_seen_by_differences() -> None:

@@ -21,7 +21,9 @@ from contactverif.scenes.blocks import pressure_of, two_blocks
 from contactverif.scenes.catalogue import load_scene_case
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
-from contactverif_properties.solved import FLAT_SOLVE, SLOPE, VARIANTS, at_penalty, solved
+from contactverif_properties.flat_solve import FLAT_SOLVE, SLOPE, measure_two_penalties
+from contactverif_properties.patch_variants import PATCH_VARIANTS
+from contactverif_properties.shared.solved_patch import measure_at_penalty
 
 
 @cache
@@ -60,15 +62,15 @@ def test_the_recovered_stress_is_that_pressure(name: str) -> None:
 
 
 def test_nts_on_a1_passes_as_the_penalty_grows_because_it_locks() -> None:
-    found = solved(load_scene_case("a1"), the("nts"))
+    found = measure_two_penalties(load_scene_case("a1"), the("nts"))
     assert found.details[SLOPE] == pytest.approx(-1, abs=0.05)
     assert judge(FLAT_SOLVE, found)[0] is Verdict.FAIL
 
 
 def test_nts_ar_on_c_fails_at_any_penalty() -> None:
-    found = solved(load_scene_case("c-prime"), the("nts-ar"))
+    found = measure_two_penalties(load_scene_case("c-prime"), the("nts-ar"))
     assert found.details[SLOPE] > -0.5
-    assert found.values["stress, high penalty"] > 1e-2
+    assert found.values["stress error, high penalty"] > 1e-2
 
 
 class Turned:
@@ -105,9 +107,9 @@ def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
         return Turned(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
 
     lost = Subject("lost", make)
-    found = at_penalty(load_scene_case("c-prime"), lost, load_scene_case("c-prime").penalty)
-    assert judge(VARIANTS, found)[0] is Verdict.FAIL
-    assert found.values["master forces"] > 1e6 * found.tolerances["master forces"]
+    found = measure_at_penalty(load_scene_case("c-prime"), lost, load_scene_case("c-prime").penalty)
+    assert judge(PATCH_VARIANTS, found)[0] is Verdict.FAIL
+    assert found.values["master force error"] > 1e6 * found.tolerances["master force error"]
 
 
 @pytest.mark.parametrize("scene", ["a2-graded", "b:degrees=45", "example-1bis", "c-prime:ratio=1e-3", "c:ratio=1e6"])
@@ -121,9 +123,9 @@ def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
 
         return Turned(inner, contact_points=contact_points)
 
-    found = solved(load_scene_case(scene), Subject("boaster", make))
+    found = measure_two_penalties(load_scene_case(scene), Subject("boaster", make))
     wrong = {name for name, value in found.values.items() if value > found.tolerances[name]}
-    assert wrong == {"pressure", "pressure, high penalty"}
+    assert wrong == {"pressure error", "pressure error, high penalty"}
 
 
 def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
@@ -143,7 +145,7 @@ def test_every_variant_is_drawn() -> None:
     assert any(scene_of(case).bodies[1].rigid for case in drawn)
 
 
-@pytest.mark.parametrize("question", [FLAT_SOLVE, VARIANTS])
+@pytest.mark.parametrize("question", [FLAT_SOLVE, PATCH_VARIANTS])
 def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
     (row,) = run([the("vts-me")], [question], scene=load_scene_case("b")).rows
     assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)
@@ -165,6 +167,6 @@ def test_a_scaled_scene_is_judged_the_same() -> None:
             penalty=10 * modulus / length,
             approach=0.1 * length,
         )
-        found = at_penalty(scene.case(), the("nts-ar"), scene.penalty)
+        found = measure_at_penalty(scene.case(), the("nts-ar"), scene.penalty)
         values.append([*found.values.values(), *found.tolerances.values()])
     assert values[0] == pytest.approx(values[1], rel=1e-9)

@@ -10,7 +10,7 @@ from handmade import Handmade, case, subject
 
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.run.runner import judge_case
-from contactverif_properties.purity import AGAIN, BATCHED, PURITY, REORDERED, pure
+from contactverif_properties.purity import BATCHED, PURITY, REORDERED, REPEATED, measure_purity
 
 
 class Pure(Handmade):
@@ -27,7 +27,7 @@ class Pure(Handmade):
 
 
 def measured(plugin: Any, **traits: Any) -> Measurement:
-    return pure(case(seed=3), subject(plugin, **traits))
+    return measure_purity(case(seed=3), subject(plugin, **traits))
 
 
 def told(plugin: Any, **traits: Any) -> set[str]:
@@ -38,7 +38,7 @@ def told(plugin: Any, **traits: Any) -> set[str]:
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_function_is_pure(batched: bool) -> None:
     found = measured(Pure, batched=batched)
-    assert found.values == {AGAIN.name: 0, REORDERED.name: 0, BATCHED.name: 0}
+    assert found.values == {REPEATED.name: 0, REORDERED.name: 0, BATCHED.name: 0}
     assert not found.broken
     assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
 
@@ -51,7 +51,7 @@ def test_what_counts_its_calls_is_told_when_asked_again() -> None:
             self.calls += 1
             return z * (1 + self.calls * 2.0**-50)
 
-    assert AGAIN.name in told(Counts)
+    assert REPEATED.name in told(Counts)
 
 
 def test_what_a_tangent_leaves_behind_is_told_by_the_order() -> None:
@@ -133,13 +133,13 @@ class Moves(Pure):
     ("plugin", "said"),
     [
         (Kept, "the pairing of a state depends on the state before it"),
-        (Restless, "the pairing of a state differs when asked again"),
+        (Restless, "the pairing of a state differs in a repeated call"),
         (Moves, "the interface was changed"),
     ],
 )
 def test_a_breach_that_no_number_tells_is_said_in_words(plugin: Any, said: str) -> None:
     if plugin is Kept:  # a seed for which the two states pair differently
-        found = [pure(case(seed=seed), subject(plugin)).broken for seed in range(40)]
+        found = [measure_purity(case(seed=seed), subject(plugin)).broken for seed in range(40)]
         assert said in found
         return
     assert said in measured(plugin).broken

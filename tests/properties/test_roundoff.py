@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from handmade import case
 
-from contactverif_properties import roundoff
+from contactverif_properties.shared import roundoff
 
 U = 2.0**-53
 
 
 def test_forces_of_the_slave_are_summed_entry_by_entry() -> None:
     forces = np.array([[1.0, -2.0], [3.0, 0.0], [100.0, 100.0], [0.0, 0.0], [5.0, 5.0]])
-    assert roundoff.slave_forces(case(), forces) == 6.0
-    assert roundoff.slave_forces(case(), forces.reshape(-1)) == 6.0
+    assert roundoff.sum_slave_forces(case(), forces) == 6.0
+    assert roundoff.sum_slave_forces(case(), forces.reshape(-1)) == 6.0
 
 
 def test_the_mean_penetration_is_the_uniform_one_that_the_same_forces_need() -> None:
@@ -26,17 +26,17 @@ def test_the_mean_penetration_is_the_uniform_one_that_the_same_forces_need() -> 
 
 def test_the_tolerance_of_a_gap_is_the_formula() -> None:
     """X = 2 and N = 3."""
-    assert roundoff.of_gap(case(), 1 / 8) == pytest.approx(U * (8 * 2 / (1 / 8) + 4 * 3), rel=1e-15)
-    assert roundoff.of_gap(case(), 1e-9) > 1e6 * roundoff.of_gap(case(), 1e-2)
+    assert roundoff.gap_tolerance(case(), 1 / 8) == pytest.approx(U * (8 * 2 / (1 / 8) + 4 * 3), rel=1e-15)
+    assert roundoff.gap_tolerance(case(), 1e-9) > 1e6 * roundoff.gap_tolerance(case(), 1e-2)
 
 
 def test_where_nothing_penetrates_no_gap_is_rounded() -> None:
-    assert roundoff.of_gap(case(), 0.0) == U * 4 * 3
+    assert roundoff.gap_tolerance(case(), 0.0) == U * 4 * 3
 
 
 def test_a_share_of_nothing() -> None:
-    assert roundoff.share(1.0, 4.0) == 0.25
-    assert roundoff.share(0.0, 0.0) == 0.0
-    assert roundoff.share(1e-300, 0.0) == np.inf
-    assert np.isnan(roundoff.share(np.nan, 0.0)) or roundoff.share(np.nan, 0.0) == np.inf
-    assert np.isnan(roundoff.share(np.nan, 1.0))
+    assert roundoff.ratio(1.0, 4.0) == 0.25
+    assert roundoff.ratio(0.0, 0.0) == 0.0
+    assert roundoff.ratio(1e-300, 0.0) == np.inf
+    assert np.isnan(roundoff.ratio(np.nan, 0.0)) or roundoff.ratio(np.nan, 0.0) == np.inf
+    assert np.isnan(roundoff.ratio(np.nan, 1.0))

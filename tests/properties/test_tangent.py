@@ -12,14 +12,14 @@ from handmade import Handmade, case, over_a_node, subject
 from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.run.runner import judge_case
-from contactverif_properties.tangent import (
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.tangent_directional import (
     CENTRAL,
     COMPLEX,
-    DIRECTIONAL,
     SLOPE,
+    TANGENT_DIRECTIONAL,
     TAYLOR,
-    directional,
-    random_directions,
+    measure_directional,
     taylor_slope,
 )
 
@@ -68,12 +68,12 @@ def test_no_remainder_at_all_is_exact() -> None:
     assert taylor_slope(np.zeros((3, 2)), STEPS, floor=0.0) == np.inf
 
 
-def test_directions_are_eight_and_as_long_as_their_largest_entry() -> None:
-    directions = random_directions(case(seed=4))
-    assert directions.shape == (8, case().z.size)
+def test_directions_are_as_long_as_their_largest_entry() -> None:
+    directions = random_directions(4, 8, 10)
+    assert directions.shape == (8, 10)
     assert np.array_equal(np.abs(directions).max(axis=1), np.ones(8))
-    assert np.array_equal(directions, random_directions(case(seed=4)))
-    assert not np.array_equal(directions, random_directions(case(seed=5)))
+    assert np.array_equal(directions, random_directions(4, 8, 10))
+    assert not np.array_equal(directions, random_directions(5, 8, 10))
 
 
 def cubes(z: Any) -> Any:
@@ -112,7 +112,7 @@ def one_entry(size: float) -> Callable[[Any], Any]:
 
 
 def test_an_exact_tangent_passes_all_three_conditions() -> None:
-    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, takes_complex=True))
+    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, takes_complex=True))
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
     assert set(outcome.measurement.values) == {CENTRAL.name, TAYLOR.name, COMPLEX.name}
@@ -120,20 +120,20 @@ def test_an_exact_tangent_passes_all_three_conditions() -> None:
 
 
 def test_without_complex_numbers_there_is_no_complex_step() -> None:
-    assert COMPLEX.name not in directional(case(), subject(Smooth)).values
+    assert COMPLEX.name not in measure_directional(case(), subject(Smooth)).values
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-8])
 def test_an_error_in_one_entry_is_found(size: float) -> None:
-    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, error=one_entry(size)))
+    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=one_entry(size)))
     assert outcome.verdict is Verdict.FAIL
     assert CENTRAL.name in outcome.reason
 
 
 def test_a_complex_step_finds_what_a_central_difference_cannot() -> None:
     wrong = one_entry(1e-10)
-    assert judge_case(DIRECTIONAL, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
-    outcome = judge_case(DIRECTIONAL, case(), subject(Smooth, error=wrong, takes_complex=True))
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
+    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=wrong, takes_complex=True))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith(COMPLEX.name)
 
@@ -146,13 +146,13 @@ def test_a_tangent_of_nothing_is_nothing() -> None:
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return np.zeros((z.size, z.size))
 
-    assert judge_case(DIRECTIONAL, case(), subject(Nothing)).verdict is Verdict.PASS
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Nothing)).verdict is Verdict.PASS
 
     class TangentOfNothing(Nothing):
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return 1e-12 * np.eye(z.size)
 
-    assert judge_case(DIRECTIONAL, case(), subject(TangentOfNothing)).verdict is Verdict.FAIL
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(TangentOfNothing)).verdict is Verdict.FAIL
 
 
 class Restless(Smooth):
@@ -167,8 +167,8 @@ class Restless(Smooth):
 
 def test_a_pairing_that_changes_at_every_call_is_no_excuse() -> None:
     """Where the tangent is wrong. Where it is right, this is for `purity` to say: differences need no pairing twice."""
-    assert judge_case(DIRECTIONAL, case(), subject(Restless, error=one_entry(1.0))).verdict is Verdict.FAIL
-    assert judge_case(DIRECTIONAL, case(), subject(Restless, error=one_entry(0.0))).verdict is Verdict.PASS
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(1.0))).verdict is Verdict.FAIL
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(0.0))).verdict is Verdict.PASS
 
 
 def test_nor_where_it_names_its_contact_points() -> None:
@@ -176,7 +176,7 @@ def test_nor_where_it_names_its_contact_points() -> None:
         def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
             return self.points(c=0.1)
 
-    assert judge_case(DIRECTIONAL, case(), subject(Pointed, error=one_entry(1.0))).verdict is Verdict.FAIL
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Pointed, error=one_entry(1.0))).verdict is Verdict.FAIL
 
 
 @pytest.mark.parametrize(("wrong", "verdict"), [(0.0, Verdict.PASS), (1e-3, Verdict.FAIL)])
@@ -191,7 +191,7 @@ def test_where_the_residual_is_not_smooth_the_slope_tells_nothing(wrong: float, 
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return (1 + wrong) * np.eye(z.size)
 
-    assert judge_case(DIRECTIONAL, case(), subject(Rough)).verdict is verdict
+    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Rough)).verdict is verdict
 
 
 class Nearest(Handmade):
@@ -222,16 +222,17 @@ class Nearest(Handmade):
 
 def test_a_true_kink_is_undecided_where_it_would_fail() -> None:
     at_kink, beside = over_a_node(0.0), over_a_node(1 / 7)
-    assert judge_case(DIRECTIONAL, at_kink, subject(Nearest)).verdict is Verdict.PASS  # the frozen pairing is smooth
-    outcome = judge_case(DIRECTIONAL, at_kink, subject(Nearest, wrong=0.1))
+    on_frozen_pairing = judge_case(TANGENT_DIRECTIONAL, at_kink, subject(Nearest))
+    assert on_frozen_pairing.verdict is Verdict.PASS
+    outcome = judge_case(TANGENT_DIRECTIONAL, at_kink, subject(Nearest, wrong=0.1))
     assert outcome.verdict is Verdict.UNDECIDED
     assert outcome.reason.startswith("a kink: a decision hangs on ")
-    assert judge_case(DIRECTIONAL, beside, subject(Nearest)).verdict is Verdict.PASS
-    assert judge_case(DIRECTIONAL, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
+    assert judge_case(TANGENT_DIRECTIONAL, beside, subject(Nearest)).verdict is Verdict.PASS
+    assert judge_case(TANGENT_DIRECTIONAL, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
 
 
 def test_what_provides_no_tangent_is_not_asked() -> None:
-    assert DIRECTIONAL.needs == {"tangent"}
-    assert DIRECTIONAL.promise(Traits()) is None
-    assert DIRECTIONAL.promise(Traits(tangent="approximate")) is False
-    assert DIRECTIONAL.promise(Traits(tangent="exact")) is True
+    assert TANGENT_DIRECTIONAL.needs == {"tangent"}
+    assert TANGENT_DIRECTIONAL.promise(Traits()) is None
+    assert TANGENT_DIRECTIONAL.promise(Traits(tangent="approximate")) is False
+    assert TANGENT_DIRECTIONAL.promise(Traits(tangent="exact")) is True

@@ -17,7 +17,7 @@ from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.unilateral import UNILATERAL, lifted
+from contactverif_properties.unilateral import UNILATERAL, lift_slave
 
 
 class Springs:
@@ -43,7 +43,7 @@ def verdict(case: Case, **options: Any) -> tuple[Verdict, str]:
 
 def test_springs_that_push_and_never_pull() -> None:
     case = named_case("a1")
-    assert lifted(case, 0.25).positions[0, 1] == case.positions[0, 1] + 0.25
+    assert lift_slave(case, 0.25).positions[0, 1] == case.positions[0, 1] + 0.25
     assert verdict(case)[0] is Verdict.PASS
     depth = case.parameter("penetration")
     assert verdict(case, at=1.01 * depth)[0] is Verdict.FAIL

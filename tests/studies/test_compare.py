@@ -22,7 +22,8 @@ from contactverif.run.registry import load_formulation, load_properties
 from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.comparison_study import compared, differing
 from contactverif.studies.evaluation_cost import measured, state
-from contactverif_properties.newton import NEWTON_ORDER, ended
+from contactverif_properties.newton_order import NEWTON_ORDER
+from contactverif_properties.shared.newton_solution import solution_details
 from contactverif_reports.compare.cells import ORDER, Cell, Paired
 from contactverif_reports.compare.comparison import CONVERGED, END, ITERATIONS, Comparison
 from contactverif_reports.compare.regression import ALPHA, Changes, change, few, shift, wandering
@@ -31,7 +32,7 @@ from contactverif_reports.netcdf.stored_cells import StoredCells, read_cells
 from contactverif_reports.netcdf.write import write
 
 ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding")
-SLOPE = Quantity("order of one step", "1", "1.9", "second order", "at least")
+SLOPE = Quantity("order of one Newton step", "1", "1.9", "second order", "at least")
 TOLERANCE = 2.0**-40  # a power of two, so that margins are exact
 
 
@@ -582,6 +583,6 @@ def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -
     scene = load_scene("c")
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)
-    told = ended(solve(scene, subject.for_case(scene.case())))
+    told = solution_details(solve(scene, subject.for_case(scene.case())))
     assert {ITERATIONS, END} <= set(told)
     assert told[END] == CONVERGED == End.CONVERGED

@@ -17,7 +17,7 @@ from contactverif.contract.property import Outcome, Property, Verdict, excess
 from contactverif.contract.result import Row
 from contactverif_reports.netcdf.summary_group import worst
 
-ORDER = "order of one step"  # the quantity of a property that measures the order of Newton's method
+ORDER = "order of one Newton step"  # the quantity of a property that measures the order of Newton's method
 HALF = 0.5  # of the largest difference, in decades: whoever is that far may be drawn for its smaller mesh
 
 

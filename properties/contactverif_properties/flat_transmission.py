@@ -1,0 +1,94 @@
+"""Ask whether a uniform penetration of a flat interface gives the exact nodal forces on both sides.
+
+**Question.** Two flat surfaces with different meshes penetrate each other by the same depth everywhere. Are the nodal
+forces the consistent forces of the pressure ε̂ |g|, on the slave and on the master?
+
+**Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure that is
+not there onto the bodies, and finer meshes do not help: refined solutions converge to a wrong stress.
+
+**How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces.
+The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap is
+a difference of coordinates, each rounded to uX, and N forces are summed. With multipliers only the distribution of
+the forces is judged, and not their size: of uniform multipliers if they are pressures, and of those that come nearest
+to the exact forces if they are nodal forces.
+
+**Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
+give the same gap.
+
+**Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.property import Measurement, Property
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies import flat_cases
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.roundoff import gap_quantity, gap_tolerance
+from contactverif_properties.shared.uniform_pressure import forces_of_penetration, unit_forces
+
+FORCE_ERROR = gap_quantity("error of a nodal force")
+
+
+def measure_transmission(case: Case, subject: Subject) -> Measurement:
+    """Compare the nodal forces of a uniform penetration with the exact consistent forces.
+
+    Parameters
+    ----------
+    case : Case
+        A flat case with the parameter `penetration`, a length.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        The largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless.
+    """
+    formulation = subject.for_case(case)
+    exact = forces_of_penetration(case)
+    size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
+    tolerance = gap_tolerance(case, case.parameter("penetration"))
+    if formulation.n_multipliers(case.interface):
+        forces, largest = _forces_of_multipliers(case, subject, formulation, exact)
+        tolerance *= largest
+    else:
+        forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+    error = float(np.linalg.norm(forces.reshape(-1, 2) - exact, axis=1).max())
+    return Measurement({FORCE_ERROR.name: error / size}, {FORCE_ERROR.name: tolerance})
+
+
+def _forces_of_multipliers(
+    case: Case, subject: Subject, formulation: CheckedFormulation, exact: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the forces (n_unknowns,) of the multipliers that are judged, and the largest multiplier over the mean."""
+    pressure = case.penalty * case.parameter("penetration")
+    uniform = np.full(formulation.n_multipliers(case.interface), pressure)
+    state = case.with_multipliers(uniform)
+    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    if subject.traits.penalty == "nodal":
+        multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
+        mean = float(np.abs(multipliers).mean())
+        return transfer @ multipliers, float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
+    forces: FloatArray = transfer @ uniform
+    n = 2 * case.interface.n_slave_nodes
+    total, exact_total = (nodal[:n].reshape(-1, 2).sum(axis=0) for nodal in (forces, exact.reshape(-1)))
+    projection = float(total @ exact_total)
+    return forces * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
+
+
+FLAT_TRANSMISSION = Property(
+    id="patch.flat.transmission",
+    family="patch",
+    summary="A uniform penetration of a flat interface gives the exact nodal forces on both sides.",
+    quantities=(FORCE_ERROR,),
+    cases=flat_cases,
+    measure=measure_transmission,
+    promise=lambda traits: traits.passes_flat_patch,
+    applicable=refuse_barrier,
+    exact=forces_of_penetration,
+)

@@ -1,0 +1,250 @@
+"""Ask whether one step of Newton's method from near a solution ends at a distance of second order.
+
+**Question.** A Newton step starts at a small distance from the solution of a random scene, with the pairing of the
+solution. How fast does the distance after the step fall with the distance before it?
+
+**Why it matters.** A tangent with a forgotten term still converges, but slowly: an analysis then takes ten times as
+many iterations, and smaller load steps. One step near the solution shows the order; the residuals of a whole solution
+often hide it.
+
+**How it is judged.** Steps start at distances of 3e-2 to 1e-5 ℓ in two random directions. The measured number is the
+slope of log |u1 − u*| over log |u0 − u*| at the three nearest distances where |u1 − u*| is above 1e3 u cond; the
+lower direction counts. It must be at least 1.9, since Newton's method has 2 less what is left of the third power.
+There is no number where the step meets the solution exactly. If the slope is near 1, the rate and the spectral radius
+of I − K⁻¹ ∂R/∂u are kept beside it.
+
+**Undecided.** Where Newton's method finds no solution, where the matrix has no inverse, where too few states near the
+solution pair like it, and where the derivative by differences gives no better order.
+
+**Source.** Zavarise & De Lorenzis (2009), Fig. 30, where the spectral radius is the rate of the basic version.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import System
+from contactverif.mechanics.scene import scene_of
+from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.newton_solution import (
+    find_solution,
+    is_untouched,
+    length_units,
+    solution_details,
+    solution_floor,
+)
+
+DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # From 3e-2 to 1e-5, over the shortest segment.
+N_DIRECTIONS = 2
+N_FITTED = 3  # The number of distances, the nearest ones, that a slope is fitted to.
+RISING = 0.02  # A slope that grows by more than this between neighbours has not settled yet.
+EXACT = 1e-2  # A floor up to this share of the shortest distance cannot hide linear convergence.
+LINEAR, QUADRATIC = 1.1, 1.9  # A slope up to the first is linear, one from the second on is quadratic.
+
+ORDER = Quantity(
+    "order of one Newton step",
+    "1",
+    "1.9",
+    "From states of the same pairing, |u1 − u*| falls like |u0 − u*|², less what is left of the third power.",
+    "at least",
+)
+
+
+def measure_order(case: Case, subject: Subject) -> Measurement:
+    """Take one Newton step from states at a known distance of a solution, and fit the order.
+
+    Parameters
+    ----------
+    case : Case
+        A random scene.
+    subject : Subject
+        A formulation with a tangent.
+
+    Returns
+    -------
+    Measurement
+        The order; missing where the step meets the solution exactly. Details: how the solution ended, the rate
+        |u1 − u*| / |u0 − u*| at the nearest distance, the number of steps, and the spectral radius where the order is
+        below 1.9.
+    """
+    scene = scene_of(case)
+    system = System(scene, subject.for_case(case))
+    trace = find_solution(system)
+    details = solution_details(trace)
+    if not trace.converged:
+        return Measurement({}, {}, details=details, undecided=f"Newton found no solution: {trace.end.label}")
+    solution = trace.u[-1]
+    pairing = system.pair(solution)
+    matrix, _ = system.matrix(solution, pairing)
+    condition = system.step(matrix, np.zeros(system.size)).condition
+    if condition <= system.size * UNIT_ROUNDOFF:
+        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+    steps = fit_steps(system, case, solution, pairing, condition)
+    details["rate"], details["steps"] = steps.rate, float(steps.count)
+    if np.isnan(steps.order):
+        return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
+    undecided = ""
+    if steps.order < QUADRATIC:
+        details["spectral radius"] = spectral_radius(system, solution, pairing)
+        by_differences = fit_steps(replace(system, use_tangent=False), case, solution, pairing, condition)
+        if not by_differences.order >= QUADRATIC:
+            undecided = "a kink: with the derivative by differences, Newton's order is no better"
+    linear = steps.order == inf  # One step solves a linear problem, which has no order.
+    return Measurement(
+        {} if linear else {ORDER.name: steps.order},
+        {} if linear else {ORDER.name: QUADRATIC},
+        details=details,
+        undecided=undecided,
+        idle=is_untouched(system, trace),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The order and rate of single Newton steps from around a solution.
+
+    Attributes
+    ----------
+    order : float
+        The lower order of the directions; NaN if none decides.
+    rate : float
+        The higher rate of the directions.
+    count : int
+        The number of steps that started with the pairing of the solution.
+    """
+
+    order: float
+    rate: float
+    count: int
+
+
+def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float) -> Steps:
+    """Take one Newton step from each of some states around a solution, and fit their order.
+
+    Parameters
+    ----------
+    system : System
+        The scene with its formulation.
+    case : Case
+        The case of the scene, for its seed and its shortest segment.
+    solution : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns of the solution.
+    pairing : Pairing | None
+        The pairing of the solution.
+    condition : float
+        The reciprocal condition of the matrix there.
+    """
+    length, units = case.shortest_segment, length_units(system, solution, pairing)
+    floor = solution_floor(system, solution, pairing, condition)
+    fits, count = [], 0
+    for direction in random_directions(case.seed, N_DIRECTIONS, system.size):
+        before, after = [], []
+        for distance in DISTANCES:
+            u = solution + distance * length * direction * units
+            if not _pairs_alike(system, case, pairing, u, distance * length):
+                continue
+            matrix, _ = system.matrix(u, pairing)
+            step = system.step(matrix, -system.residual(u, pairing)).change
+            count += 1
+            before.append(distance * length)
+            after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
+        fits.append(fit_order(np.array(before), np.array(after), floor))
+    decisive = [(order, rate) for order, rate in fits if not np.isnan(order)] or [(np.nan, np.nan)]
+    return Steps(min(order for order, _ in decisive), max(rate for _, rate in decisive), count)
+
+
+def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
+    """Fit the slope of log after over log before at the nearest distances above the floor.
+
+    Parameters
+    ----------
+    before : FloatArray, shape (n_steps,)
+        Distances from the solution before the step, descending.
+    after : FloatArray, shape (n_steps,)
+        Distances after the step; infinite where the matrix had no inverse.
+    floor : float
+        The distance at which roundoff decides.
+
+    Returns
+    -------
+    order : float
+        The slope. Infinite where even the longest distance ends at the floor: one step is exact. NaN where there are
+        too few distances, or where the slope is below 2 and still rises towards it as the distances fall.
+    rate : float
+        after/before at the nearest distance.
+    """
+    if not len(before):
+        return np.nan, np.nan
+    above = after > floor
+    if not above.any():  # The step is exact, unless roundoff would hide as much as a linear rate.
+        return (inf, 0.0) if floor <= EXACT * before.min() else (np.nan, np.nan)
+    # Once at the floor, always at the floor: an error that rises again at a shorter distance is noise.
+    last = int(np.argmin(above)) if not above.all() else len(above)
+    before, after = before[:last][-N_FITTED:], after[:last][-N_FITTED:]
+    if len(before) < N_FITTED:
+        return np.nan, np.nan
+    if not np.isfinite(after).all():
+        return 0.0, inf
+    slopes = np.diff(np.log(after)) / np.diff(np.log(before))
+    if LINEAR < slopes[-1] < QUADRATIC and slopes[-1] > slopes[0] + RISING:
+        return np.nan, np.nan
+    return float(slopes.mean() if slopes[-1] < QUADRATIC else slopes[-1]), float(after[-1] / before[-1])
+
+
+def spectral_radius(system: System, u: FloatArray, pairing: Pairing | None) -> float:
+    """Return the spectral radius of I − K⁻¹ ∂R/∂u, the rate of Newton's method with the matrix K.
+
+    The derivative is taken by central differences of the residual.
+
+    Parameters
+    ----------
+    system : System
+        The scene with its formulation.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns.
+    pairing : Pairing | None
+        The pairing, which stays frozen.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Fig. 30.
+    """
+    matrix, _ = system.matrix(u, pairing)
+    exact, _ = replace(system, use_tangent=False).matrix(u, pairing)
+    return float(np.abs(linalg.eigvals(np.eye(len(u)) - linalg.solve(dense(matrix), dense(exact)))).max())
+
+
+def _pairs_alike(system: System, case: Case, pairing: Pairing | None, u: FloatArray, reach: float) -> bool:
+    """Return whether the state pairs as the solution does, or without a pairing, whether differences see no kink."""
+    if pairing is not None:
+        return system.pair(u) == pairing
+    z = system.state(u)
+    (direction,) = random_directions(case.seed, 1, z.size)
+    state = replace(case, z=z, n_multipliers=system.n_multipliers)
+    return not find_kink(state, system.formulation, None, reach, direction)
+
+
+NEWTON_ORDER = Property(
+    id="newton.order",
+    family="newton",
+    summary="One Newton step from near a solution ends at a distance of second order.",
+    quantities=(ORDER,),
+    cases=solid_cases,
+    measure=measure_order,
+    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    needs=frozenset({"tangent"}),
+    applicable=refuse_dependent_multipliers,
+    bodies=True,
+)

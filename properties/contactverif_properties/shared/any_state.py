@@ -1,0 +1,47 @@
+"""Cases for questions that make sense in any state, and the formulation with a complete state to ask them about.
+
+A formulation with multipliers is asked about a state with random multipliers that press. No body gives a unit of
+pressure there. The harness chooses one in which c = 1 and multipliers are as large as penetrations would be, so that
+forces, constraints and all parts of a tangent have one size and one unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies import general_cases, tie_cases
+
+SMALLEST, LARGEST = 0.125, 0.25  # The range of random multipliers over the shortest segment.
+
+
+def any_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
+    """Return a strategy of random meshes and states, exact ties among them.
+
+    Parameters
+    ----------
+    interface : Interface | None
+        A given interface, on which only the states are random. By default the meshes are random too, and about one
+        case in three is an exact tie between two answers.
+    """
+    if interface is not None:
+        return general_cases(interface)
+    return st.one_of(general_cases(), general_cases(), tie_cases())
+
+
+def prepare_state(case: Case, subject: Subject) -> tuple[CheckedFormulation, Case]:
+    """Return the formulation with the penalty of the case, and the case with multipliers if the formulation has any."""
+    formulation = subject.for_case(case)
+    if not formulation.n_multipliers(case.interface):
+        return formulation, case
+    low, high = (share * case.shortest_segment for share in (SMALLEST, LARGEST))
+    formulation = subject.with_penalty(1.0)
+    random = np.random.default_rng([case.seed, 1])  # Other numbers than those that the property draws for itself.
+    multipliers = random.uniform(low, high, formulation.n_multipliers(case.interface))
+    return formulation, replace(case, penalty=1.0).with_multipliers(multipliers)

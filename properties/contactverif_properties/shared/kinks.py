@@ -1,0 +1,134 @@
+"""Decide whether a state is so near a kink that a failure there means nothing.
+
+A kink is where a contact point changes its master segment, its gap changes sign, or an end of its area of competence
+passes a master node. The harness decides, and not the plugin's pairing, or a plugin whose pairing changes at every call
+would never fail. Where the plugin says where its contact points are, the harness computes the distance to the nearest
+kink from the positions. Where the plugin does not, one-sided differences of its residual must agree.
+`docs/tolerances.md` explains kinks and the verdict `undecided`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.subject import CheckedFormulation
+from contactverif.oracle import kink_margin
+from contactverif_properties.shared.directions import random_directions
+
+N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
+
+
+def explain_by_kink(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, errors: dict[str, float]
+) -> str:
+    """Return why a failure may be the fault of a kink, or an empty string.
+
+    Parameters
+    ----------
+    case : Case
+        The state that failed.
+    formulation : CheckedFormulation
+        The formulation that is judged.
+    pairing : Pairing | None
+        The pairing of the state.
+    reach : float
+        By how much the coordinates are rounded, a length.
+    errors : dict[str, float]
+        The largest error of an entry, under "forces" or "tangent", for each of the two that failed.
+
+    Returns
+    -------
+    str
+        A reason if a decision hangs on less than `reach`, or if moving the nodes by `reach` changes the answer by a
+        quarter of each error or more.
+    """
+    directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
+    near = find_kink(case, formulation, pairing, reach, directions[0])
+    if near:
+        return near
+    jumps = dict(zip(("forces", "tangent"), measure_jump(case, formulation, reach, directions), strict=True))
+    if all(4 * jumps[part] >= error for part, error in errors.items()):
+        return "a kink: moving the nodes by roundoff changes the answer as much"
+    return ""
+
+
+def measure_jump(
+    case: Case, formulation: CheckedFormulation, reach: float, directions: FloatArray
+) -> tuple[float, float]:
+    """Return how much the forces and the tangent change when the nodes move by `reach`, forth or back.
+
+    Parameters
+    ----------
+    case : Case
+        The state to move.
+    formulation : CheckedFormulation
+        The formulation that answers, with a new pairing in each state.
+    reach : float
+        The length of the move.
+    directions : FloatArray, shape (n, n_unknowns)
+        The directions of the moves; the largest entry of each is ±1.
+
+    Returns
+    -------
+    force_change : float
+        The largest change of a force.
+    tangent_change : float
+        The largest change of an entry of the tangent; 0 where the plugin has none.
+    """
+    force, tangent = _answers(case, formulation, case.z)
+    others = [
+        _answers(case, formulation, case.z + sign * reach * direction) for direction in directions for sign in (1, -1)
+    ]
+    return (
+        max(float(np.abs(other_force - force).max()) for other_force, _ in others),
+        max(float(np.abs(other_tangent - tangent).max()) for _, other_tangent in others),
+    )
+
+
+def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return forces and tangent at z with its own pairing; one zero in place of a tangent that is not provided."""
+    pairing = formulation.pair(case.interface, z)
+    forces = formulation.residual(case.interface, pairing, z)
+    if "tangent" not in formulation.provides:
+        return forces, np.zeros(1)
+    return forces, dense(formulation.tangent(case.interface, pairing, z))
+
+
+def find_kink(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, direction: FloatArray
+) -> str:
+    """Return why a decision may change if each coordinate moves by `reach` at most, or an empty string.
+
+    Parameters
+    ----------
+    case : Case
+        The state to look at.
+    formulation : CheckedFormulation
+        The formulation; its contact points are used if it provides them.
+    pairing : Pairing | None
+        The pairing of the state.
+    reach : float
+        The largest move of a coordinate, a length.
+    direction : FloatArray, shape (n_unknowns,)
+        The direction of one-sided differences where there are no contact points; its largest entry is ±1.
+    """
+    if "contact_points" in formulation.provides:
+        points = formulation.contact_points(case.interface, pairing, case.z)
+        margin = kink_margin(case.interface, case.z, points.slave_segment, points.c, points.area_from, points.area_to)
+        if margin <= np.sqrt(2) * reach:  # The reach is of a coordinate, the margin of a node.
+            return f"a kink: a decision hangs on {margin:.2g}, no more than nodes may move"
+        return ""
+    here, ahead, behind = (
+        formulation.residual(case.interface, formulation.pair(case.interface, z), z)
+        for z in (case.z, case.z + reach * direction, case.z - reach * direction)
+    )
+    bend = np.abs(ahead - 2 * here + behind).max()
+    slope = np.abs(ahead - behind).max() / 2
+    # A smooth function bends by slope × reach/ℓ and by what roundoff does; a kink bends by as much as the slope itself.
+    rounding = 32 * UNIT_ROUNDOFF * case.largest_coordinate / reach
+    if bend > slope * max(np.sqrt(reach / case.shortest_segment), rounding):
+        return f"a kink: one-sided differences over {reach:.2g} disagree by {bend / max(slope, bend):.2g}"
+    return ""

@@ -1,0 +1,133 @@
+"""The errors of a solved patch test: nodal forces, heights, and what the formulation reports at its contact points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.subject import CheckedFormulation
+from contactverif.mechanics.scene import Scene
+from contactverif.scenes.blocks import overhangs
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.shared.uniform_pressure import consistent_forces
+
+
+def force_errors(
+    case: Case, scene: Scene, formulation: CheckedFormulation, q: FloatArray, pressure: float
+) -> tuple[float, float]:
+    """Return the largest error of a nodal force on the slave and on the master, over p L.
+
+    Forces are judged twice: those that the bodies need to be in balance, and those that the formulation gives. They
+    differ where the formulation found no balance, and at rollers, which take what the bodies do not need.
+
+    Parameters
+    ----------
+    case : Case
+        The solved state.
+    scene : Scene
+        The scene that was solved.
+    formulation : CheckedFormulation
+        The formulation, with the penalty of the solution.
+    q : FloatArray, shape (n_free,)
+        The unknowns of the bodies in that state.
+    pressure : float
+        The exact pressure p.
+
+    Returns
+    -------
+    slave : float
+        The largest error over the slave's nodes, dimensionless.
+    master : float
+        The same over the master's nodes.
+    """
+    by_bodies = scene.nodal_forces(q)
+    pairing = formulation.pair(case.interface, case.z)
+    by_contact = -formulation.residual(case.interface, pairing, case.z)[: case.interface.n_unknowns].reshape(-1, 2)
+    first = 0
+    for index in scene.bodies_in_reach:
+        last = first + len(scene.bodies[index].contact_nodes)
+        if scene.bodies[index].rigid:
+            by_bodies[first:last] = by_contact[first:last]
+        first = last
+    exact = consistent_forces(case, pressure)
+    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
+    errors /= pressure * case.slave_length
+    n_slave = case.interface.n_slave_nodes
+    return float(errors[:n_slave].max()), float(errors[n_slave:].max())
+
+
+def gap_error(case: Case, penetration: float, size: float) -> float:
+    """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
+
+    A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
+
+    Parameters
+    ----------
+    case : Case
+        The solved state, with the parameters `along` and `direction` of a flat interface.
+    penetration : float
+        The exact penetration p/ε̂, a length; 0 for multipliers.
+    size : float
+        The length that the error is divided by.
+    """
+    along = case.parameters["direction"]
+    heights = case.positions @ [-along[1], along[0]]
+    n_slave = case.interface.n_slave_nodes
+    slave, master = np.split(case.parameters["along"], [n_slave])
+    order = np.argsort(slave)
+    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
+    level = heights[n_slave:].mean()
+    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
+    return float(errors.max() / size)
+
+
+def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: float) -> tuple[float, float]:
+    """Return the largest errors of the gaps and pressures that a formulation reports at its contact points.
+
+    Idle points do not count if they have no weight, no master segment, or lie beside the master.
+
+    Parameters
+    ----------
+    case : Case
+        The solved state.
+    points : ContactPoints
+        What the formulation reports there.
+    penalty : float
+        The distributed penalty ε̂ of the solution.
+    pressure : float
+        The exact pressure p.
+
+    Returns
+    -------
+    gap : float
+        The largest error of a reported gap over p/ε̂.
+    pressure : float
+        The largest error of a reported pressure over p; infinite if no point counts.
+    """
+    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(case, points)
+    counted = (points.weight != 0) & in_contact
+    gaps = np.where(counted, points.gap, -pressure / penalty)  # A gap is NaN where it is meaningless.
+    gap = float(np.nanmax(np.abs(gaps * penalty / pressure + 1), initial=0.0))
+    pressures = np.where(points.active, points.pressure, 0.0)[counted]
+    if not len(pressures):
+        return gap, np.inf
+    return gap, float(np.abs(pressures - pressure).max(initial=0.0) / pressure)
+
+
+def beside_master(case: Case, points: ContactPoints) -> BoolArray:
+    """Return which points (n_points,) of an overhanging slave lie beside the master, or within roundoff of its end.
+
+    A point that names no place on the slave does not lie beside the master.
+    """
+    if not overhangs(case):
+        return np.zeros(len(points.c), bool)
+    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    ends = slave[
+        case.interface.slave.segments[points.slave_segment]
+    ]  # Segment −1 gives nonsense, which the last line drops.
+    place = (1 - points.c) / 2 * ends[:, 0] + (1 + points.c) / 2 * ends[:, 1]
+    rounding = COORDINATE_ROUNDING * case.largest_coordinate
+    beside: BoolArray = (place < master.min() + rounding) | (place > master.max() - rounding)
+    return beside & (points.slave_segment >= 0)

@@ -1,0 +1,103 @@
+"""The tolerances that several properties share: what roundoff alone may do to a force, each formula with its reason.
+
+Symbols: u = 2⁻⁵³; X is the largest coordinate; g is the penetration; ℓ is the shortest segment; L is the slave's
+length; N is the number of segments of both sides. Where the penetration varies, g is the uniform one that would give
+the same forces, Σ|R| / (ε̂ L). `docs/tolerances.md` has the whole list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
+from contactverif.contract.case import Case
+from contactverif.contract.property import Quantity
+
+GAP_TOLERANCE = "u(8X/|g| + 4N)"
+GAP_REASON = "A gap is a difference of coordinates, each rounded to uX, and N forces are summed."
+SEGMENT_TOLERANCE = "u(8X/min(g, ℓ) + 4N)"
+SEGMENT_REASON = (
+    "A gap is a difference of coordinates, each rounded to uX, and N forces are summed. "
+    "Rounding the ends of a segment turns the segment and its force by uX/ℓ."
+)
+COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a few times; this times X bounds the move.
+
+
+def sum_slave_forces(case: Case, forces: Array) -> float:
+    """Return Σ|R| over the entries of the slave nodes.
+
+    Parameters
+    ----------
+    case : Case
+        The case that the forces belong to.
+    forces : Array, shape (n_unknowns,) or (n_nodes, 2)
+        The residual; what stands behind the slave's entries is not read.
+    """
+    return float(np.abs(forces.reshape(-1)[: 2 * case.interface.n_slave_nodes]).sum())
+
+
+def mean_penetration(case: Case, forces: Array) -> float:
+    """Return the uniform penetration, a length, that would need the same Σ|R| over the slave: Σ|R| / (ε̂ L)."""
+    return sum_slave_forces(case, forces) / (case.penalty * case.slave_length)
+
+
+def gap_tolerance(case: Case, penetration: float) -> float:
+    """Return GAP_TOLERANCE as a number.
+
+    Parameters
+    ----------
+    case : Case
+        The state that is judged.
+    penetration : float
+        The penetration g, a length. Where it is 0 there is no gap to round, and a force of any size is wrong.
+    """
+    gap_rounding = 8 * case.largest_coordinate / penetration if penetration > 0 else 0.0
+    return UNIT_ROUNDOFF * (gap_rounding + 4 * case.n_segments)
+
+
+def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
+    """Return SEGMENT_TOLERANCE as a number.
+
+    Parameters
+    ----------
+    case : Case
+        The state that is judged.
+    forces : Array, shape (n_unknowns,)
+        Its residual, for the mean penetration. Where nothing is in contact the value is 0 or infinite, and any
+        tolerance serves.
+    largest : float
+        The largest coordinate X of all states that take part.
+    """
+    penetration = mean_penetration(case, forces)
+    reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment
+    return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
+
+
+def select_failures(errors: Mapping[str, float], values: Mapping[str, float], tolerance: float) -> dict[str, float]:
+    """Return those errors whose value is above the tolerance.
+
+    Parameters
+    ----------
+    errors : Mapping[str, float]
+        The largest error of an entry, under "forces" or "tangent".
+    values : Mapping[str, float]
+        The same errors in the same order, over the size of what they belong to, by the names of quantities.
+    tolerance : float
+        The tolerance of all values.
+    """
+    pairs = zip(errors.items(), values.values(), strict=True)
+    return {part: error for (part, error), value in pairs if value > tolerance}
+
+
+def ratio(part: float, whole: float) -> float:
+    """Return part / whole; 0/0 counts as 0, and anything else over 0 as infinite."""
+    if whole > 0:
+        return part / whole
+    return 0.0 if part == 0 else np.inf
+
+
+def gap_quantity(name: str) -> Quantity:
+    """Return a dimensionless quantity that only the rounding of gaps may keep from zero."""
+    return Quantity(name, "1", GAP_TOLERANCE, GAP_REASON)

@@ -1,0 +1,248 @@
+"""The patch test solved: two elastic bodies under a uniform pressure, judged against the exact solution.
+
+The patch test asks about the residual alone, so Newton's method differentiates the residual by itself, and the
+formulation's own tangent plays no part. The question is whether the exact solution is a solution of the formulation.
+
+Rule for the next editor: the exact stress and the tolerances come from `contactverif.scenes.uniform_stress`, the errors
+from `patch_errors`; this file solves, and puts numbers and tolerances together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.scenes.blocks import exact_unknowns, pressure_of
+from contactverif.scenes.uniform_stress import (
+    PRESSURE_TOLERANCE,
+    STRESS_TOLERANCE,
+    stress_error,
+    uniform_tolerances,
+)
+from contactverif_properties.shared.exact_multipliers import exact_multipliers, nearest_multipliers
+from contactverif_properties.shared.newton_solution import end_details
+from contactverif_properties.shared.patch_errors import force_errors, gap_error, point_errors
+from contactverif_properties.shared.uniform_pressure import consistent_forces
+
+ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
+SAME_SOLUTION = 2.0**-10  # A solution this close to the exact one, over the penetration, counts as the same one.
+
+REASON = (
+    "κ, the greater of ε̂h and the stiffer body's E over the softer body's E, measures the condition of the matrix. "
+    "r is the shortest segment over the longest. "
+    "A gap p/ε̂ is a difference of positions X, and a node balances about 8 springs to 8 roundoffs. "
+    "Displacements U are rounded, which makes stresses M U/ℓ on the shortest segment."
+)
+STRESS = Quantity("stress error", "1", STRESS_TOLERANCE, REASON)
+SLAVE_FORCES = Quantity("slave force error", "1", STRESS_TOLERANCE, REASON)
+MASTER_FORCES = Quantity("master force error", "1", STRESS_TOLERANCE, REASON)
+GAP = Quantity(
+    "gap error",
+    "1",
+    f"({STRESS_TOLERANCE}) (1 + ε̂ ΣH/M)",
+    f"{REASON} Where no spring measures a height, the bodies hold it, and they give way by ΣH/M under a unit pressure.",
+)
+PRESSURE = Quantity(
+    "pressure error",
+    "1",
+    PRESSURE_TOLERANCE,
+    f"{REASON} The shortest segment carries what the force of the longest one lacks.",
+)
+MULTIPLIERS = Quantity(
+    "multiplier error",
+    "1",
+    f"({STRESS_TOLERANCE})/s",
+    f"{REASON} s is the smallest singular value of the loads of unit multipliers on the bodies over the largest one.",
+)
+QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE)
+
+
+def measure_once(case: Case, subject: Subject) -> Measurement:
+    """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
+    if subject.traits.enforcement == "multiplier":
+        return measure_with_multipliers(case, subject, case.penalty)
+    return measure_at_penalty(case, subject, case.penalty)
+
+
+def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
+    """Solve the scene of the case with a penalty method and return its errors.
+
+    Parameters
+    ----------
+    case : Case
+        A uniform scene.
+    subject : Subject
+        The formulation.
+    penalty : float
+        The distributed penalty ε̂ to solve with.
+
+    Returns
+    -------
+    Measurement
+        All dimensionless. Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master
+        force errors: the largest error of a nodal force over p L (`force_errors`). Gap error: the largest error of a
+        node's height, or of a reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p;
+        it is missing where the formulation reports none, or is nodal and so knows forces only.
+    """
+    scene, pressure = scene_of(case), pressure_of(case, penalty)
+    formulation = subject.for_case(replace(case, penalty=penalty))
+    exact = exact_unknowns(scene, pressure, penalty)
+    trace, q = solve_patch(scene, formulation, exact, pressure / penalty)
+    state = replace(case, z=scene.positions(q), penalty=penalty)
+    slave, master = force_errors(state, scene, formulation, q, pressure)
+    values = {
+        STRESS.name: stress_error(scene, scene.stresses(q), pressure),
+        SLAVE_FORCES.name: slave,
+        MASTER_FORCES.name: master,
+        GAP.name: gap_error(state, pressure / penalty, pressure / penalty),
+    }
+    if "contact_points" in formulation.provides:
+        pairing = formulation.pair(case.interface, state.z)
+        points = formulation.contact_points(case.interface, pairing, state.z)
+        gap, reported = point_errors(case, points, penalty, pressure)
+        values[GAP.name] = max(values[GAP.name], gap)
+        if subject.traits.penalty != "nodal":
+            values[PRESSURE.name] = reported
+    roundoff = uniform_tolerances(state, scene, pressure)
+    tolerances = dict.fromkeys(values, roundoff.stress)
+    tolerances[GAP.name] *= _gap_factor(case, penalty)
+    if PRESSURE.name in values:
+        tolerances[PRESSURE.name] = roundoff.pressure
+    return Measurement(values, tolerances, details=end_details(trace))
+
+
+def _gap_factor(case: Case, penalty: float) -> float:
+    """Return 1 + ε̂ ΣH/M."""
+    return 1 + penalty * float(case.parameters["compliance"].sum())
+
+
+def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
+    """Solve the scene of the case as a saddle point and return its errors against the solution without penetration.
+
+    Where the exact solution is a solution of the formulation, to roundoff, it counts in place of one that Newton's
+    method found less exactly: a saddle point that is nearly singular spoils what Newton's method finds, and not the
+    fact that the exact solution is one.
+
+    Parameters
+    ----------
+    case : Case
+        A uniform scene.
+    subject : Subject
+        A formulation with multipliers.
+    penalty : float
+        The distributed penalty ε̂ of the case. It serves as the scale c, and as the measure of gaps.
+
+    Returns
+    -------
+    Measurement
+        Stress and forces as in `measure_at_penalty`; gaps over p/ε̂. Multiplier error: the largest error of a
+        multiplier over p, where multipliers are pressures. Where they are not unique, the solution nearest to the exact
+        multipliers counts. Details: how the solution ended, and how many multipliers were not unique.
+    """
+    scene, pressure = scene_of(case), pressure_of(case, np.inf)
+    formulation = subject.for_case(replace(case, penalty=penalty))
+    exact = exact_unknowns(scene, pressure, np.inf)
+    exact_state = replace(case, z=scene.positions(exact))
+    saddle = _SaddlePoint(
+        case=case,
+        scene=scene,
+        subject=subject,
+        formulation=formulation,
+        penalty=penalty,
+        pressure=pressure,
+        multipliers=exact_multipliers(exact_state, subject, formulation, pressure),
+    )
+    exact_u = np.append(exact, saddle.multipliers)
+    trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
+    measurement = saddle.errors(u)
+    if any(value > measurement.tolerances[name] for name, value in measurement.values.items()):
+        at_exact = solve(scene, formulation, start=exact_u, iterations=1, use_tangent=False)
+        if at_exact.roundings[0] <= NEAR_CONVERGENCE:
+            measurement = saddle.errors(exact_u)
+    return replace(measurement, details=end_details(trace))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _SaddlePoint:
+    """A scene that a formulation with multipliers solves, and its exact solution."""
+
+    case: Case
+    scene: Scene
+    subject: Subject
+    formulation: CheckedFormulation
+    penalty: float
+    pressure: float
+    multipliers: FloatArray  # The exact ones, of shape (n_multipliers,).
+
+    def errors(self, u: FloatArray) -> Measurement:
+        """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
+        scene, pressure = self.scene, self.pressure
+        q = u[: scene.n_free]
+        state = replace(self.case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
+        multipliers, sharpness = nearest_multipliers(state, scene, self.formulation, self.multipliers)
+        state = state.with_multipliers(multipliers)
+        slave, master = force_errors(state, scene, self.formulation, q, pressure)
+        values = {
+            STRESS.name: stress_error(scene, scene.stresses(q), pressure),
+            SLAVE_FORCES.name: slave,
+            MASTER_FORCES.name: master,
+            GAP.name: gap_error(state, 0.0, pressure / self.penalty),
+        }
+        tolerance = uniform_tolerances(state, scene, pressure).stress
+        tolerances = dict.fromkeys(values, tolerance)
+        tolerances[GAP.name] *= _gap_factor(self.case, self.penalty)
+        if self.subject.traits.penalty == "distributed":
+            loaded = self.multipliers != 0  # The multiplier of a node that faces nothing is 0.
+            errors = np.abs(multipliers[loaded] / pressure - 1)
+            values[MULTIPLIERS.name] = float(errors.max(initial=0.0))
+            tolerances[MULTIPLIERS.name] = tolerance / sharpness
+        return Measurement(values, tolerances)
+
+
+def solve_patch(
+    scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
+) -> tuple[Trace, FloatArray]:
+    """Solve a scene and return Newton's trace and the solution that is judged.
+
+    Newton's method may end elsewhere than at the exact solution, since large motions have other solutions too. Then it
+    starts again at the exact solution, where a formulation that passes is in balance and does not move. A formulation
+    that is not in balance there is judged where it comes nearest to balance afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene to solve.
+    formulation : CheckedFormulation
+        The formulation, with its penalty.
+    exact : FloatArray, shape (n_free + n_multipliers,)
+        The exact solution.
+    penetration : float
+        The exact penetration p/ε̂, a length; distances from the exact solution are measured by it.
+
+    Returns
+    -------
+    trace : Trace
+        The first solution.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns that are judged.
+    """
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False)
+    if trace.converged:
+        distance = np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0)
+        if distance <= SAME_SOLUTION * penetration:
+            return trace, trace.u[-1]
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False)
+    balanced = again.roundings[0] <= NEAR_CONVERGENCE or len(again.u) == 1
+    return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
+
+
+def forces_to_draw(case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) at the penalty of the case, for pictures."""
+    return consistent_forces(case, pressure_of(case, case.penalty))
