@@ -38,7 +38,7 @@ from contactverif.run.registry import load_formulation, load_properties, propert
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case
 
-SEED = 3
+SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verify --all --profile ci` asks.
 
 
 def the_property(property_id: str) -> Property:
