@@ -45,7 +45,7 @@ class Quantity:
     unit : str
         "1" for a ratio.
     tolerance : str
-        The formula, as it is printed; its symbols are those of verification: u, X, S, g, ℓ, N.
+        The formula, as it is printed; its symbols are explained in docs/concepts/tolerances.md.
     reason : str
         Why that formula.
     sense : Literal['at most', 'at least']

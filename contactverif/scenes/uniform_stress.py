@@ -4,7 +4,7 @@ Properties, studies, the paper's room and the tests judge solved patch tests. Al
 the same solution has the same error and the same tolerance everywhere.
 
 Rules for the next editor: a formula is written once as text, beside the function that computes it, and whoever prints a
-tolerance prints that text. A change of a formula changes both, and `docs/tolerances.md`.
+tolerance prints that text. A change of a formula changes both, and `docs/concepts/tolerances.md`.
 
 Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment; r is the
 ratio of the shortest to the longest segment; u = 2⁻⁵³; X is the largest coordinate; M is the stiffer body's oedometer

@@ -3,5 +3,5 @@
 Rules for the next editor: the judge shares no code with the judged, so nothing here imports a plugin or
 `contactverif.geometry`. A file holds one property, and its first lines say what is asked, why it matters to an
 engineer, how it is judged, and when a case is undecided. The reference pages of the site are made of these lines.
-`docs/tolerances.md` explains what the formulas have in common.
+`docs/concepts/tolerances.md` explains what the formulas have in common.
 """

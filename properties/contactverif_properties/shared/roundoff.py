@@ -2,7 +2,7 @@
 
 Symbols: u = 2⁻⁵³; X is the largest coordinate; g is the penetration; ℓ is the shortest segment; L is the slave's
 length; N is the number of segments of both sides. Where the penetration varies, g is the uniform one that would give
-the same forces, Σ|R| / (ε̂ L). `docs/tolerances.md` has the whole list.
+the same forces, Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole list.
 """
 
 from __future__ import annotations
