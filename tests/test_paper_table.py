@@ -14,6 +14,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes import catalogue
@@ -115,7 +116,7 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
 
 def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_too_many() -> None:
     grid = np.linspace(0, 8, 9)
-    scene = two_blocks(grid, [4, 8], [0, 4, 8], [0, 4], penalty=10.0, pressure=1.0)
+    scene = two_blocks(Rectangle(grid, [4, 8]), Rectangle([0, 4, 8], [0, 4]), penalty=10.0, pressure=1.0)
     subject = load_formulation("vts-ppt-lm")
     (question,) = load_properties(["multipliers.rank"])
     assert isinstance(subject, Subject)

@@ -1,4 +1,8 @@
-"""Types of the arrays that flow through the house, and how they are made read-only."""
+"""The types of the arrays that flow through the house, and how an array is checked and made read-only.
+
+Rule for the next editor: what a plugin may keep or change must not be what others are judged on. Whoever passes an
+array on to a plugin, or takes one from it, passes or takes a copy.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from contactverif.contract.errors import MisuseError
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-Array = NDArray[Any]  # float64 or complex128: a residual takes and gives either
+Array = NDArray[Any]  # float64 or complex128: a residual takes either and returns the same.
 
 UNIT_ROUNDOFF = 2.0**-53
 
@@ -19,9 +25,21 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
-    """A contiguous copy of `values` with the given dtype that nobody can write on.
+    """Return a contiguous read-only copy of an array.
 
-    It stands on immutable bytes: a plugin cannot make it writeable again and change what others are judged on.
+    The copy stands on immutable bytes, so that nobody can make it writeable again.
+
+    Parameters
+    ----------
+    values : ArrayLike
+        An array of any shape.
+    dtype : type
+        The dtype of the copy.
+
+    Returns
+    -------
+    NDArray
+        The copy, of the same shape.
     """
     array = np.asarray(values, dtype=dtype)
     if array.size == 0:
@@ -35,3 +53,58 @@ def dense(matrix: Any) -> FloatArray:
     """Return a matrix, given as an array or as a sparse matrix or array of scipy, as an array of the same shape."""
     array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
     return array
+
+
+def as_array(argument: str, values: ArrayLike) -> NDArray[Any]:
+    """Return the values as an array of any dtype and shape.
+
+    Raises
+    ------
+    MisuseError
+        If rows have different lengths.
+    """
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise MisuseError(argument, "rows of different lengths", "an array") from error
+
+
+def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """Return the values as a new array of floats.
+
+    Parameters
+    ----------
+    argument : str
+        The name of the values in messages.
+    values : ArrayLike
+        Real numbers.
+    shape : tuple[int, ...]
+        The shape that is needed; −1 stands for any length.
+
+    Raises
+    ------
+    MisuseError
+        If the values are no real numbers, or have another shape.
+    """
+    raw = as_array(argument, values)
+    if raw.dtype.kind not in "fiu":
+        raise MisuseError(argument, f"dtype {raw.dtype}", "numbers")
+    check_shape(argument, raw, shape)
+    return raw.astype(np.float64)
+
+
+def check_shape(argument: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Check the shape of an array, in which −1 stands for any length.
+
+    Raises
+    ------
+    MisuseError
+        If the array has another shape.
+    """
+    fits = array.ndim == len(shape) and all(
+        length in (-1, actual) for length, actual in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        lengths = ["n" if length < 0 else str(length) for length in shape]
+        needed = f"shape ({lengths[0]},)" if len(shape) == 1 else f"shape ({', '.join(lengths)})"
+        raise MisuseError(argument, f"shape {array.shape}", needed)

@@ -1,4 +1,9 @@
-"""One thing to judge: an interface, a state, a penalty. To and from plain arrays, so that it outlives its maker."""
+"""A case: one interface in one state with one penalty, on which a property judges a formulation.
+
+Rules for the next editor: a case is complete. Whoever has its arrays can judge it again, in another process and with
+another version of hypothesis; so nothing that a judgement depends on is kept outside, and `to_arrays` and `from_arrays`
+agree bit by bit. The lengths below (`diameter`, `shortest_segment`, …) are those of the tolerances.
+"""
 
 from __future__ import annotations
 
@@ -17,26 +22,43 @@ _PREFIX = "parameter_"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """What a property judges a formulation on.
+    """One interface in one state with one penalty, on which a property judges a formulation.
 
     Attributes
     ----------
     interface : Interface
         The two meshes in their reference configuration.
-    z : FloatArray, shape (n_unknowns,)
-        Current positions, a length each, flat: slave nodes first. Behind them the multipliers, if any.
+    z : FloatArray, shape (n_unknowns + n_multipliers,)
+        The state: current positions, a length each, flat, slave nodes first; behind them the multipliers, if any.
     penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation is given
-        ε̂ × the mean slave segment.
+        The distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation gets
+        ε̂ × the mean length of the slave segments.
     parameters : Mapping[str, FloatArray]
-        What else the property that made the case needs to know, arrays of floats by name.
+        Whatever else the property that made the case needs to know: arrays of floats by name.
     seed : int
-        Of anything random that the property does with the case (directions of a derivative).
+        The seed of everything random that the property does with the case, such as directions of a derivative.
     name : str
-        Of a case that has one ("C", "C′"), else empty.
+        The name of the case, if it has one (``"c"``, ``"c-prime"``); else empty.
     n_multipliers : int
-        How many of the entries of z are multipliers. A case that is drawn or stored has none; those of a
-        formulation are put behind its positions when it is asked.
+        The number of multipliers in z. A case from a strategy or a report has none; the harness puts those of a
+        formulation behind the positions.
+
+    Raises
+    ------
+    MisuseError
+        If z has another shape or is not finite, the penalty is not positive, or the seed is no integer from 0 to
+        2^63 − 1.
+
+    Examples
+    --------
+    A slave segment that penetrates the master by 0.1:
+
+    >>> import numpy as np
+    >>> from contactverif import Case, Interface
+    >>> interface = Interface.from_chains(slave=[[0, 0], [1, 0]], master=[[2, 0], [-1, 0]])
+    >>> case = Case(interface, np.array([0, -0.1, 1, -0.1, 2, 0, -1, 0]), penalty=100.0)
+    >>> case.positions[0].tolist(), case.slave_length
+    ([0.0, -0.1], 1.0)
     """
 
     interface: Interface
@@ -48,32 +70,26 @@ class Case:
     n_multipliers: int = 0
 
     def __post_init__(self) -> None:
-        raw = np.asarray(self.z)
-        if raw.dtype.kind not in "fiu":
-            raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
-        z = freeze(raw, np.float64)
-        if z.shape != (self.interface.n_unknowns + self.n_multipliers,):
-            needed = (
-                f"({self.interface.n_unknowns + self.n_multipliers},): n_nodes × dim, flat, then multipliers if any"
-            )
-            raise MisuseError("z", f"shape {z.shape}", needed)
-        if not np.isfinite(z).all():
-            raise MisuseError("z", "NaN or infinity", "finite positions")
-        penalty = np.asarray(self.penalty)
-        if penalty.shape != () or penalty.dtype.kind not in "fiu" or not 0 < penalty < np.inf:
-            raise MisuseError("penalty", f"{self.penalty!r}", "a finite number > 0")
-        seed = np.asarray(self.seed)
-        if seed.shape != () or seed.dtype.kind not in "iu" or not 0 <= seed < 2**63:
-            raise MisuseError("seed", f"{self.seed!r}", "an integer from 0 to 2^63 − 1")
-        object.__setattr__(self, "z", z)
-        object.__setattr__(self, "penalty", float(self.penalty))
-        object.__setattr__(self, "seed", int(self.seed))
+        object.__setattr__(self, "z", self._check_state())
+        object.__setattr__(self, "penalty", _as_penalty(self.penalty))
+        object.__setattr__(self, "seed", _as_seed(self.seed))
         parameters = {name: freeze(values, np.float64) for name, values in self.parameters.items()}
         object.__setattr__(self, "parameters", parameters)
 
+    def _check_state(self) -> FloatArray:
+        raw, n_entries = np.asarray(self.z), self.interface.n_unknowns + self.n_multipliers
+        if raw.dtype.kind not in "fiu":
+            raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
+        z = freeze(raw, np.float64)
+        if z.shape != (n_entries,):
+            raise MisuseError("z", f"shape {z.shape}", f"({n_entries},): n_nodes × dim, flat, then multipliers if any")
+        if not np.isfinite(z).all():
+            raise MisuseError("z", "NaN or infinity", "finite positions")
+        return z
+
     @property
     def positions(self) -> FloatArray:
-        """Current positions (n_nodes, dim)."""
+        """The current positions of all nodes (n_nodes, dim), a length each."""
         return self.z[: self.interface.n_unknowns].reshape(self.interface.nodes.shape)
 
     @property
@@ -88,36 +104,42 @@ class Case:
 
     @property
     def largest_coordinate(self) -> float:
-        """X: the largest coordinate, of the state and the reference."""
+        """The largest coordinate of the state and of the reference, a length; X in the tolerances."""
         return float(max(np.abs(self.positions).max(), np.abs(self.interface.nodes).max()))
 
     @property
     def shortest_segment(self) -> float:
-        """ℓ: the shortest current segment, both sides."""
+        """The length of the shortest current segment of both sides; ℓ in the tolerances."""
         interface = self.interface
         return float(min(surface.lengths(self.positions).min() for surface in (interface.slave, interface.master)))
 
     @property
     def slave_length(self) -> float:
-        """L: the current length of the slave surface."""
+        """The current length of the slave surface; L in the tolerances."""
         return float(self.interface.slave.lengths(self.positions).sum())
 
     @property
     def diameter(self) -> float:
-        """D: the diagonal of the box around the current state."""
+        """The diagonal of the box around the current state, a length; D in the tolerances."""
         return float(np.linalg.norm(np.ptp(self.positions, axis=0)))
 
     @property
     def n_segments(self) -> int:
-        """N: segments of both sides."""
+        """The number of segments of both sides; N in the tolerances."""
         return len(self.interface.slave) + len(self.interface.master)
 
     def parameter(self, name: str) -> float:
-        """A parameter that is one number."""
+        """Return a parameter that is one number.
+
+        Raises
+        ------
+        KeyError
+            If the case has no parameter of that name.
+        """
         return float(self.parameters[name])
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
-        """All of the case as named arrays."""
+        """Return the whole case as named arrays, from which `from_arrays` makes the same case."""
         interface = self.interface
         arrays: dict[str, ArrayLike] = {
             "nodes": interface.nodes,
@@ -133,7 +155,15 @@ class Case:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> Case:
-        """The case that `to_arrays` took apart."""
+        """Return the case whose `to_arrays` gave these arrays.
+
+        Raises
+        ------
+        KeyError
+            If an array is missing.
+        MisuseError
+            If the arrays are not those of a case.
+        """
         interface = Interface(
             np.asarray(arrays["nodes"], dtype=np.float64),
             Surface(np.asarray(arrays["slave_segments"])),
@@ -152,3 +182,17 @@ class Case:
             int(np.asarray(arrays["seed"])),
             str(np.asarray(arrays["name"])),
         )
+
+
+def _as_penalty(value: float) -> float:
+    penalty = np.asarray(value)
+    if penalty.shape != () or penalty.dtype.kind not in "fiu" or not 0 < penalty < np.inf:
+        raise MisuseError("penalty", f"{value!r}", "a finite number > 0")
+    return float(value)
+
+
+def _as_seed(value: int) -> int:
+    seed = np.asarray(value)
+    if seed.shape != () or seed.dtype.kind not in "iu" or not 0 <= seed < 2**63:
+        raise MisuseError("seed", f"{value!r}", "an integer from 0 to 2^63 − 1")
+    return int(value)

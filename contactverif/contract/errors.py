@@ -1,14 +1,20 @@
-"""The two ways in which things go wrong, told apart by whose fault it is: the caller's or the plugin's."""
+"""The errors that contactverif raises on purpose, told apart by who has to act: the caller or the author of the plugin.
+
+Rule for the next editor: an error of a caller is a `MisuseError`, an error of a plugin is a `ContractError`. The
+message of a `MisuseError` names the argument, what was found there and what is needed, so that the caller can act.
+"""
 
 from __future__ import annotations
 
 
 class ContactverifError(Exception):
-    """Base of all errors that contactverif raises on purpose."""
+    """The base of all errors that contactverif raises on purpose."""
 
 
 class MisuseError(ContactverifError, ValueError):
     """The caller gave something that cannot be used.
+
+    The message reads ``argument: found …; needed …``.
 
     Parameters
     ----------
@@ -26,12 +32,15 @@ class MisuseError(ContactverifError, ValueError):
 
 
 class ContractError(ContactverifError):
-    """The plugin broke the contract of `contactverif.contract.formulation`: wrong shape, wrong dtype, wrong kind."""
+    """The plugin broke the contract of a formulation: an answer of the wrong kind, shape or dtype.
+
+    The contract is stated in `contactverif.contract.formulation`.
+    """
 
 
 class NonFiniteError(ContractError):
-    """The plugin returned a NaN or an infinity."""
+    """The plugin returned NaN or infinity."""
 
 
 class PluginError(ContractError):
-    """The plugin raised an exception; it is the `__cause__`."""
+    """The plugin raised an exception, which is the `__cause__` of this error."""

@@ -1,16 +1,43 @@
-"""The contract that a plugin fulfils, and the signs and words of the whole house.
+"""The contract between the harness and a contact formulation, and the signs and words of the whole house.
 
-Signs: `gap` is negative in penetration; `pressure` ≥ 0; `normal` points out of the master body; the residual is
-internal minus external force, so a slave node in contact is pushed along +normal by `-residual`.
+A formulation comes as a plugin: an entry point of the group ``contactverif.formulations`` names a factory ``make(*,
+penalty, **options)``, which returns an object with the methods of `Formulation`. Only ``residual`` is required. The
+harness reports what is missing as "not provided" and judges the rest. The harness chooses the penalty of each case.
 
-An entry point of the group `contactverif.formulations` is a factory `make(*, penalty, **options) -> Formulation`; the
-harness chooses the penalty of each case. All but `residual` may be missing; what is missing is reported as
-"not provided" and nothing is promised for it. A `ResidualOnly` is the least a plugin is.
+Signs and words, which hold in every module, message and report:
 
-Multipliers: a formulation that has some says how many in `n_multipliers(interface)`; they stand behind the positions in
-z, and their rows behind the forces in the residual: −area · g where active, area · λ where not. λ ≥ 0 is a pressure
-(trait `penalty` "distributed") or a nodal force ("nodal"). What the factory is given as penalty is then the scale c of
-the decision λ − c g ≥ 0 and must change no solution.
+slave, master
+    The two surfaces. A formulation looks for contact at points of the slave and measures it against the master.
+gap
+    The signed distance of a slave point from the master, a length. It is **negative in penetration**.
+normal
+    The unit vector that points **out of the master body**, towards the slave.
+pressure
+    Force per length of the interface, **≥ 0** in compression.
+residual
+    The nodal forces, **internal minus external**: a slave node in contact is pushed along +normal by ``-residual``.
+penalty
+    The distributed stiffness ε̂, force per length per length of penetration: pressure = ε̂ |gap|. A nodal formulation
+    (trait ``penalty="nodal"``) gets ε̂ × the mean length of the slave segments, force per length.
+area of competence
+    The part of the slave surface for which a contact point stands, a length.
+xi
+    The place of a projection on a master segment: 0 at its first node, 1 at its second, unclipped.
+c
+    The place of a point on a slave segment: −1 at its first node, +1 at its second.
+virtual slave node
+    A contact point that lies between the nodes of a slave segment.
+z
+    The state of an interface: the current positions of all nodes, flat, slave nodes first; behind them the multipliers.
+
+Multipliers: a formulation that enforces contact by multipliers says how many it has by a method
+``n_multipliers(interface) -> int``. The multipliers stand behind the positions in z, and the constraint rows behind the
+forces in the residual: −area · gap where a constraint is active, area · λ where it is not. λ ≥ 0 is a pressure (trait
+``penalty="distributed"``) or a nodal force (``"nodal"``). The penalty that the factory gets is then the scale c of the
+decision λ − c gap ≥ 0; no solution may depend on it.
+
+Rules for the next editor: a `Pairing` holds integers and booleans only, so that the residual is a smooth function of
+the positions on a frozen pairing. Signs and words change here first, or not at all.
 """
 
 from __future__ import annotations
@@ -28,15 +55,35 @@ from contactverif.contract.interface import Interface
 
 
 class Pairing(Mapping[str, NDArray[Any]]):
-    """Who touches whom: a flat mapping from names to read-only int64 or bool arrays, and nothing else.
+    """The discrete decisions of a formulation at one state: who touches whom, as integers and booleans only.
 
-    Every real number (ξ, normal, area of competence) is computed from the positions, so that on a frozen pairing the
-    residual is a smooth function and a finite difference shows a forgotten term.
+    A pairing is a flat mapping from names, which the plugin chooses, to read-only arrays of int64 or bool. Typical
+    entries are the master segment of each slave node, which nodes are active, or the sparsity pattern of the tangent.
+
+    Every real number (ξ, the normal, the area of competence) is computed from the positions, never stored here. So the
+    residual is a smooth function of the positions on a frozen pairing, and a finite difference shows a forgotten term.
+    A method ``pair`` may return a plain dict of arrays; the harness makes a `Pairing` of it.
+
+    Parameters
+    ----------
+    arrays : Mapping[str, NDArray]
+        The arrays by name. Integers number something (a segment, a node, an unknown, an entry of a pattern); −1 stands
+        for nothing.
 
     Raises
     ------
     ContractError
-        If a value is no array of integers or booleans, or a name is no string.
+        If a value is no array of int64 or bool, or a name is no string.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from contactverif import Pairing
+    >>> pairing = Pairing({"master_segment": np.array([0, 0, -1]), "active": np.array([True, True, False])})
+    >>> pairing["active"].sum()
+    np.int64(2)
+    >>> pairing
+    Pairing(master_segment(3,), active(3,))
     """
 
     __slots__ = ("_arrays",)
@@ -49,8 +96,8 @@ class Pairing(Mapping[str, NDArray[Any]]):
             if not isinstance(name, str):
                 raise ContractError(f"pair: the name {name!r} is a {type(name).__name__}; needed a string")
             if not isinstance(values, np.ndarray) or values.dtype not in (np.int64, np.bool_):
-                found = f"dtype {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
-                raise ContractError(f"pair: {name!r} is {found}; needed an array of int64 or bool")
+                kind = f"dtype {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
+                raise ContractError(f"pair: {name!r} is {kind}; needed an array of int64 or bool")
             checked[name] = freeze(values, values.dtype.type)
         self._arrays = checked
 
@@ -72,12 +119,17 @@ class Pairing(Mapping[str, NDArray[Any]]):
         return f"Pairing({', '.join(f'{name}{values.shape}' for name, values in self._arrays.items())})"
 
     def check_bounds(self, interface: Interface) -> None:
-        """Integers number something: a segment, a node, an unknown, an entry of a pattern, or nothing (−1).
+        """Check that every integer can number something of the problem: a segment, node, unknown or entry, or −1.
+
+        Parameters
+        ----------
+        interface : Interface
+            The interface that the pairing belongs to.
 
         Raises
         ------
         ContractError
-            If a value is below −1 or above the sizes of the problem.
+            If an integer is below −1, or larger than both the number of unknowns and the longest array of the pairing.
         """
         pattern = max((values.size for values in self._arrays.values()), default=0)
         most = max(interface.n_unknowns, pattern)
@@ -87,13 +139,13 @@ class Pairing(Mapping[str, NDArray[Any]]):
                 raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
 
     def same_as(self, other: Pairing) -> bool:
-        """Whether names, shapes and all values agree."""
+        """Return whether names, shapes and all values agree."""
         return self._arrays.keys() == other._arrays.keys() and all(
             np.array_equal(values, other._arrays[name]) for name, values in self._arrays.items()
         )
 
 
-_WORDS: dict[str, tuple[object, ...]] = {
+_VALUES_OF_TRAITS: dict[str, tuple[object, ...]] = {
     "passes_flat_patch": (True, False, None),
     "covers_overhang": (True, False, None),
     "tangent": ("exact", "approximate", None),
@@ -112,51 +164,66 @@ _WORDS: dict[str, tuple[object, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What a formulation promises. None promises nothing; False says "does not" and names a witness.
+    """The promises of a formulation; the harness checks every one.
+
+    Every trait is optional. ``None`` promises nothing. ``True``, or a word, is a promise that holds for all cases.
+    ``False`` says "does not"; it needs a case that shows so, the witness of the property that checks the promise.
 
     Attributes
     ----------
     passes_flat_patch : bool | None
-        Transmits a uniform pressure exactly across any flat interface that it covers; one by penalty the
-        pressure ε̂ |g|, so a law that is not linear promises nothing here.
+        The formulation transmits a uniform pressure exactly across any flat interface on which the master covers the
+        slave. With a penalty, the pressure is ε̂ |gap|; so a formulation whose law is not linear promises nothing here.
     covers_overhang : bool | None
-        Does so too where the slave overhangs the master inside a slave segment.
+        The formulation does so too where the slave overhangs the master inside a slave segment.
     tangent : Literal['exact', 'approximate'] | None
-        "exact" is the derivative of the residual on a frozen pairing; "approximate" is not.
+        ``"exact"``: `Formulation.tangent` is the derivative of the residual on a frozen pairing. ``"approximate"``: it
+        is not.
     symmetric : bool | None
         The tangent is symmetric.
     conserves_force, conserves_moment : bool | None
-        Slave and master forces balance at any tilt and curvature.
+        The forces on slave and master balance at any tilt and curvature; so do their moments.
     continuity : Literal['C0', 'C1'] | None
-        How smooth the forces are while a node slides over the vertices of a master that no line along the
-        normal meets twice, "C0" or "C1".
+        The smoothness of the forces while a node slides over the vertices of a master that no line along the normal
+        meets twice.
     area : Literal['reference', 'current'] | None
-        The configuration in which areas of competence are measured; they add up to the slave's length, so that
-        a uniform penetration gives the total force ε̂ |g| × that. None where springs act twice (two-pass).
+        The configuration in which areas of competence are measured. They add up to the slave's length there, so that a
+        uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass).
     penalty : Literal['nodal', 'distributed'] | None
-        "nodal" (force per length) or "distributed" (force per length per length of penetration); of a
-        multiplier, whether it is a nodal force or a pressure.
+        The unit of the penalty: ``"nodal"`` is force per length, ``"distributed"`` is force per length per length of
+        penetration. For multipliers it says what a multiplier is: a nodal force, or a pressure.
     enforcement : Literal['penalty', 'multiplier', 'barrier']
-        How contact is enforced.
+        The way in which contact is enforced.
     independent_multipliers : bool | None
         The constraints are independent on any mesh, so that the multipliers are unique.
     dimensions : tuple[int, ...]
-        Numbers of coordinates that it can do.
+        The numbers of coordinates that the formulation supports.
     batched : bool
-        `residual` takes a batch of states, z (..., n_unknowns).
+        ``residual`` takes a batch of states, z (..., n_unknowns), in one call. Otherwise the harness loops.
     takes_complex : bool
-        `residual` takes complex positions, so that a complex step works.
+        ``residual`` takes complex positions, so that the harness may use a complex step.
     witnesses : Mapping[str, str]
-        {property id: name of a case} for each promise "does not"; the case always runs. The beginning of an id
-        stands for all below it: "patch" is the witness of "patch.flat.solve" too. A property that solves bodies
-        takes the scene of that name ("c-prime", or with options "c-prime:penalty=1e4").
+        ``{property id: name of a case}`` for each promise "does not". The case always runs. The beginning of an id
+        stands for all ids below it: ``"patch"`` is the witness of ``"patch.flat.solve"`` too. A property that solves
+        bodies takes the scene of that name (``"c-prime"``, or with options ``"c-prime:penalty=1e4"``).
     source : str
-        Where the formulation is published.
+        The publication of the formulation.
 
     Raises
     ------
     ContractError
-        For a word that is none of these, such as a misspelt promise.
+        If a trait has none of the values listed here, for example a misspelt word.
+
+    Examples
+    --------
+    Nodal springs with an exact tangent that fail the patch test on case A1 of the reference paper:
+
+    >>> from contactverif import Traits
+    >>> traits = Traits(
+    ...     passes_flat_patch=False, witnesses={"patch": "a1"}, tangent="exact", symmetric=True, penalty="nodal"
+    ... )
+    >>> traits.witness("patch.flat.transmission")
+    'a1'
     """
 
     passes_flat_patch: bool | None = None
@@ -177,7 +244,18 @@ class Traits:
     source: str = ""
 
     def witness(self, property_id: str) -> str | None:
-        """The name of the case that shows that the property fails, None where there is none."""
+        """Return the name of the case that shows that a promise "does not" holds.
+
+        Parameters
+        ----------
+        property_id : str
+            The id of a property, such as ``"patch.flat.solve"``.
+
+        Returns
+        -------
+        str | None
+            The name from `witnesses` for the id or for the longest beginning of it; None if there is none.
+        """
         parts = property_id.split(".")
         for n in range(len(parts), 0, -1):
             if (name := self.witnesses.get(".".join(parts[:n]))) is not None:
@@ -185,10 +263,10 @@ class Traits:
         return None
 
     def __post_init__(self) -> None:
-        for name, words in _WORDS.items():
-            if getattr(self, name) not in words:
-                found, needed = repr(getattr(self, name)), ", ".join(map(repr, words))
-                raise ContractError(f"Traits.{name}: found {found}; needed one of {needed}")
+        for name, values in _VALUES_OF_TRAITS.items():
+            if getattr(self, name) not in values:
+                needed = ", ".join(map(repr, values))
+                raise ContractError(f"Traits.{name}: found {getattr(self, name)!r}; needed one of {needed}")
         if not isinstance(self.witnesses, Mapping):
             raise ContractError(
                 f"Traits.witnesses: found a {type(self.witnesses).__name__}; needed {{property id: name of a case}}"
@@ -197,30 +275,40 @@ class Traits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPoints:
-    """Where a formulation looks for contact and what it finds there; NaN (−1 for integers) where meaningless.
+    """The points at which a formulation looks for contact, and what it finds there.
+
+    `Formulation.contact_points` returns them, for pictures and for properties that judge gaps and pressures. A number
+    that means nothing for a formulation is NaN; an integer is −1.
 
     Attributes
     ----------
     slave_segment : IntArray, shape (n_points,)
-        The slave segment that carries the point.
+        The number of the slave segment that carries the point.
     c : FloatArray, shape (n_points,)
-        Where on it, −1 at its first node, +1 at its second.
+        The place on that segment: −1 at its first node, +1 at its second.
     master_segment : IntArray, shape (n_points,)
-        The segment that it is measured against.
+        The number of the master segment that the gap is measured against.
     xi : FloatArray, shape (n_points,)
-        Foot on the master segment, 0 at its first node, 1 at its second, unclipped.
-    position, normal : FloatArray, shape (n_points, dim)
-        A length; a unit vector out of the master body.
+        The place of the foot on the master segment: 0 at its first node, 1 at its second, unclipped.
+    position : FloatArray, shape (n_points, dim)
+        The current position of the point, a length each.
+    normal : FloatArray, shape (n_points, dim)
+        The unit vector out of the master body.
     gap : FloatArray, shape (n_points,)
-        A length, negative in penetration.
+        The gap, a length, negative in penetration.
     pressure : FloatArray, shape (n_points,)
-        Force per length of the interface, ≥ 0 (a nodal method: the force).
+        The pressure, force per length of the interface, ≥ 0. A nodal formulation gives the nodal force instead.
     weight : FloatArray, shape (n_points,)
-        A length, the area of competence (a nodal method: 1).
+        The length that the pressure acts on, the area of competence. A nodal formulation gives 1.
     active : BoolArray, shape (n_points,)
-        In contact.
+        True where the point is in contact.
     area_from, area_to : FloatArray, shape (n_points,)
-        The ends of the area of competence on the slave segment, as `c`.
+        The two ends of the area of competence on the slave segment, measured as `c`.
+
+    Raises
+    ------
+    MisuseError
+        If an array has the wrong dtype, or not n_points rows.
     """
 
     slave_segment: IntArray
@@ -241,48 +329,140 @@ class ContactPoints:
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
         for entry in fields(self):
             raw, dtype = np.asarray(getattr(self, entry.name)), dtypes.get(entry.name, np.float64)
-            if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # or 0.7 becomes segment 0
+            if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # Otherwise 0.7 would become segment 0.
                 raise MisuseError(f"ContactPoints.{entry.name}", f"dtype {raw.dtype}", np.dtype(dtype).name)
             values: NDArray[Any] = freeze(raw, dtype)
-            wanted = 2 if entry.name in ("position", "normal") else 1
-            if values.ndim != wanted or len(values) != n_points:
+            n_axes = 2 if entry.name in ("position", "normal") else 1
+            if values.ndim != n_axes or len(values) != n_points:
                 raise MisuseError(
                     f"ContactPoints.{entry.name}",
                     f"shape {values.shape}",
-                    f"({n_points}, dim)" if wanted == 2 else f"({n_points},)",
+                    f"({n_points}, dim)" if n_axes == 2 else f"({n_points},)",
                 )
             object.__setattr__(self, entry.name, values)
 
 
 class ResidualOnly(Protocol):
-    """The least a plugin is."""
+    """The least that a plugin is: an object with a residual.
+
+    Nothing else is required. Without ``pair`` the residual gets ``pairing=None``; without ``tangent`` the harness
+    differentiates the residual where it needs a tangent. Each missing part is reported as "not provided".
+
+    Examples
+    --------
+    A penalty on every slave node below the straight line y = 0, the whole plugin:
+
+    >>> import numpy as np
+    >>> from contactverif import Interface
+    >>> class Floor:
+    ...     def __init__(self, *, penalty):
+    ...         self.penalty = penalty
+    ...     def residual(self, interface, pairing, z):
+    ...         n_slave = interface.n_slave_nodes
+    ...         forces = np.zeros_like(z)
+    ...         y = z[..., 1 : 2 * n_slave : 2]
+    ...         forces[..., 1 : 2 * n_slave : 2] = self.penalty * np.where(y < 0, y, 0)
+    ...         return forces
+    >>> interface = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])
+    >>> z = np.array([0, -0.5, 1, 0.25, 1, 0, 0, 0])  # the first slave node penetrates by 0.5
+    >>> Floor(penalty=10.0).residual(interface, None, z)[:4]  # -residual pushes it upwards
+    array([ 0., -5.,  0.,  0.])
+    """
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array, /) -> Array:
-        """Nodal forces (..., n_unknowns), internal minus external, at the positions z (..., n_unknowns).
+        """Return the nodal forces at a state, internal minus external. Required.
 
-        Behind them, where there are multipliers, the constraint rows; z and the answer are of one shape. `pairing` is
-        what `pair` returned, None where the plugin has no `pair`. The leading axes are a batch of states, used only
-        where `traits.batched`.
+        Parameters
+        ----------
+        interface : Interface
+            The meshes in their reference configuration.
+        pairing : Pairing | None
+            What ``pair`` returned; None if the plugin has no ``pair``. Decisions are taken from here, so that the
+            residual is smooth on a frozen pairing.
+        z : Array, shape (..., n_unknowns)
+            The current positions of all nodes, flat, slave nodes first; behind them the multipliers, if the formulation
+            has any. The leading axes are a batch of states; only plugins with the trait ``batched`` get one.
+
+        Returns
+        -------
+        Array, shape (..., n_unknowns)
+            The forces in the shape and dtype of z; behind them the constraint rows, if there are multipliers.
+            A slave node in contact is pushed along +normal by ``-residual``.
         """
         ...
 
 
 class Formulation(ResidualOnly, Protocol):
-    """The whole contract of a penalty formulation; one with multipliers has `n_multipliers(interface) -> int` too."""
+    """The whole contract of a contact formulation.
+
+    A factory ``make(*, penalty, **options)`` returns an object with these methods. ``residual`` is required;
+    ``traits``, ``pair``, ``tangent`` and ``contact_points`` are optional. A formulation with multipliers has one method
+    more, ``n_multipliers(interface) -> int``. The harness calls ``pair`` at a state, then the other methods with that
+    pairing, at the same state or at states around it. The methods keep no state between calls: the same arguments give
+    the same answer. All arrays that the harness passes are read-only.
+
+    See Also
+    --------
+    ResidualOnly : The required part, with a small example.
+    CheckedFormulation : A formulation as the harness uses it, every answer checked.
+    """
 
     @property
     def traits(self) -> Traits:
-        """What is promised."""
+        """The promises of the formulation. Optional; without it nothing is promised."""
         ...
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing | Mapping[str, NDArray[Any]]:
-        """Who touches whom at the positions z (n_unknowns,): integers and booleans only."""
+        """Decide who touches whom. Optional.
+
+        Parameters
+        ----------
+        interface : Interface
+            The meshes in their reference configuration.
+        z : FloatArray, shape (n_unknowns,)
+            One state: current positions, then multipliers.
+
+        Returns
+        -------
+        Pairing | Mapping[str, NDArray]
+            Named arrays of integers and booleans. Every real number is computed from z in the other methods.
+        """
         ...
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
-        """Derivative (n_unknowns, n_unknowns) of the residual on a frozen pairing, dense or scipy.sparse."""
+        """Return the derivative of the residual on a frozen pairing. Optional.
+
+        Parameters
+        ----------
+        interface : Interface
+            The meshes in their reference configuration.
+        pairing : Pairing
+            What ``pair`` returned.
+        z : FloatArray, shape (n_unknowns,)
+            One state: current positions, then multipliers.
+
+        Returns
+        -------
+        FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
+            Row i, column j holds ∂residual_i/∂z_j; rows and columns of multipliers come last.
+        """
         ...
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """The points of contact at the positions z (n_unknowns,)."""
+        """Return where the formulation looks for contact, and what it finds there. Optional.
+
+        Parameters
+        ----------
+        interface : Interface
+            The meshes in their reference configuration.
+        pairing : Pairing
+            What ``pair`` returned.
+        z : FloatArray, shape (n_unknowns,)
+            One state: current positions, then multipliers.
+
+        Returns
+        -------
+        ContactPoints
+            Gaps, pressures and places of all contact points, active or not.
+        """
         ...

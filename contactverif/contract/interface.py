@@ -1,38 +1,51 @@
-"""The two facing meshes. What is wrong with a mesh is said here, once; behind this door every mesh is right.
+"""The two facing meshes of a contact problem: how segments hang together, and where their nodes are.
 
-A `Surface` knows how segments hang together and nothing of positions; an `Interface` adds the reference positions.
+Rules for the next editor: whatever can be wrong with a mesh is found here, in the constructors, once. A formulation, an
+oracle or a property may rely on every statement of the two docstrings below and checks none of them again. `Surface`
+knows how segments hang together and nothing of positions; `Interface` adds the reference positions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from contactverif.contract.arrays import FloatArray, IntArray, freeze
+from contactverif.contract.arrays import FloatArray, IntArray, as_array, freeze
 from contactverif.contract.errors import MisuseError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Chains of straight segments with their body on the left.
+    """One side of the interface: chains of straight segments, each with the body on its left.
+
+    Whoever walks from the first to the second node of a segment has the body on the left and the other surface on the
+    right. A surface consists of any number of chains, open or closed. A node belongs to at most two segments.
 
     Attributes
     ----------
     segments : IntArray, shape (n_segments, 2)
-        Node numbers, first and second node of each segment.
+        The numbers of the first and the second node of each segment, in any order of the segments. This is the only
+        argument of the constructor; the other attributes follow from it.
     neighbours : IntArray, shape (n_segments, 2)
-        The previous and the next segment of the chain, −1 at a free end.
+        The numbers of the previous and the next segment of the chain; −1 at a free end.
     chain_order : IntArray, shape (n_segments,)
-        The segments as one meets them walking along the chains.
+        The numbers of the segments in the order of a walk along the chains: open chains from their free ends, then
+        closed chains.
 
     Raises
     ------
     MisuseError
-        If the segments are no chains: a node that begins or ends two of them, or a segment that begins where it
-        ends.
+        If the segments form no chains: two of them begin at one node, two end at one node, or one begins and ends at
+        the same node.
+
+    Examples
+    --------
+    >>> from contactverif import Surface
+    >>> surface = Surface([[0, 1], [1, 2]])
+    >>> surface.neighbours.tolist()
+    [[-1, 1], [0, -1]]
     """
 
     segments: IntArray
@@ -40,31 +53,13 @@ class Surface:
     chain_order: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        raw = _array("segments", self.segments)
+        raw = as_array("segments", self.segments)
         if raw.ndim != 2 or raw.shape[1] != 2 or len(raw) == 0:
             raise MisuseError("segments", f"an array of shape {raw.shape}", "shape (n_segments, 2), n_segments ≥ 1")
         if not np.issubdtype(raw.dtype, np.integer):
             raise MisuseError("segments", f"dtype {raw.dtype}", "integer node numbers")
         segments = freeze(raw, np.int64)
-        if segments.min() < 0:
-            raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
-        looped = np.flatnonzero(segments[:, 0] == segments[:, 1])
-        if len(looped):
-            raise MisuseError(
-                "segments",
-                f"segment {looped[0]} that begins and ends at node {segments[looped[0], 0]}",
-                "two nodes",
-            )
-        for end, word in ((0, "begin"), (1, "end")):
-            numbers, counts = np.unique(segments[:, end], return_counts=True)
-            if counts.max() > 1:
-                node = numbers[np.argmax(counts)]
-                where = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
-                raise MisuseError(
-                    "segments",
-                    f"segments {where} that all {word} at node {node}",
-                    "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
-                )
+        _check_chains(segments)
         object.__setattr__(self, "segments", segments)
         object.__setattr__(self, "neighbours", freeze(_neighbours(segments), np.int64))
         object.__setattr__(self, "chain_order", freeze(_chain_order(self.neighbours), np.int64))
@@ -74,11 +69,22 @@ class Surface:
 
     @property
     def nodes(self) -> IntArray:
-        """The node numbers of this surface, ascending."""
+        """The numbers of the nodes of this surface (n_nodes,), ascending."""
         return np.unique(self.segments)
 
     def lengths(self, nodes: FloatArray) -> FloatArray:
-        """Lengths (n_segments,) of the segments at the node positions (n_nodes, dim)."""
+        """Return the lengths of the segments.
+
+        Parameters
+        ----------
+        nodes : FloatArray, shape (n_nodes, dim)
+            The positions of all nodes of the interface, reference or current.
+
+        Returns
+        -------
+        FloatArray, shape (n_segments,)
+            The lengths, in the unit of the positions.
+        """
         ends = nodes[self.segments]  # (n_segments, 2, dim)
         lengths: FloatArray = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
         return lengths
@@ -86,20 +92,39 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Interface:
-    """A slave and a master surface in their reference configuration.
+    """The two surfaces that may touch, slave and master, in their reference configuration.
+
+    The meshes need not match. Both surfaces have their body on the left, so they run in opposite directions where they
+    face each other: with the slave body on top, the slave runs in +x and the master in −x.
 
     Attributes
     ----------
-    nodes : FloatArray, shape (n_nodes, dim)
-        Reference positions, a length each; slave nodes first, then master nodes.
+    nodes : FloatArray, shape (n_nodes, 2)
+        The reference positions of all nodes, a length each: slave nodes first, then master nodes.
     slave, master : Surface
-        The two surfaces, bodies on the left: where they face each other they run in opposite directions.
+        The two surfaces. Slave nodes have the numbers 0 … n_slave_nodes − 1, master nodes all numbers behind them; each
+        node belongs to exactly one surface.
 
     Raises
     ------
     MisuseError
-        On NaN or infinity, zero-length segments, two nodes of one surface in one place, a node of both surfaces
-        or of none, or nodes out of order.
+        If a coordinate is NaN or infinite, a segment has no length, two nodes of one surface lie in one place, a node
+        belongs to both surfaces or to none, or the slave nodes are not the first.
+
+    See Also
+    --------
+    Interface.from_chains : Make an interface from the points of one open chain a side.
+
+    Examples
+    --------
+    Two slave segments over one master segment, both 4 long; the slave body is on top:
+
+    >>> from contactverif import Interface
+    >>> interface = Interface.from_chains(slave=[[0, 0], [2, 0], [4, 0]], master=[[4, 0], [0, 0]])
+    >>> interface.slave.segments.tolist(), interface.master.segments.tolist()
+    ([[0, 1], [1, 2]], [[3, 4]])
+    >>> interface.n_nodes, interface.n_slave_nodes, interface.n_unknowns
+    (5, 3, 10)
     """
 
     nodes: FloatArray
@@ -110,7 +135,7 @@ class Interface:
         for name, surface in (("slave", self.slave), ("master", self.master)):
             if not isinstance(surface, Surface):
                 raise MisuseError(name, f"a {type(surface).__name__}", "a Surface")
-        raw = _array("nodes", self.nodes)
+        raw = as_array("nodes", self.nodes)
         if raw.ndim != 2 or raw.shape[1] != 2:
             raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
         if raw.dtype.kind not in "fiu":
@@ -125,13 +150,13 @@ class Interface:
         if not np.array_equal(used_slave, np.arange(n_slave)):
             raise MisuseError(
                 "slave",
-                f"nodes {_brief(used_slave)}",
+                f"nodes {_abbreviate(used_slave)}",
                 f"the first node numbers, 0 … {n_slave - 1}, each used",
             )
         if not np.array_equal(used_master, np.arange(n_slave, len(nodes))):
             raise MisuseError(
                 "master",
-                f"nodes {_brief(used_master)}",
+                f"nodes {_abbreviate(used_master)}",
                 f"all node numbers behind the slave's, {n_slave} … {len(nodes) - 1}, each used",
             )
         for name, surface, used in (("slave", self.slave, used_slave), ("master", self.master, used_master)):
@@ -139,8 +164,24 @@ class Interface:
 
     @classmethod
     def from_chains(cls, slave: ArrayLike, master: ArrayLike) -> Interface:
-        """One open chain a side, through the points (n, 2) in walking order, the body on the left."""
-        points = [_array(name, side) for name, side in (("slave", slave), ("master", master))]
+        """Return the interface with one open chain a side.
+
+        Parameters
+        ----------
+        slave, master : ArrayLike, shape (n_points, 2)
+            The points of each chain in walking order, with the body on the left; at least two.
+
+        Returns
+        -------
+        Interface
+            Its nodes are numbered in walking order, slave first.
+
+        Raises
+        ------
+        MisuseError
+            If the points form no such chain.
+        """
+        points = [as_array(name, side) for name, side in (("slave", slave), ("master", master))]
         for name, side in zip(("slave", "master"), points, strict=True):
             if side.ndim != 2 or side.shape[1] != 2 or len(side) < 2:
                 raise MisuseError(name, f"an array of shape {side.shape}", "shape (n ≥ 2, 2), the points of a chain")
@@ -151,26 +192,26 @@ class Interface:
 
     @property
     def dim(self) -> int:
-        """Number of coordinates of a node."""
+        """The number of coordinates of a node: 2."""
         return int(self.nodes.shape[1])
 
     @property
     def n_nodes(self) -> int:
-        """Number of nodes, both sides."""
+        """The number of nodes of both sides."""
         return int(self.nodes.shape[0])
 
     @property
     def n_slave_nodes(self) -> int:
-        """Number of slave nodes; they are the first."""
+        """The number of slave nodes, which are the first nodes."""
         return int(self.slave.segments.max()) + 1
 
     @property
     def n_unknowns(self) -> int:
-        """Number of position unknowns: n_nodes × dim."""
+        """The number of position unknowns: n_nodes × dim."""
         return self.nodes.size
 
-    def swapped(self) -> Interface:
-        """The same two surfaces with their roles exchanged (slave nodes are renumbered to come first)."""
+    def swap_roles(self) -> Interface:
+        """Return the interface with the roles of slave and master exchanged; nodes are renumbered, slave first."""
         n_slave = self.n_slave_nodes
         n_master = self.n_nodes - n_slave
         return Interface(
@@ -180,38 +221,54 @@ class Interface:
         )
 
     def at(self, nodes: ArrayLike) -> Interface:
-        """The same segments on other reference positions (n_nodes, dim)."""
-        return Interface(_array("nodes", nodes), self.slave, self.master)
+        """Return the interface with the same segments on other reference positions, shape (n_nodes, dim)."""
+        return Interface(as_array("nodes", nodes), self.slave, self.master)
 
 
-def _array(argument: str, values: ArrayLike) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except ValueError as error:
-        raise MisuseError(argument, "rows of different lengths", "an array") from error
+def _check_chains(segments: IntArray) -> None:
+    """Check that node numbers and connections are those of chains."""
+    if segments.min() < 0:
+        raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
+    loops = np.flatnonzero(segments[:, 0] == segments[:, 1])
+    if len(loops):
+        segment = loops[0]
+        node = segments[segment, 0]
+        raise MisuseError("segments", f"segment {segment} that begins and ends at node {node}", "two nodes")
+    for end, verb in ((0, "begin"), (1, "end")):
+        numbers, counts = np.unique(segments[:, end], return_counts=True)
+        if counts.max() > 1:
+            node = numbers[np.argmax(counts)]
+            meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
+            raise MisuseError(
+                "segments",
+                f"segments {meeting} that all {verb} at node {node}",
+                "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
+            )
 
 
 def _neighbours(segments: IntArray) -> IntArray:
+    """Return the previous and the next segment of each segment (n_segments, 2), −1 at a free end."""
     starting = {int(first): index for index, first in enumerate(segments[:, 0])}
     ending = {int(second): index for index, second in enumerate(segments[:, 1])}
     return np.array([[ending.get(int(first), -1), starting.get(int(second), -1)] for first, second in segments])
 
 
 def _chain_order(neighbours: IntArray) -> IntArray:
-    """Open chains first, each from its free end; then closed chains, each from its lowest segment."""
+    """Return open chains first, each from its free end; then closed chains, each from its lowest segment."""
     following = neighbours[:, 1].tolist()
-    seen = [False] * len(following)
+    visited = [False] * len(following)
     order = []
     for start in [*np.flatnonzero(neighbours[:, 0] < 0).tolist(), *range(len(following))]:
         segment = start
-        while segment >= 0 and not seen[segment]:
-            seen[segment] = True
+        while segment >= 0 and not visited[segment]:
+            visited[segment] = True
             order.append(segment)
             segment = following[segment]
     return np.array(order, dtype=np.int64)
 
 
 def _check_positions(name: str, surface: Surface, used: IntArray, nodes: FloatArray) -> None:
+    """Check that the segments of a surface have a length and its nodes a place of their own."""
     ends = nodes[surface.segments]
     zero = np.flatnonzero((ends[:, 0] == ends[:, 1]).all(axis=1))
     if len(zero):
@@ -222,11 +279,11 @@ def _check_positions(name: str, surface: Surface, used: IntArray, nodes: FloatAr
         twins = used[(nodes[used] == place).all(axis=1)]
         raise MisuseError(
             name,
-            f"coincident nodes {_brief(twins)} at {tuple(place.tolist())}",
+            f"coincident nodes {_abbreviate(twins)} at {tuple(place.tolist())}",
             "one node a place on each surface (merge them, or move one)",
         )
 
 
-def _brief(numbers: IntArray) -> str:
-    shown = ", ".join(map(str, numbers[:5].tolist()))
-    return shown + (", …" if len(numbers) > 5 else "")
+def _abbreviate(numbers: IntArray) -> str:
+    listed = ", ".join(map(str, numbers[:5].tolist()))
+    return listed + (", …" if len(numbers) > 5 else "")

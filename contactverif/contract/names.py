@@ -1,4 +1,8 @@
-"""How things are asked for by name: `NAME:OPTION=VALUE,OPTION=VALUE`, and what is said where there is no such name."""
+"""The spelling of names with options on the command line, `NAME:OPTION=VALUE,OPTION=VALUE`, and its error messages.
+
+Formulations and scenes use the same spelling. Rule for the next editor: a name that does not exist is answered with the
+nearest names that do, everywhere by `unknown_name_error`.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,22 @@ from contactverif.contract.errors import MisuseError
 
 
 def unknown_name_error(argument: str, name: str, names: Iterable[str]) -> MisuseError:
-    """The error for a name that is none of the names: it suggests the nearest, or lists all if none is near."""
+    """Return the error for a name that does not exist; it suggests the nearest names, or lists all if none is near.
+
+    Parameters
+    ----------
+    argument : str
+        What the message begins with: the argument as the caller wrote it.
+    name : str
+        The name that does not exist.
+    names : Iterable[str]
+        The names that exist.
+
+    Returns
+    -------
+    MisuseError
+        The error, to be raised by the caller.
+    """
     every = sorted(names)
     near = difflib.get_close_matches(name, every, n=3)
     if near:
@@ -21,12 +40,33 @@ def unknown_name_error(argument: str, name: str, names: Iterable[str]) -> Misuse
 def parse_name(
     argument: str, text: str, form: str = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 ) -> tuple[str, dict[str, Any]]:
-    """Name and options of `name:option=value,option=value`.
+    """Split `name:option=value,option=value` into the name and its options.
+
+    Parameters
+    ----------
+    argument : str
+        The argument that holds the text, for messages.
+    text : str
+        A name, with or without options. A value is read as bool (`true`, `false`), int, float or else as text.
+    form : str
+        The form that a message says is needed.
+
+    Returns
+    -------
+    name : str
+        The name before the colon.
+    options : dict[str, Any]
+        The values by option, in the order of the text.
 
     Raises
     ------
     MisuseError
         If the text does not have that form, or names an option twice.
+
+    Examples
+    --------
+    >>> parse_name("formulation", "vts-me:n=4,area=reference")
+    ('vts-me', {'n': 4, 'area': 'reference'})
     """
     name, colon, rest = text.partition(":")
     if not name:
@@ -38,11 +78,11 @@ def parse_name(
             raise MisuseError(argument, f"{part!r} in {text!r}", form)
         if option in options:
             raise MisuseError(argument, f"{option} twice in {text!r}", "each option once")
-        options[option] = _value(value)
+        options[option] = _parse_value(value)
     return name, options
 
 
-def _value(text: str) -> bool | int | float | str:
+def _parse_value(text: str) -> bool | int | float | str:
     if text in ("true", "false"):
         return text == "true"
     for number in (int, float):

@@ -1,40 +1,28 @@
-"""Two blocks, one on the other: the scene of the patch test, and what is known exactly about it.
+"""Two blocks, one on the other: the scene of the patch test, and everything that is known exactly about it.
 
-Both blocks stand on rollers at their sides, so that nothing strains laterally: the pressure and the gap are exact
-whatever the method's configuration. What of either block lies beside the other carries the pressure too.
+Rule for the next editor: an exact answer is stated only where it holds for every formulation. Both blocks stand on
+rollers at their sides, so that nothing strains laterally and the pressure and the gap are exact in whatever
+configuration a method measures areas. Where one block is wider than the other, the pressure also acts on its part beside the other, so
+that everything stays uniform.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import Body, block, placed_at, rigid_surface
+from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import Scene
-
-
-@dataclass(frozen=True, slots=True)
-class Placing:
-    """Where a scene that is drawn upright lies: scale × (its x along `axis`, its y across it, + shift)."""
-
-    axis: tuple[float, float] = (1.0, 0.0)
-    shift: tuple[float, float] = (0.0, 0.0)
-    scale: float = 1.0
+from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle, block, rigid_surface
 
 
 def two_blocks(
-    slave_x: ArrayLike,
-    slave_y: ArrayLike,
-    master_x: ArrayLike,
-    master_y: ArrayLike,
+    slave: Rectangle,
+    master: Rectangle,
     *,
-    young: Sequence[float] = (1.0, 1.0),
-    poisson: Sequence[float] = (0.0, 0.0),
     penalty: float = 1.0,
     pressure: float | None = None,
     approach: float | None = None,
@@ -42,116 +30,168 @@ def two_blocks(
     lowered: float | None = None,
     free_sides: bool = False,
     rigid_master: bool = False,
-    placing: Placing = Placing(),
+    placing: Placing = UPRIGHT,
     name: str = "",
 ) -> Scene:
-    """A slave block (its bottom touches) on a master block or a rigid floor, pressed together.
+    """Return the scene of a slave block that is pressed on a master block or on a rigid floor.
+
+    The bottom of the slave touches the top of the master. The master is held below.
 
     Parameters
     ----------
-    slave_x, slave_y, master_x, master_y : ArrayLike
-        Ascending grid lines; the slave's lowest and the master's highest y agree. Where one block is wider, and
-        a pressure is given, the pressure acts beside the other one too, so that all stays uniform.
-    young, poisson : Sequence[float]
-        Of slave and master.
+    slave, master : Rectangle
+        Grid lines and materials. The slave's lowest and the master's highest y agree.
     penalty : float
-        Ε̂, also for the depth of the first guess.
+        The distributed stiffness ε̂, force per length per length of penetration.
     pressure : float | None
-        On top of the slave, or.
+        The pressure on top of the slave, force per length. Either this or `approach` is given.
     approach : float | None
-        Of its top, a displacement; with `tilt` nothing is uniform any more, and no exact pressure is known.
+        The displacement of the top of the slave towards the master, a length.
+    tilt : float
+        Part of the approach that varies linearly, see `block`. With a tilt nothing is uniform, and no exact pressure is
+        known.
     lowered : float | None
-        How deep the slave is pushed in the first guess; by default `approach`, or p/ε̂.
+        The depth, a length, to which the slave is pushed in the first guess; `approach` by default, or pressure / ε̂.
     free_sides : bool
-        Of both blocks; then the gap is not known exactly, since areas change.
+        True leaves the vertical sides of both blocks free. Areas change then, and the gap is not known exactly.
     rigid_master : bool
-        The master's top alone, held.
+        True replaces the master by its top, held.
+    placing : Placing
+        Rotation, shift and scale of the whole scene.
+    name : str
+        The name of the scene.
+
+    Returns
+    -------
+    Scene
+        Its facts are "along" (n_nodes,), the coordinate of each contact node along the interface, a length, and
+        "direction" (2,), the interface's unit vector. If the pressure is known exactly, then also "compliance" (2,),
+        height over oedometric modulus of slave and master, and "pressure" or "approach".
 
     Raises
     ------
     MisuseError
         As `Body` and `Scene` do.
+
+    Examples
+    --------
+    >>> from contactverif import Rectangle, load_formulation, solve, two_blocks
+    >>> scene = two_blocks(Rectangle([0, 1, 3], [0, 2]), Rectangle([0, 2, 3], [-2, 0]), penalty=10.0, pressure=0.1)
+    >>> trace = solve(scene, load_formulation("vts-ppt").with_penalty(10.0))
+    >>> trace.end.label
+    'converged'
     """
     slave_x, slave_y, master_x, master_y = (
-        np.asarray(values, dtype=np.float64) for values in (slave_x, slave_y, master_x, master_y)
+        np.asarray(values, dtype=np.float64) for values in (slave.x, slave.y, master.x, master.y)
     )
     if lowered is None:
         lowered = approach if approach is not None else (pressure or 0.0) / penalty / placing.scale
     upper = block(
-        slave_x,
-        slave_y,
+        replace(slave, x=slave_x, y=slave_y),
         contact="bottom",
-        young=young[0],
-        poisson=poisson[0],
         pressure=pressure or 0.0,
         approach=approach,
         tilt=tilt,
         lowered=lowered,
         free_sides=free_sides,
-        over=(float(master_x[0]), float(master_x[-1])),
-        axis=placing.axis,
-        shift=placing.shift,
-        scale=placing.scale,
+        contact_range=(float(master_x[0]), float(master_x[-1])),
+        placing=placing,
         name="slave",
     )
     lower: Body
     if rigid_master:
         points = np.column_stack([master_x[::-1], np.full(len(master_x), master_y[-1])])
-        placed = placed_at(points, placing.axis, placing.shift, placing.scale)
-        lower = rigid_surface(placed, axis=placing.axis, name="master")
+        lower = rigid_surface(placing.place(points), axis=placing.axis, name="master")
     else:
         lower = block(
-            master_x,
-            master_y,
+            replace(master, x=master_x, y=master_y),
             contact="top",
-            young=young[1],
-            poisson=poisson[1],
             pressure=pressure or 0.0,
             approach=0.0,
             free_sides=free_sides,
-            over=(float(slave_x[0]), float(slave_x[-1])),
-            axis=placing.axis,
-            shift=placing.shift,
-            scale=placing.scale,
+            contact_range=(float(slave_x[0]), float(slave_x[-1])),
+            placing=placing,
             name="master",
         )
     facts = {
         "along": np.concatenate([slave_x, master_x[::-1] if rigid_master else master_x]) * placing.scale,
         "direction": np.array(placing.axis),
     }
-    left, right = slave_x[0] - master_x[0], master_x[-1] - slave_x[-1]  # by how much the master is wider
-    all_touch = left >= 0 and right >= 0 if rigid_master else left == right == 0
-    if tilt == 0 and not free_sides and (pressure is not None or all_touch):
-        heights = (np.ptp(slave_y), 0.0 if rigid_master else np.ptp(master_y))
-        moduli = (upper.oedometric_modulus, lower.oedometric_modulus)
-        facts["compliance"] = np.array([h / m for h, m in zip(heights, moduli, strict=True)]) * placing.scale
-        if approach is not None:
-            facts["approach"] = np.array(approach * placing.scale)
-        else:
-            facts["pressure"] = np.array(pressure)
+    # The part of each block beside the other carries the pressure; an approach imposes none there.
+    left, right = slave_x[0] - master_x[0], master_x[-1] - slave_x[-1]  # Lengths of the master beside the slave.
+    whole_slave_touches = left >= 0 and right >= 0 if rigid_master else left == right == 0
+    if tilt == 0 and not free_sides and (pressure is not None or whole_slave_touches):
+        heights = (float(np.ptp(slave_y)), 0.0 if rigid_master else float(np.ptp(master_y)))
+        facts |= _uniform_facts((upper, lower), heights, pressure, approach, placing.scale)
     return Scene((upper, lower), penalty=penalty, facts=facts, name=name)
 
 
+def _uniform_facts(
+    bodies: tuple[Body, Body],
+    heights: tuple[float, float],
+    pressure: float | None,
+    approach: float | None,
+    scale: float,
+) -> dict[str, FloatArray]:
+    """Return the exact facts of a scene under uniform pressure: compliances, and the pressure or the approach."""
+    compliances = [height / body.oedometric_modulus for height, body in zip(heights, bodies, strict=True)]
+    facts: dict[str, FloatArray] = {"compliance": np.array(compliances) * scale}
+    if approach is not None:
+        facts["approach"] = np.array(approach * scale)
+    else:
+        facts["pressure"] = np.array(pressure)
+    return facts
+
+
 def is_uniform(case: Case) -> bool:
-    """Whether the pressure of the scene is known, and the same everywhere."""
+    """Return whether the pressure of the scene is known exactly, and the same everywhere."""
     return "compliance" in case.parameters
 
 
 def overhangs(case: Case) -> bool:
-    """Whether the slave of a uniform scene lies beside its master somewhere."""
+    """Return whether the slave of a uniform scene extends beyond its master at either end."""
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     return bool(slave.min() < master.min() or slave.max() > master.max())
 
 
 def pressure_of(case: Case, penalty: float) -> float:
-    """The exact contact pressure p of a uniform scene: given, or p = Δ / (H1/M1 + H2/M2 + 1/ε̂)."""
+    """Return the exact contact pressure of a uniform scene, force per length.
+
+    Parameters
+    ----------
+    case : Case
+        A case for which `is_uniform` holds.
+    penalty : float
+        The distributed stiffness ε̂; infinite for multipliers.
+
+    Returns
+    -------
+    float
+        The pressure that loads the scene; under an approach Δ it is p = Δ / (H1/M1 + H2/M2 + 1/ε̂), with the heights H
+        and the oedometric moduli M of both blocks.
+    """
     if "pressure" in case.parameters:
         return case.parameter("pressure")
     return case.parameter("approach") / (float(case.parameters["compliance"].sum()) + 1 / penalty)
 
 
 def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:
-    """The unknowns q (n_free,) of the exact solution: both surfaces move along the normal alone."""
+    """Return the unknowns q (n_free,) of the exact solution of a uniform scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene from `two_blocks` whose pressure is known.
+    pressure : float
+        The exact contact pressure p.
+    penalty : float
+        The distributed stiffness ε̂.
+
+    Returns
+    -------
+    FloatArray, shape (n_free,)
+        Both surfaces move along the normal alone: the master by p H2/M2, the slave by p/ε̂ more.
+    """
     _, master = scene.facts["compliance"]
     down = {True: -pressure * (master + 1 / penalty), False: -pressure * master}
     return np.concatenate(

@@ -22,7 +22,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.blocks import Placing, two_blocks
+from contactverif.mechanics.simple_bodies import Placing, Rectangle
+from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.disk import DiskProblem, disk_on_foundation
 
 MODERATE_PENALTY = 10.0  # ε̂ h / E
@@ -310,12 +311,8 @@ def blocks(
     angle = radians(degrees)
     axis = _QUARTERS.get(degrees % 360, (cos(angle), sin(angle)))  # type: ignore[call-overload]
     return two_blocks(
-        slave_x,
-        layers,
-        master_x,
-        layers - drawing.height,
-        young=(young, ratio * young),
-        poisson=(poisson, poisson),
+        Rectangle(slave_x, layers, young=young, poisson=poisson),
+        Rectangle(master_x, layers - drawing.height, young=ratio * young, poisson=poisson),
         penalty=MODERATE_PENALTY * young / mean_segment if penalty is None else penalty,
         pressure=p,
         lowered=lowered,

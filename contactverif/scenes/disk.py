@@ -21,9 +21,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.body import Body, block
+from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.scenes.hertz import WinklerContact, half_width, layer_half_width, solve_winkler_contact
 
 UNIFORM = 1.6  # half-widths of the contact: where the foundation's elements are equally wide
@@ -135,11 +136,13 @@ def foundation(problem: DiskProblem, refine: int = 1) -> Body:
         middle[-1] + graded(problem.width / 2 - middle[-1], size, outer, outer * refine - fewer)[1:] for fewer in (0, 1)
     )
     whole = block(
-        np.concatenate([-left[::-1], -middle[::-1], middle, right]),
-        -graded(problem.depth, size, deep, deep * refine)[::-1],
+        Rectangle(
+            np.concatenate([-left[::-1], -middle[::-1], middle, right]),
+            -graded(problem.depth, size, deep, deep * refine)[::-1],
+            young=problem.young[1],
+            poisson=problem.poisson,
+        ),
         contact="top",
-        young=problem.young[1],
-        poisson=problem.poisson,
         approach=0.0,
         free_sides=True,
         name="master",

@@ -19,7 +19,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import has_bodies
-from contactverif.scenes.blocks import Placing, is_uniform, overhangs, two_blocks
+from contactverif.mechanics.simple_bodies import Placing, Rectangle
+from contactverif.scenes.blocks import is_uniform, overhangs, two_blocks
 from contactverif.scenes.catalogue import MODERATE_PENALTY
 from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
@@ -183,12 +184,8 @@ def _case(
     approach = None if pressure is not None else strain * (slave_y[-1] + master_y[-1])
     segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * place.scale
     scene = two_blocks(
-        slave_x,
-        slave_y,
-        master_x,
-        master_y - master_y[-1],
-        young=young,
-        poisson=poisson,
+        Rectangle(slave_x, slave_y, young=young[0], poisson=poisson[0]),
+        Rectangle(master_x, master_y - master_y[-1], young=young[1], poisson=poisson[1]),
         penalty=stiff * (young[0] if rigid_master else min(young)) / segment,
         pressure=pressure,
         approach=approach,

@@ -1,6 +1,6 @@
 """Two passes: any one-pass formulation, once with the roles as they are and once exchanged, summed.
 
-The second pass asks the formulation about `interface.swapped()`. Both get the same penalty, so that it acts twice:
+The second pass asks the formulation about `interface.swap_roles()`. Both get the same penalty, so that it acts twice:
 springs share a pressure between the passes, and penetrate half as much. Multipliers of the first pass come first in z.
 Exchanging the roles of the surfaces changes nothing. What the formulation does not provide, two passes of it do not.
 
@@ -124,7 +124,7 @@ class TwoPass:
         return self._known[1]
 
     def _new_passes(self, interface: Interface) -> tuple[Pass, Pass]:
-        swapped, positions = interface.swapped(), np.arange(interface.n_unknowns)
+        swapped, positions = interface.swap_roles(), np.arange(interface.n_unknowns)
         there = interface.dim * interface.n_slave_nodes
         first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))
         multipliers = interface.n_unknowns + np.arange(first + second)

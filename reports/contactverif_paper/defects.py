@@ -18,10 +18,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import block
 from contactverif.contract.interface import Interface
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif_paper import cast
 from contactverif_paper.paper_data import Defects, Member, Said, Series, Statement
@@ -169,17 +169,16 @@ def overhanging(part: float) -> Scene:
     young, poisson, pressure = 1e4, 0.3, 100.0
     penalty = 10 * young / 2.0
     upper = block(
-        slave_x,
-        layers,
+        Rectangle(slave_x, layers, young=young, poisson=poisson),
         contact="bottom",
-        young=young,
-        poisson=poisson,
         pressure=pressure,
-        over=(-edge, edge),
         lowered=pressure / penalty,
         name="slave",
+        contact_range=(-edge, edge),
     )
-    lower = block(master_x, layers - 4.0, contact="top", young=young, poisson=poisson, approach=0.0, name="master")
+    lower = block(
+        Rectangle(master_x, layers - 4.0, young=young, poisson=poisson), contact="top", approach=0.0, name="master"
+    )
     facts = {
         "along": np.concatenate([slave_x, master_x]),
         "direction": np.array([1.0, 0.0]),

@@ -14,6 +14,7 @@ import numpy as np
 
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
@@ -95,12 +96,8 @@ def eight_on_two() -> Scene:
     """Eight slave segments on two master segments: the rows of VTS-PPT's constraints depend on one another."""
     layers = np.linspace(0.0, 4.0, 3)
     return two_blocks(
-        np.linspace(0.0, 8.0, 9),
-        layers,
-        np.linspace(0.0, 8.0, 3),
-        layers - 4.0,
-        young=(1e4, 1e4),
-        poisson=(0.3, 0.3),
+        Rectangle(np.linspace(0.0, 8.0, 9), layers, young=1e4, poisson=0.3),
+        Rectangle(np.linspace(0.0, 8.0, 3), layers - 4.0, young=1e4, poisson=0.3),
         penalty=1e5,
         pressure=100.0,
     )

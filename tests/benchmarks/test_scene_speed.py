@@ -17,6 +17,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case
@@ -52,12 +53,8 @@ def meshes() -> list[TwoBlocks]:
 def posed(blocks: TwoBlocks) -> Scene:
     """The same two blocks as a scene."""
     return two_blocks(
-        blocks.slave_x,
-        blocks.slave_y,
-        blocks.master_x,
-        blocks.master_y,
-        young=blocks.young,
-        poisson=blocks.poisson,
+        Rectangle(blocks.slave_x, blocks.slave_y, young=blocks.young[0], poisson=blocks.poisson[0]),
+        Rectangle(blocks.master_x, blocks.master_y, young=blocks.young[1], poisson=blocks.poisson[1]),
         penalty=blocks.penalty,
         approach=blocks.approach,
     )

@@ -11,8 +11,9 @@ from handmade_run import run_with
 
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import has_bodies, scene_of
+from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.blocks import Placing, two_blocks
+from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import SCENES, load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.read import case_ids, read_case, same_data
@@ -25,9 +26,12 @@ def odd() -> Case:
     """Numbers that no decimal holds, and an approach instead of a pressure."""
     third = 1 / 3
     return two_blocks(
-        [0, third, 1], [0, np.pi], [0, 0.7, 1], [-np.e, 0], young=(third, 1e9 / 7), poisson=(0.1, 0.3), penalty=np.pi,
-        approach=1e-3 / 7, placing=Placing((np.cos(1.0), np.sin(1.0)), (1e3, -third), 2.0**-40),
-    ).case(seed=2**63 - 5)  # fmt: skip
+        Rectangle([0, third, 1], [0, np.pi], young=third, poisson=0.1),
+        Rectangle([0, 0.7, 1], [-np.e, 0], young=1e9 / 7, poisson=0.3),
+        penalty=np.pi,
+        approach=1e-3 / 7,
+        placing=Placing((np.cos(1.0), np.sin(1.0)), (1e3, -third), 2.0**-40),
+    ).case(seed=2**63 - 5)
 
 
 CASES = {name: load_scene(name).case() for name in SCENES}

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.contract.body import Body, block, placed_at, rigid_surface
+from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 
 # Four cells; nodes are numbered along x from below, so 0 1 2 touch and 6 7 8 are held.
-BLOCK = block([0, 1, 2], [0, 1, 2], contact="bottom", approach=0.1)
+BLOCK = block(Rectangle([0, 1, 2], [0, 1, 2]), contact="bottom", approach=0.1)
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 
 
@@ -161,34 +162,61 @@ def test_an_axis_may_be_a_rounding_too_long() -> None:
 
 
 WRONG_BLOCKS: dict[str, tuple[Callable[[], Body], str]] = {
-    "descending": (lambda: block([0, 2, 1], [0, 1], contact="top"), r"block: x: found \[0.0, 2.0, 1.0\]; needed at l"),
-    "one line": (lambda: block([0, 1], [3], contact="top"), r"block: y: found \[3.0\]; needed at least two ascending"),
-    "equal": (lambda: block([0, 0], [0, 1], contact="top"), r"block: x: found \[0.0, 0.0\]; needed at least two"),
-    "nan": (lambda: block([0, np.nan], [0, 1], contact="top"), r"block: x: found \[0.0, nan\]; needed at least two"),
-    "inf": (lambda: block([0, np.inf], [0, 1], contact="top"), r"block: x: found \[0.0, inf\]; needed at least two"),
-    "text": (lambda: block("ab", [0, 1], contact="top"), "block: x: found dtype <U2; needed numbers"),
-    "a grid": (lambda: block([[0, 1]], [0, 1], contact="top"), r"block: x: found shape \(1, 2\); needed shape \(n,\)"),
-    "side": (lambda: block([0, 1], [0, 1], contact="left"), "block: contact: found 'left'; needed 'bottom' or 'top'"),
-    "axis": (lambda: block([0, 1], [0, 1], contact="top", axis=(1, 1)), r"block: axis: found \(1.0, 1.0\); needed a"),
+    "descending": (
+        lambda: block(Rectangle([0, 2, 1], [0, 1]), contact="top"),
+        r"block: x: found \[0.0, 2.0, 1.0\]; needed at l",
+    ),
+    "one line": (
+        lambda: block(Rectangle([0, 1], [3]), contact="top"),
+        r"block: y: found \[3.0\]; needed at least two ascending",
+    ),
+    "equal": (
+        lambda: block(Rectangle([0, 0], [0, 1]), contact="top"),
+        r"block: x: found \[0.0, 0.0\]; needed at least two",
+    ),
+    "nan": (
+        lambda: block(Rectangle([0, np.nan], [0, 1]), contact="top"),
+        r"block: x: found \[0.0, nan\]; needed at least two",
+    ),
+    "inf": (
+        lambda: block(Rectangle([0, np.inf], [0, 1]), contact="top"),
+        r"block: x: found \[0.0, inf\]; needed at least two",
+    ),
+    "text": (lambda: block(Rectangle("ab", [0, 1]), contact="top"), "block: x: found dtype <U2; needed numbers"),
+    "a grid": (
+        lambda: block(Rectangle([[0, 1]], [0, 1]), contact="top"),
+        r"block: x: found shape \(1, 2\); needed shape \(n,\)",
+    ),
+    "side": (
+        lambda: block(Rectangle([0, 1], [0, 1]), contact="left"),
+        "block: contact: found 'left'; needed 'bottom' or 'top'",
+    ),
+    "axis": (
+        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(axis=(1, 1))),
+        r"block: axis: found \(1.0, 1.0\); needed a",
+    ),
     "axis of 3": (
-        lambda: block([0, 1], [0, 1], contact="top", axis=(1, 0, 0)),
+        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(axis=(1, 0, 0))),
         r"block: axis: found shape \(3,\); needed shape \(2,\)",
     ),
     "shift": (
-        lambda: block([0, 1], [0, 1], contact="top", shift=(1,)),
+        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(shift=(1,))),
         r"block: shift: found shape \(1,\); needed shape \(2,\)",
     ),
-    "material": (lambda: block([0, 1], [0, 1], contact="top", young=0), "block: young: found 0; needed Young's"),
+    "material": (
+        lambda: block(Rectangle([0, 1], [0, 1], young=0), contact="top"),
+        "block: young: found 0; needed Young's",
+    ),
     "one point": (lambda: rigid_surface([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
     "in line": (lambda: rigid_surface([0, 1, 2]), r"rigid: points: found shape \(3,\); needed shape \(n, 2\)"),
     "ragged": (lambda: rigid_surface([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),
     "words": (lambda: rigid_surface("abc"), "rigid: points: found dtype <U3; needed numbers"),
     "move": (
-        lambda: rigid_surface([[0, 0], [1, 0]], moved=(1, 2, 3)),
-        r"rigid: moved: found shape \(3,\); needed shape \(2,",
+        lambda: rigid_surface([[0, 0], [1, 0]], displacement=(1, 2, 3)),
+        r"rigid: displacement: found shape \(3,\); needed shape \(2,",
     ),
     "nowhere": (
-        lambda: rigid_surface([[0, 0], [1, 0]], moved=(np.nan, 0)),
+        lambda: rigid_surface([[0, 0], [1, 0]], displacement=(np.nan, 0)),
         "rigid: imposed: found NaN or infinity; needed",
     ),
     "loose": (
@@ -207,7 +235,12 @@ def test_wrong_blocks(make: Callable[[], Body], message: str) -> None:
 
 @pytest.mark.parametrize("contact", ["bottom", "top"])
 def test_the_body_is_on_the_left_of_its_contact_edges(contact: str) -> None:
-    body = block([0, 1, 3], [0, 2], contact=contact, approach=0.0, axis=LEANING, shift=(5, -1), scale=2.0)
+    body = block(
+        Rectangle([0, 1, 3], [0, 2]),
+        contact=contact,
+        approach=0.0,
+        placing=Placing(axis=LEANING, shift=(5, -1), scale=2.0),
+    )
     first, second = np.swapaxes(body.nodes[body.contact], 0, 1)
     along, to_centre = second - first, body.nodes.mean(axis=0) - first
     assert (along[:, 0] * to_centre[:, 1] - along[:, 1] * to_centre[:, 0] > 0).all()
@@ -216,7 +249,7 @@ def test_the_body_is_on_the_left_of_its_contact_edges(contact: str) -> None:
 
 @pytest.mark.parametrize(("contact", "down"), [("bottom", -1.0), ("top", 1.0)])
 def test_pressure_on_the_far_side(contact: str, down: float) -> None:
-    body = block([0, 1, 3], [0, 1, 2], contact=contact, pressure=5.0, scale=2.0)
+    body = block(Rectangle([0, 1, 3], [0, 1, 2]), contact=contact, pressure=5.0, placing=Placing(scale=2.0))
     far = body.nodes[:, 1] == (4 if contact == "bottom" else 0)
     assert body.load[far].tolist() == [[0, 5 * down], [0, 15 * down], [0, 10 * down]]  # 5 × (1, 3, 2)
     assert not body.load[~far].any()
@@ -226,38 +259,47 @@ def test_pressure_on_the_far_side(contact: str, down: float) -> None:
 
 
 def test_an_approach_of_the_far_side_with_a_tilt() -> None:
-    body = block([0, 1, 4], [0, 1], contact="bottom", approach=0.25, tilt=0.125, lowered=0.5, scale=2.0)
+    body = block(
+        Rectangle([0, 1, 4], [0, 1]),
+        contact="bottom",
+        approach=0.25,
+        tilt=0.125,
+        lowered=0.5,
+        placing=Placing(scale=2.0),
+    )
     assert body.imposed.tolist() == [[0, 0]] * 3 + [[0, -0.25], [0, -0.375], [0, -0.75]]
     assert body.fixed[:3, 1].tolist() == [False] * 3
     assert body.fixed[3:, 1].all()
     assert body.start.tolist() == [0, -1]
-    assert block([0, 1, 4], [0, 1], contact="top", approach=0.25).imposed[:3, 1].tolist() == [0.25] * 3
+    assert block(Rectangle([0, 1, 4], [0, 1]), contact="top", approach=0.25).imposed[:3, 1].tolist() == [0.25] * 3
 
 
 def test_free_sides_hold_one_node_from_sliding() -> None:
-    body = block([0, 1, 3], [0, 1, 2], contact="bottom", pressure=1.0, free_sides=True)
+    body = block(Rectangle([0, 1, 3], [0, 1, 2]), contact="bottom", pressure=1.0, free_sides=True)
     assert np.argwhere(body.fixed).tolist() == [[6, 0]]
 
 
 def test_pressure_beside_what_presses() -> None:
-    body = block([0, 2, 4], [0, 1], contact="top", approach=0.0, pressure=3.0, over=(1, 3))
+    body = block(Rectangle([0, 2, 4], [0, 1]), contact="top", approach=0.0, pressure=3.0, contact_range=(1, 3))
     # outside [1, 3]: ∫ N over [0, 1] is 3/4 at x = 0 and 1/4 at x = 2; the same from the right
     assert body.load.tolist() == [[0, 0]] * 3 + [[0, -2.25], [0, -1.5], [0, -2.25]]
-    whole = block([0, 2, 4], [0, 1], contact="top", approach=0.0, pressure=3.0, over=(0, 4))
+    whole = block(Rectangle([0, 2, 4], [0, 1]), contact="top", approach=0.0, pressure=3.0, contact_range=(0, 4))
     assert not whole.load.any()
 
 
 def test_where_a_block_lies() -> None:
-    quarter = block([0, 1], [0, 2], contact="bottom", approach=0.0, axis=(0, 1), shift=(1, 0), scale=2.0)
+    quarter = block(
+        Rectangle([0, 1], [0, 2]), contact="bottom", approach=0.0, placing=Placing(axis=(0, 1), shift=(1, 0), scale=2.0)
+    )
     assert quarter.nodes.tolist() == [[2, 0], [2, 2], [-2, 0], [-2, 2]]
     points = np.array([[3.0, 4.0]])
-    turned = placed_at(points, LEANING, (1, 2), 0.5)
+    turned = Placing(LEANING, (1, 2), 0.5).place(points)
     expected = 0.5 * (np.array([1, 2]) + 3 * np.array(LEANING) + 4 * np.array([-LEANING[1], LEANING[0]]))
     assert np.abs(turned - expected).max() <= 4 * UNIT_ROUNDOFF * 7  # 7 = 3 + 4, two products and two sums
 
 
 def test_a_rigid_body() -> None:
-    floor = rigid_surface([[4, 0], [1, 0], [0, 0]], moved=(0, 0.5), name="floor")
+    floor = rigid_surface([[4, 0], [1, 0], [0, 0]], displacement=(0, 0.5), name="floor")
     assert floor.rigid
     assert floor.fixed.all()
     assert floor.imposed.tolist() == [[0, 0.5]] * 3

@@ -71,10 +71,10 @@ def test_an_interface() -> None:
 
 
 def test_swapped_twice_is_the_identity() -> None:
-    once = PAIR.swapped()
+    once = PAIR.swap_roles()
     assert once.nodes[: once.n_slave_nodes].tolist() == PAIR.nodes[3:].tolist()
     assert once.slave.lengths(once.nodes).tolist() == PAIR.master.lengths(PAIR.nodes).tolist()
-    twice = once.swapped()
+    twice = once.swap_roles()
     assert np.array_equal(twice.nodes, PAIR.nodes)
     assert np.array_equal(twice.slave.segments, PAIR.slave.segments)
     assert np.array_equal(twice.master.segments, PAIR.master.segments)

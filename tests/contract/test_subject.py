@@ -286,7 +286,7 @@ def test_multipliers_are_counted_once_an_interface() -> None:
 
     guarded = Subject("restless", lambda *, penalty: Restless()).with_penalty(1.0)
     assert [guarded.n_multipliers(PAIR) for _ in range(3)] == [1, 1, 1]
-    assert guarded.n_multipliers(PAIR.swapped()) == 2
+    assert guarded.n_multipliers(PAIR.swap_roles()) == 2
 
 
 def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:

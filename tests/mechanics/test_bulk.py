@@ -14,12 +14,13 @@ import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.body import Body, block, rigid_surface
+from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import bulk
 from contactverif.mechanics.bulk import body_from_mesh, condense, loose_modes, stiffness
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.blocks import Placing, exact_unknowns, two_blocks
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
+from contactverif.scenes.blocks import exact_unknowns, two_blocks
 
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 
@@ -47,8 +48,11 @@ def in_triangles(body: Body) -> Body:
 
 
 def a_block(**more: Any) -> Body:
-    given = {"contact": "bottom", "young": 3.0, "poisson": 0.3, "approach": 0.1} | more
-    return block([0, 1, 2.5, 4], [0, 1, 2, 3.5], **given)
+    """A block of nine cells; options are those of `Rectangle`, `Placing` and `block`."""
+    options = {"contact": "bottom", "young": 3.0, "poisson": 0.3, "approach": 0.1} | more
+    material = {name: options.pop(name) for name in ("young", "poisson")}
+    placing = Placing(**{name: options.pop(name) for name in ("axis", "shift") if name in options})
+    return block(Rectangle([0, 1, 2.5, 4], [0, 1, 2, 3.5], **material), placing=placing, **options)
 
 
 BODIES = {
@@ -184,11 +188,11 @@ def test_a_body_is_condensed_once() -> None:
 
 
 def test_bodies_without_unknowns_or_without_an_inside() -> None:
-    floor = condense(rigid_surface([[4, 0], [1, 0], [0, 0]], moved=(0.5, 0.25), axis=(0, 1)))
+    floor = condense(rigid_surface([[4, 0], [1, 0], [0, 0]], displacement=(0.5, 0.25), axis=(0, 1)))
     assert floor.stiffness.shape == (0, 0)
     assert floor.displacements(np.zeros(0), 0.5).tolist() == [[-0.125, 0.25]] * 3
     assert floor.stresses(np.zeros(0)).shape == (0, 1, 3)
-    held = block([0, 1], [0, 1], contact="bottom", approach=0.0)  # one cell: the sides and the top are held
+    held = block(Rectangle([0, 1], [0, 1]), contact="bottom", approach=0.0)  # one cell: the sides and the top are held
     layer = condense(held)
     assert layer.unknowns.tolist() == [1, 3]
     expected = by_skfem(held)[np.ix_([1, 3], [1, 3])]
@@ -220,12 +224,8 @@ def test_stresses_of_a_uniform_pressure(axis: tuple[float, float], cells: str) -
     """Between rollers σ_nn = −p and σ_tt = −p ν/(1−ν), recovered from the contact boundary alone."""
     p, penalty, poisson = 0.5, 10.0, (0.3, 0.2)
     scene = two_blocks(
-        [0, 1, 2.5, 4],
-        [0, 1, 2, 3.5],
-        [0, 2, 3, 4],
-        [-3, -1, 0],
-        young=(1.0, 3.0),
-        poisson=poisson,
+        Rectangle([0, 1, 2.5, 4], [0, 1, 2, 3.5], young=1.0, poisson=poisson[0]),
+        Rectangle([0, 2, 3, 4], [-3, -1, 0], young=3.0, poisson=poisson[1]),
         penalty=penalty,
         pressure=p,
         placing=Placing(axis, (1.0, -2.0)),
@@ -248,7 +248,7 @@ def with_a_loose_part(seed: int) -> Body:
     """The block, and a second one that nobody holds, somewhere else."""
     random = np.random.default_rng(seed)
     body, n = a_block(poisson=float(random.uniform(0, 0.45))), int(random.integers(2, 5))
-    other = block(np.arange(n) * random.uniform(0.3, 3), np.arange(3.0), contact="top", approach=0.0)
+    other = block(Rectangle(np.arange(n) * random.uniform(0.3, 3), np.arange(3.0)), contact="top", approach=0.0)
     none = np.zeros(other.nodes.shape)
     return Body(
         nodes=np.vstack([body.nodes, other.nodes + random.uniform(5, 9, 2)]),
@@ -280,14 +280,14 @@ def test_a_loose_part_is_found_whatever_roundoff_makes_of_it(dense: int, monkeyp
 @pytest.mark.parametrize("dense", [2000, 0], ids=["dense", "sparse"])
 def test_a_long_thin_bar_is_not_loose(dense: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bulk, "DENSE_LIMIT", dense)
-    bar = block([0, 1], np.arange(400.0), contact="bottom", free_sides=True, pressure=1.0)
+    bar = block(Rectangle([0, 1], np.arange(400.0)), contact="bottom", free_sides=True, pressure=1.0)
     condensed = condense(replace(bar, fixed=np.zeros_like(bar.fixed)))
     # the contact boundary alone carries the load on top, whose resultant is 1
     assert abs(condensed.load[1::2].sum() + 1) <= UNIT_ROUNDOFF * 400.0**4  # cond of a bar: (length / thickness)^4
 
 
 def test_what_is_loose_is_said() -> None:
-    flat = block([0, 1, 2], [0, 1], contact="bottom", pressure=1.0, name="punch")
+    flat = block(Rectangle([0, 1, 2], [0, 1]), contact="bottom", pressure=1.0, name="punch")
     bent = replace(flat, nodes=np.where(np.arange(6)[:, None] == 1, (1.0, -0.25), flat.nodes))
     none = np.zeros_like(flat.fixed)
     one = none.copy()
@@ -381,7 +381,7 @@ def test_clockwise_cells_are_turned() -> None:
 
 
 def test_a_body_from_a_mesh_is_the_block_of_the_same_grid() -> None:
-    drawn = block([0, 1, 2.5], [0, 1, 1.75], contact="bottom", pressure=2.0, young=3.0, poisson=0.2)
+    drawn = block(Rectangle([0, 1, 2.5], [0, 1, 1.75], young=3.0, poisson=0.2), contact="bottom", pressure=2.0)
     meshed = made(supports={"left": "along", "right": "along"}, pressures={"top": 2.0}, young=3.0, poisson=0.2)
     order = [int(np.flatnonzero((meshed.nodes == node).all(axis=1))[0]) for node in drawn.nodes]
     assert np.array_equal(meshed.fixed[order], drawn.fixed)

@@ -22,6 +22,7 @@ from contactverif.mechanics import bulk
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.newton import End, System, Trace, solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
@@ -68,12 +69,8 @@ MASTERS = {"one": [0.0, 8.0], "matching": [0.0, 2, 4, 8], "b": [0.0, 4, 8], "cro
 def test_the_pressure_of_two_pressed_blocks(name: str, master: str) -> None:
     """p = Δ/(H1/M1 + H2/M2 + 1/ε̂), on a pair of meshes that each formulation can do."""
     scene = two_blocks(
-        [0, 2, 4, 8],
-        [0, 2, 6],
-        MASTERS[master],
-        [-4, -2, 0],
-        young=(1, 3),
-        poisson=(0.3, 0.2),
+        Rectangle([0, 2, 4, 8], [0, 2, 6], young=1, poisson=0.3),
+        Rectangle(MASTERS[master], [-4, -2, 0], young=3, poisson=0.2),
         penalty=10,
         approach=0.1,
     )
@@ -309,7 +306,7 @@ def test_load_steps_end_at_the_same_solution() -> None:
 
 
 def test_load_steps_of_an_imposed_displacement() -> None:
-    scene = two_blocks([0, 1, 3], [0, 1], [0, 2, 3], [-1, 0], penalty=10, approach=0.1)
+    scene = two_blocks(Rectangle([0, 1, 3], [0, 1]), Rectangle([0, 2, 3], [-1, 0]), penalty=10, approach=0.1)
     trace = solved("vts-ppt", scene, load_steps=2)
     half = [-stresses[..., 1] for stresses in scene.stresses(trace.q[np.flatnonzero(trace.factors == 0.5)[-1]], 0.5)]
     exact = 0.1 / (1 + 1 + 0.1)

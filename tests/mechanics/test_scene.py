@@ -13,7 +13,7 @@ import skfem
 
 from contactverif import oracle
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body, block, rigid_surface
+from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
@@ -25,9 +25,10 @@ from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bulk import body_from_mesh, stiffness
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.run.registry import load_formulation
 from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import Placing, exact_unknowns, two_blocks
+from contactverif.scenes.blocks import exact_unknowns, two_blocks
 from contactverif_nts import eq6, walk
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
@@ -36,14 +37,10 @@ LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 
 def pressed(**more: Any) -> Scene:
     """Two blocks whose meshes do not match, pressed together; leaning, off the origin."""
-    given: dict[str, Any] = {
-        "young": (1.0, 3.0),
-        "poisson": (0.3, 0.2),
-        "penalty": 10.0,
-        "pressure": 0.5,
-        "placing": Placing(LEANING, (1.0, -2.0), 2.0),
-    }
-    return two_blocks([0, 1, 2.5, 4], [0, 1, 2, 3.5], [0, 2, 3, 4], [-3, -1, 0], **(given | more))
+    slave = Rectangle([0, 1, 2.5, 4], [0, 1, 2, 3.5], young=1.0, poisson=0.3)
+    master = Rectangle([0, 2, 3, 4], [-3, -1, 0], young=3.0, poisson=0.2)
+    usual: dict[str, Any] = {"penalty": 10.0, "pressure": 0.5, "placing": Placing(LEANING, (1.0, -2.0), 2.0)}
+    return two_blocks(slave, master, **usual | more)
 
 
 def in_triangles(body: Body) -> Body:
@@ -52,9 +49,13 @@ def in_triangles(body: Body) -> Body:
 
 def three_bodies() -> Scene:
     """A quadrilateral and a triangular slave on one master, of different heights."""
-    master = block(np.linspace(0, 8, 6), [-2, -1, 0], contact="top", approach=0.0, young=5.0, name="base")
-    left = block([0.5, 1, 3], [0, 1, 2], contact="bottom", approach=0.125, tilt=0.01, lowered=0.125, poisson=0.25)
-    right = in_triangles(block([4, 6, 7.5], [0, 3], contact="bottom", pressure=0.25, lowered=0.0625, young=2.0))
+    master = block(Rectangle(np.linspace(0, 8, 6), [-2, -1, 0], young=5.0), contact="top", approach=0.0, name="base")
+    left = block(
+        Rectangle([0.5, 1, 3], [0, 1, 2], poisson=0.25), contact="bottom", approach=0.125, tilt=0.01, lowered=0.125
+    )
+    right = in_triangles(
+        block(Rectangle([4, 6, 7.5], [0, 3], young=2.0), contact="bottom", pressure=0.25, lowered=0.0625)
+    )
     return Scene((left, master, right), slave=(0, 2), master=(1,), penalty=7.0)
 
 
@@ -66,7 +67,8 @@ SCENES: dict[str, Callable[[], Scene]] = {
     ),
     "rigid floor": lambda: pressed(rigid_master=True),
     "rigid both": lambda: Scene(
-        (rigid_surface([[0, 0], [1, 0], [3, 0]], moved=(0, -0.5)), rigid_surface([[4, 0], [-1, 0]])), penalty=1 / 3
+        (rigid_surface([[0, 0], [1, 0], [3, 0]], displacement=(0, -0.5)), rigid_surface([[4, 0], [-1, 0]])),
+        penalty=1 / 3,
     ),
     "three": three_bodies,
     "named": lambda: catalogue.make_scene("c", degrees=33.0),
@@ -227,8 +229,8 @@ def test_bulk_forces_of_the_exact_solution_are_the_consistent_ones(scene: Scene,
 
 
 def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
-    far = block([100, 101, 103], [0, 1, 2], contact="bottom", approach=0.25, poisson=0.25, young=2.0)
-    free = block([200, 201], [0, 3], contact="top", pressure=0.5, free_sides=True)
+    far = block(Rectangle([100, 101, 103], [0, 1, 2], young=2.0, poisson=0.25), contact="bottom", approach=0.25)
+    free = block(Rectangle([200, 201], [0, 3]), contact="top", pressure=0.5, free_sides=True)
     free = replace(free, fixed=free.fixed | (free.nodes[:, 1:] == 3) & [False, True])  # hangs on its contact side
     scene = replace(pressed(), bodies=(*pressed().bodies, far, free), slave=(0, 2), master=(1, 3))
     assert scene.bodies_in_reach == (0, 1)
@@ -300,7 +302,9 @@ def test_bodies_that_cannot_meet() -> None:
 
 
 def test_a_body_out_of_reach_that_nothing_holds() -> None:
-    far = block([100, 101, 103], [0, 1, 2], contact="bottom", pressure=0.5, name="far")  # contact alone would hold it
+    far = block(
+        Rectangle([100, 101, 103], [0, 1, 2]), contact="bottom", pressure=0.5, name="far"
+    )  # contact alone would hold it
     scene = Scene((SLAVE, MASTER, far), slave=(0, 2))
     with pytest.raises(
         MisuseError,
@@ -343,7 +347,7 @@ def counted(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
 
 
 def with_a_far_body(scene: Scene, role: str) -> Scene:
-    far = block([4e3, 4001, 4003], [0, 1, 2], contact="bottom" if role == "slave" else "top", approach=0.25)
+    far = block(Rectangle([4e3, 4001, 4003], [0, 1, 2]), contact="bottom" if role == "slave" else "top", approach=0.25)
     bodies = (*scene.bodies, far)
     return replace(scene, bodies=bodies, **{role: (*getattr(scene, role), len(bodies) - 1)})
 
@@ -388,7 +392,7 @@ def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
 
 def test_a_near_body_does_change_it() -> None:
     alone = catalogue.make_scene("c")
-    near = block([13, 14], [0, 4], contact="bottom", approach=0.0)
+    near = block(Rectangle([13, 14], [0, 4]), contact="bottom", approach=0.0)
     beside = replace(alone, bodies=(*alone.bodies, near), slave=(0, 2))
     assert len(beside.interface.slave) == len(alone.interface.slave) + 1
 

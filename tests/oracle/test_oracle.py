@@ -95,7 +95,7 @@ def test_the_weights_are_the_integrals_of_the_shapes_over_what_both_surfaces_cov
                 expected[node] += (high - low) * value
     assert uniform_pressure_weights_exact(interface, case.parameters["along"]) == expected
     n_slave = interface.n_slave_nodes
-    swapped = uniform_pressure_weights_exact(interface.swapped(), np.roll(case.parameters["along"], -n_slave))
+    swapped = uniform_pressure_weights_exact(interface.swap_roles(), np.roll(case.parameters["along"], -n_slave))
     assert swapped == expected[n_slave:] + expected[:n_slave]
 
 

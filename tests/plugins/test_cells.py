@@ -101,7 +101,7 @@ def test_the_far_side_of_a_ring_is_not_touched() -> None:
     numbers = np.arange(24)
     ring = np.column_stack([numbers, np.roll(numbers, -1)])
     interface = Interface(np.vstack([inner, hole]), Surface(ring), Surface(ring + 24))
-    for here in (interface, interface.swapped()):
+    for here in (interface, interface.swap_roles()):
         _, points = cells_at(here, here.nodes)
         assert len(points) >= 24
         assert np.abs(points[:, GAP]).max() < 0.2

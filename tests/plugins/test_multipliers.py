@@ -17,6 +17,7 @@ from contactverif.geometry import projection
 from contactverif.geometry.compiled import uncompiled
 from contactverif.mechanics.newton import Trace, solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error
@@ -288,7 +289,9 @@ def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: di
     """Eight slave segments with two points each: 16 constraints, and gaps that nine nodal values describe."""
     heights = np.linspace(0, 4, 3)
     blocks = two_blocks(
-        np.arange(9), heights, [0, 4, 8], heights - 4, young=(1e4, 1e4), poisson=(0.3, 0.3), pressure=PRESSURE
+        Rectangle(np.arange(9), heights, young=1e4, poisson=0.3),
+        Rectangle([0, 4, 8], heights - 4, young=1e4, poisson=0.3),
+        pressure=PRESSURE,
     )
     trace = solved(name, blocks, penalty=1e4, **options)
     assert trace.converged

@@ -12,12 +12,12 @@ from surfaces import DEPTH, bent, flat, pushed
 
 import contactverif_mortar
 from contactverif import Interface, MisuseError
-from contactverif.contract.body import block
 from contactverif.contract.subject import Subject
 from contactverif.geometry import projection
 from contactverif.geometry.compiled import uncompiled
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.scenes.named_states import named_case
 from contactverif_mortar import cells, geometry, search, shapes, transmission
@@ -198,9 +198,11 @@ def test_nodal_gaps_fail_in_the_dead_zone() -> None:
 
 def dead_zone(make: Any, degrees: float) -> float:
     axis = [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
-    material: dict[str, Any] = {"young": 1e3, "poisson": 0.3, "axis": axis}
-    upper = block(SLAVE, np.linspace(0, 4, 4), contact="bottom", pressure=1.0, over=(-3.3, 3.3), **material)
-    lower = block(MASTER, np.linspace(-4, 0, 4), contact="top", approach=0.0, **material)
+    placing = Placing((float(axis[0]), float(axis[1])))
+    slave = Rectangle(SLAVE, np.linspace(0, 4, 4), young=1e3, poisson=0.3)
+    master = Rectangle(MASTER, np.linspace(-4, 0, 4), young=1e3, poisson=0.3)
+    upper = block(slave, contact="bottom", pressure=1.0, contact_range=(-3.3, 3.3), placing=placing)
+    lower = block(master, contact="top", approach=0.0, placing=placing)
     scene = Scene((upper, lower))
     trace = solve(scene, Subject("", make).with_penalty(1e4))
     assert trace.converged

@@ -16,6 +16,7 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import Trace, solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene
@@ -40,7 +41,7 @@ def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
 
 
 def exchanged(formulation: Any, interface: Interface) -> Any:
-    """Where the unknowns of `interface.swapped()` are among those of the interface, multipliers too."""
+    """Where the unknowns of `interface.swap_roles()` are among those of the interface, multipliers too."""
     there, n = 2 * interface.n_slave_nodes, interface.n_unknowns
     total = formulation.n_multipliers(interface)
     first = formulation._inner.n_multipliers(interface)
@@ -52,7 +53,7 @@ def test_it_is_the_sum_of_both_passes(name: str) -> None:
     formulation, one = both(name), getattr(contactverif_nts, name)(penalty=PENALTY)
     for seed in range(20):
         interface, z = state(formulation, seed)
-        swapped, n, there = interface.swapped(), interface.n_unknowns, 2 * interface.n_slave_nodes
+        swapped, n, there = interface.swap_roles(), interface.n_unknowns, 2 * interface.n_slave_nodes
         first = one.n_multipliers(interface)
         x, multipliers = z[:n], z[n:]
         states = np.append(x, multipliers[:first]), np.concatenate([x[there:], x[:there], multipliers[first:]])
@@ -69,7 +70,7 @@ def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
     formulation, in_contact = both(name), 0
     for seed in range(50):
         interface, z = state(formulation, seed)
-        places, swapped = exchanged(formulation, interface), interface.swapped()
+        places, swapped = exchanged(formulation, interface), interface.swap_roles()
         pairing, other = formulation.pair(interface, z), formulation.pair(swapped, z[places])
         forces = formulation.residual(interface, pairing, z)
         assert np.array_equal(formulation.residual(swapped, other, z[places]), forces[places])
@@ -252,7 +253,12 @@ def test_springs_in_two_passes_fail(name: str, scene_name: str) -> None:
 
 def blocks(slave: list[float], master: list[float]) -> Scene:
     y = np.linspace(0, 4, 3)
-    return two_blocks(slave, y, master, y - 4, young=(1e4, 1e4), poisson=(0.3, 0.3), pressure=100.0, penalty=5e4)
+    return two_blocks(
+        Rectangle(slave, y, young=1e4, poisson=0.3),
+        Rectangle(master, y - 4, young=1e4, poisson=0.3),
+        pressure=100.0,
+        penalty=5e4,
+    )
 
 
 MATCHING = blocks([0, 2, 3, 7], [0, 2, 3, 7])

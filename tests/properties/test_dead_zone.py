@@ -16,6 +16,7 @@ from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
@@ -67,17 +68,17 @@ def test_in_the_exact_solution_the_stress_is_uniform_and_needs_those_forces(text
 
 
 def test_either_block_may_overhang() -> None:
-    scene = two_blocks([0, 2, 4], [0, 1], [1, 3, 7], [-2, 0], pressure=0.5, penalty=10)
+    scene = two_blocks(Rectangle([0, 2, 4], [0, 1]), Rectangle([1, 3, 7], [-2, 0]), pressure=0.5, penalty=10)
     q = exact_unknowns(scene, 0.5, 10)
     assert stress_error(scene, scene.stresses(q), 0.5) <= 1e-14
     assert overhangs(scene.case())
-    assert not overhangs(two_blocks([1, 2], [0, 1], [0, 3], [-2, 0], pressure=0.5).case())
+    assert not overhangs(two_blocks(Rectangle([1, 2], [0, 1]), Rectangle([0, 3], [-2, 0]), pressure=0.5).case())
 
 
 def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
     floor = {"approach": 0.1, "rigid_master": True}
-    assert is_uniform(two_blocks([0, 1, 2], [0, 1], [0, 2], [0], **floor).case())  # type: ignore[arg-type]
-    assert not is_uniform(two_blocks([0, 1, 2], [0, 1], [0.5, 2], [0], **floor).case())  # type: ignore[arg-type]
+    assert is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0, 2], [0]), **floor).case())  # type: ignore[arg-type]
+    assert not is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0.5, 2], [0]), **floor).case())  # type: ignore[arg-type]
 
 
 # --- who passes -------------------------------------------------------------------------------------------------
@@ -114,7 +115,10 @@ def test_the_numbers_of_the_design() -> None:
         for start, lengths in ((DRAWING.slave_from, DRAWING.slave), (DRAWING.master_from, DRAWING.master))
     )
     scene = two_blocks(
-        x, [0, 6], master_x, [-6, 0], young=(1e4, 1e4), poisson=(0.3, 0.3), penalty=30 * 1e4 / 2, pressure=100
+        Rectangle(x, [0, 6], young=1e4, poisson=0.3),
+        Rectangle(master_x, [-6, 0], young=1e4, poisson=0.3),
+        penalty=30 * 1e4 / 2,
+        pressure=100,
     )
     errors = {name: measure_once(scene.case(), the(name)).values["stress error"] for name in (*RIGHT[:2], *WRONG)}
     assert max(errors[name] for name in RIGHT[:2]) <= 1e-13

@@ -16,6 +16,7 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import End, System, solve
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import two_blocks
@@ -161,6 +162,8 @@ def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
 
         return Nothing()
 
-    scene = two_blocks([0, 1, 3], [0, 2], [-1, 1.2, 4], [-2, 0], penalty=10.0, approach=0.1).case()
+    scene = two_blocks(
+        Rectangle([0, 1, 3], [0, 2]), Rectangle([-1, 1.2, 4], [-2, 0]), penalty=10.0, approach=0.1
+    ).case()
     (row,) = run([Subject("nothing", make)], [NEWTON_HISTORY], scene=scene).rows
     assert (row.verdict, row.unexpected) == (Verdict.NOT_JUDGED, "not judged"), row.reason

@@ -15,6 +15,7 @@ from contactverif.contract.property import Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import pressure_of, two_blocks
@@ -36,12 +37,8 @@ def the(name: str) -> Subject:
 def textbook() -> Case:
     """Return two blocks whose exact pressure, 0.017369727047, was computed by hand."""
     scene = two_blocks(
-        [0, 1, 3, 4],
-        [0, 2, 6],
-        [0, 1.5, 2, 4],
-        [-4, -1, 0],
-        young=(1, 3),
-        poisson=(0.3, 0.2),
+        Rectangle([0, 1, 3, 4], [0, 2, 6], young=1, poisson=0.3),
+        Rectangle([0, 1.5, 2, 4], [-4, -1, 0], young=3, poisson=0.2),
         penalty=10,
         approach=0.1,
     )
@@ -158,12 +155,10 @@ def test_a_scaled_scene_is_judged_the_same() -> None:
     values = []
     for length, modulus in ((1.0, 1.0), (2.0**40, 2.0**-30)):
         scene = two_blocks(
-            np.array([0, 1, 3, 4]) * length,
-            np.array([0, 2, 6]) * length,
-            np.array([0, 1.5, 2, 4]) * length,
-            np.array([-4, -1, 0]) * length,
-            young=(modulus, 3 * modulus),
-            poisson=(0.3, 0.2),
+            Rectangle(np.array([0, 1, 3, 4]) * length, np.array([0, 2, 6]) * length, young=modulus, poisson=0.3),
+            Rectangle(
+                np.array([0, 1.5, 2, 4]) * length, np.array([-4, -1, 0]) * length, young=3 * modulus, poisson=0.2
+            ),
             penalty=10 * modulus / length,
             approach=0.1 * length,
         )

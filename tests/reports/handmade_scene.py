@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import Body, block, rigid_surface
+from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
 
 PRESSURE = 100.0
@@ -16,13 +17,23 @@ PRESSURE = 100.0
 def bodies(*, wide: float = 0.0, angle: float = 0.0, rigid_master: bool = False) -> tuple[Body, Body]:
     """Three slave cells on two master cells, the master wider by that much on either side."""
     axis = (float(np.cos(angle)), float(np.sin(angle)))
-    upper = block([0, 1, 3, 6], [0, 2], contact="bottom", pressure=PRESSURE, axis=axis, name="slave")
+    upper = block(
+        Rectangle([0, 1, 3, 6], [0, 2]), contact="bottom", pressure=PRESSURE, name="slave", placing=Placing(axis=axis)
+    )
     places = np.array([-wide, 2.0, 6.0 + wide])
     if rigid_master:
         turned = np.column_stack([places[::-1], 0 * places]) @ upper.frame.T
         return upper, rigid_surface(turned, axis=axis, name="master")
     over = (0.0, 6.0)
-    lower = block(places, [-3, 0], contact="top", approach=0.0, pressure=PRESSURE, over=over, axis=axis, name="master")
+    lower = block(
+        Rectangle(places, [-3, 0]),
+        contact="top",
+        approach=0.0,
+        pressure=PRESSURE,
+        name="master",
+        contact_range=over,
+        placing=Placing(axis=axis),
+    )
     return upper, lower
 
 

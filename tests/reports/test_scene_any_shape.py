@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactverif.contract.body import block
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
@@ -44,8 +44,8 @@ def test_silhouettes_are_to_scale(width: int) -> None:
 
 
 def test_a_flat_pair_has_silhouettes_too() -> None:
-    upper = block([0, 1, 2], [0, 1], contact="bottom", approach=0.1, name="slave")
-    lower = block([0, 2], [-1, 0], contact="top", approach=0.0, name="master")
+    upper = block(Rectangle([0, 1, 2], [0, 1]), contact="bottom", approach=0.1, name="slave")
+    lower = block(Rectangle([0, 2], [-1, 0]), contact="top", approach=0.0, name="master")
     text = silhouettes_as_text(Scene((upper, lower)).case(), upper, lower, 40).splitlines()
     assert text[0] == ""
     assert set(text[1]) == {"▒"}

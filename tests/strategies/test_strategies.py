@@ -238,7 +238,7 @@ def test_flat_cases_of_a_given_interface_have_the_penetration_they_say() -> None
     "interface",
     [
         named_case("tilted").interface,
-        named_case("a1").interface.swapped().at([[0, 0], [4, 1], [4, 0], [2, 0], [0, 0]]),
+        named_case("a1").interface.swap_roles().at([[0, 0], [4, 1], [4, 0], [2, 0], [0, 0]]),
         Interface.from_chains([(0, 0), (4, 0)], [(3, 0), (0, 0)]),
         Interface.from_chains([(0, 0), (4, 0)], [(0, 0), (4, 0)]),
         Interface.from_chains([(0, 0), (2, 0), (4, 0)], [(4, 0), (2, -1), (0, 0)]),

@@ -14,6 +14,7 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.driver import draw_cases
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import load_formulation
@@ -143,7 +144,9 @@ def test_the_interface_knows_whose_its_nodes_are() -> None:
 
 def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
     near = load_scene("c")
-    far = two_blocks([100, 101], [0, 1], [100, 101], [-1, 0], young=(1e4, 1e4), approach=0.0, penalty=1e4).bodies[1]
+    far = two_blocks(
+        Rectangle([100, 101], [0, 1], young=1e4), Rectangle([100, 101], [-1, 0], young=1e4), approach=0.0, penalty=1e4
+    ).bodies[1]
     scene = Scene((*near.bodies, far), (0,), (1, 2), near.penalty, near.facts, "c and another")
     found = solve_scene(scene.case(), [installed("vts-ppt")])
     assert found.sides == ["slave", "master", ""]
