@@ -2,8 +2,8 @@
 
 Rule for the next editor: an exact answer is stated only where it holds for every formulation. Both blocks stand on
 rollers at their sides, so that nothing strains laterally and the pressure and the gap are exact in whatever
-configuration a method measures areas. Where one block is wider than the other, the pressure also acts on its part beside the other, so
-that everything stays uniform.
+configuration a method measures areas. Where one block is wider than the other, the pressure also acts on its part
+beside the other, so that everything stays uniform.
 """
 
 from __future__ import annotations
