@@ -1,1 +1,1 @@
-"""Long jobs made of the parts: comparisons, the reference paper."""
+"""Long jobs made of the parts: comparisons, and scenes that are solved to be drawn."""

@@ -1,6 +1,6 @@
-"""Solves a scene with the formulations that are asked for, and hands the arrays over to be drawn.
+"""The solution of a scene by several formulations, as arrays for a picture.
 
-A solution that did not converge is drawn too, with its end named; what a plugin does wrong is a line.
+Rule: a solution that did not converge is a result too, with its end; a mistake of a plugin becomes one line of text.
 """
 
 from __future__ import annotations
@@ -22,11 +22,23 @@ from contactverif.scenes.blocks import is_uniform, pressure_of
 from contactverif.scenes.uniform_stress import stress_error
 from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
 
-_FAR = 1e3  # times the scene; iterates that went further are not drawn
+_FAR = 1e3  # An iterate is not drawn if a displacement exceeds this multiple of the size of the scene.
 
 
 def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedScene:
-    """The scene of the case, solved by each formulation; one that cannot be asked is a failure with its reason.
+    """Solve the scene of a case with each formulation.
+
+    Parameters
+    ----------
+    case : Case
+        A case that holds a scene.
+    subjects : Sequence[Subject | NotLoaded]
+        The formulations. One that does not load or breaks its contract goes to `failures`.
+
+    Returns
+    -------
+    SolvedScene
+        The scene with its solutions and failures.
 
     Raises
     ------
@@ -47,7 +59,7 @@ def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedSc
 
 
 def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
-    """For each body, the interface's numbers of its contact nodes; empty if it is out of reach."""
+    """Return for each body the interface's numbers of its contact nodes; none if it is out of reach."""
     ends = np.cumsum([0, *(len(scene.bodies[index].contact_nodes) for index in scene.bodies_in_reach)]).tolist()
     numbers = {
         index: np.arange(*ends_) for index, ends_ in zip(scene.bodies_in_reach, itertools.pairwise(ends), strict=True)
@@ -57,20 +69,20 @@ def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
 
 def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
     formulation = subject.for_case(case)
-    with np.errstate(all="ignore"):  # an iteration that diverges overflows; its end says so
+    with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
         trace = solve(scene, formulation)
-        shown = _last_to_be_drawn(trace)
-    q, factor = trace.q[shown], float(trace.factors[shown])
+        iterate = _last_to_be_drawn(trace)
+    q, factor = trace.q[iterate], float(trace.factors[iterate])
     at_gauss_points = scene.stresses(q, factor)
     z = scene.positions(q, factor)
-    state = np.concatenate([z, trace.u[shown, scene.n_free :]])
+    state = np.concatenate([z, trace.u[iterate, scene.n_free :]])
     forces, points, remark = _contact(scene, subject, formulation, state)
     pressure = _exact_pressure(case, subject)
     if trace.deficiency:
         rank = f"{trace.deficiency} of {len(trace.multipliers)} multipliers are not unique"
         remark = f"{remark}{'; ' if remark else ''}{rank}"
-    if shown != len(trace.q) - 1:
-        remark = f"drawn: iterate {shown}, the last that is not far away{'; ' if remark else ''}{remark}"
+    if iterate != len(trace.q) - 1:
+        remark = f"drawn is iterate {iterate}, the last one that is not far away{'; ' if remark else ''}{remark}"
     return Solution(
         formulation=subject.name,
         end=trace.end.label,
@@ -92,7 +104,7 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
 
 
 def _last_to_be_drawn(trace: Trace) -> int:
-    """The last iterate, or if that left for infinity the last one that is still near."""
+    """Return the number of the last iterate; after divergence, of the last one that is not far away."""
     if trace.end is not End.DIVERGED:
         return len(trace.q) - 1
     nodes = trace.scene.interface.nodes
@@ -104,7 +116,7 @@ def _last_to_be_drawn(trace: Trace) -> int:
 def _contact(
     scene: Scene, subject: Subject, formulation: CheckedFormulation, z: FloatArray
 ) -> tuple[FloatArray, PointPressures | None, str]:
-    """Forces (n_nodes, 2) on the nodes, pressures at points if there are any, and what the plugin could not say."""
+    """Return forces (n_nodes, 2), the pressures at points if there are any, and the plugin's error if it raises one."""
     interface = scene.interface
     forces: FloatArray = np.full(interface.nodes.shape, np.nan)
     try:
@@ -112,25 +124,31 @@ def _contact(
         forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
         if "contact_points" not in formulation.provides or subject.traits.penalty == "nodal":
             return forces, None, ""
-        found = formulation.contact_points(interface, pairing, z)
+        points = formulation.contact_points(interface, pairing, z)
     except ContractError as error:
         return forces, None, str(error)
-    on = found.slave_segment >= 0
-    area = np.column_stack([found.area_from, found.area_to])
-    return forces, PointPressures(found.slave_segment[on], found.c[on], area[on], found.pressure[on]), ""
+    is_point = points.slave_segment >= 0
+    area = np.column_stack([points.area_from, points.area_to])
+    pressures = PointPressures(
+        points.slave_segment[is_point], points.c[is_point], area[is_point], points.pressure[is_point]
+    )
+    return forces, pressures, ""
 
 
 def _in_global_axes(body: Body, stresses: FloatArray) -> FloatArray:
-    """Means (n_cells, 3) of xx, yy and xy, from stresses (n_cells, n_points, 3) in the body's axes."""
+    """Return means (n_cells, 3) of xx, yy and xy, from stresses (n_cells, n_points, 3) in the body's axes."""
     means = stresses.mean(axis=1) if len(stresses) else np.zeros((0, 3))
     along, across, shear = means.T
     tensors = np.stack([along, shear, shear, across], axis=-1).reshape(-1, 2, 2)
-    turned = body.frame @ tensors @ body.frame.T
-    return np.column_stack([turned[:, 0, 0], turned[:, 1, 1], turned[:, 0, 1]])
+    rotated = body.frame @ tensors @ body.frame.T
+    return np.column_stack([rotated[:, 0, 0], rotated[:, 1, 1], rotated[:, 0, 1]])
 
 
 def _exact_pressure(case: Case, subject: Subject) -> float:
-    """NaN where it is not known; under an imposed approach more with multipliers, which do not give way."""
+    """Return the exact contact pressure, NaN where it is not known.
+
+    Under an imposed approach it is larger with multipliers, because a penalty gives way.
+    """
     if not is_uniform(case):
         return np.nan
     return pressure_of(case, np.inf if subject.traits.enforcement == "multiplier" else case.penalty)

@@ -101,7 +101,7 @@ def test_very_uneven_lengths_are_not_to_scale() -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("turned", "flat, turned by 143.2°"),
+        ("turned", "flat, rotated by 143.2°"),
         ("touching", "touching at every slave node"),
         ("open", "open by 1/2 at every slave node"),
         ("barely", "penetration 1e-9 at every slave node"),

@@ -1,4 +1,7 @@
-"""Pictures of a case: a few lines of text for a terminal, a PNG or SVG for a paper."""
+"""Pictures of a case: a few lines of text for a terminal, a PNG or SVG for a paper.
+
+Rule: a picture may be rough where a judge may not; nothing here is used for a verdict.
+"""
 
 from __future__ import annotations
 
@@ -20,26 +23,26 @@ def draw_case(
     forces: FloatArray | None = None,
     exact: FloatArray | None = None,
 ) -> None:
-    """Draws the current state of a case to a .png or .svg file.
+    """Draw the current state of a case to a .png or .svg file.
 
-    Penetrations that are small against the interface are drawn magnified, and the figure says by which factor.
+    A penetration that is small against the interface is magnified, and the figure says by which factor.
 
     Parameters
     ----------
     case : Case
-        What to draw.
+        The case.
     path : str | os.PathLike[str]
-        File to write, replaced if it is there.
+        The file to write; an older one is replaced.
     title : str
-        Above the picture, wrapped.
-    forces, exact : FloatArray | None
-        Nodal forces (n_nodes, 2) or (n_unknowns,) as they act on the nodes (minus the residual), found and
-        right; drawn as arrows of one scale.
+        The title above the picture; it is wrapped.
+    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
+        Nodal forces of the formulation and exact ones, as they act on the nodes (minus the residual). They are drawn
+        as arrows of one scale.
 
     Raises
     ------
     MisuseError
-        If the file cannot be written, or is to be of another kind.
+        If the file cannot be written, or its name ends otherwise.
     """
     from contactverif_reports.draw.case_figure import SUFFIXES, make_case_figure, save  # importing matplotlib is slow
 

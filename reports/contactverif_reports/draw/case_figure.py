@@ -1,4 +1,4 @@
-"""Draws a case with matplotlib: both surfaces in grey, bodies hatched, forces as arrows. Slow to import."""
+"""The figure of a case: both surfaces in grey, bodies hatched, forces as arrows. Importing matplotlib is slow."""
 
 from __future__ import annotations
 
@@ -14,101 +14,147 @@ from matplotlib.figure import Figure
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Surface
 from contactverif_reports.draw.case_geometry import Course, Gaps
 from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
 from contactverif_reports.files import whole
 
 SUFFIXES = (".png", ".svg")
-_SEEN_GAP = 0.05  # of the interface; a smaller largest gap is magnified to it
-_APART = 0.13  # of the interface; between surfaces that are drawn apart, to make room for arrows
-_BODY = 0.10  # width of the hatched part of a body, of the interface
-_ARROW = 0.15  # longest arrow, of the interface
+# Lengths as shares of the size of the interface.
+_VISIBLE_GAP = 0.05  # A smaller largest gap is magnified to this share.
+_DISTANCE = 0.13  # Distance of surfaces that are drawn apart, to make room for arrows.
+_BODY = 0.10  # Width of the hatched part of a body.
+_ARROW = 0.15  # Length of the longest arrow.
+_SHORT = 0.04  # The length of a segment that is shorter is written below the title.
 
 
 def make_case_figure(
     case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
 ) -> Figure:
-    """The figure that `contactverif_reports.draw.draw_case` writes, for a page; `width` in inches."""
-    course, gaps = Course.from_case(case), Gaps.from_case(case)
-    interface = case.interface
-    lengths = [surface.lengths(case.positions) for surface in (interface.slave, interface.master)]
-    unit, unit_name = unit_of(np.concatenate(lengths))
-    with_forces = forces is not None or exact is not None
-    shown, how = _shown(case, gaps, course.roundoff, with_forces)
-    shown = shown / unit
-    size = float(np.ptp(shown, axis=0).max())
+    """Return the figure of a case: both surfaces, the hatched bodies and the forces.
 
-    wide, high = np.ptp(shown, axis=0) + 2 * (_BODY + _ARROW * with_forces) * size
-    figure = Figure(figsize=(width, float(np.clip((width - 1) * high / wide, 1.6, width)) + 1.4), layout="constrained")
-    axes = figure.add_subplot()
-    axes.set_aspect("equal", adjustable="datalim")
-    side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0  # towards the other body: there the labels are clear
-    for surface, pen, found in ((interface.master, MASTER, lengths[1]), (interface.slave, SLAVE, lengths[0])):
-        labels = [format_number(length, course.roundoff / unit) for length in (found / unit).tolist()]
-        draw_surface(axes, surface, shown, labels, pen, body=_BODY * size, side=side)
-    draw_arrows(axes, shown, forces, exact, longest=_ARROW * size)
-    _finish(axes, unit_name)
-    shortest = min(float(found.min()) for found in lengths) / unit
-    notes = [
-        _gap_note(gaps, course.roundoff) + how,
-        f"shortest segment {format_number(shortest, course.roundoff / unit)}",
-    ]
-    axes.set_title(
-        "\n".join([*textwrap.wrap(title, 92), ", ".join(notes[: 1 + (shortest < 0.04 * size)])]),
-        fontsize=9,
-        loc="left",
-        parse_math=False,
-    )
+    Parameters
+    ----------
+    case : Case
+        The case.
+    title : str
+        The title; it is wrapped.
+    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
+        Nodal forces of the formulation and exact ones, as they act on the nodes.
+    width : float
+        The width in inches.
+    """
+    course, gaps = Course.from_case(case), Gaps.from_case(case)
+    with_forces = forces is not None or exact is not None
+    lengths = _lengths(case)
+    unit, unit_name = unit_of(np.concatenate(lengths))
+    positions, change = _positions_to_draw(case, gaps, course.roundoff, with_forces)
+    positions = positions / unit
+    size = float(np.ptp(positions, axis=0).max())
+    figure, axes = _empty_figure(positions, width, margin=(_BODY + _ARROW * with_forces) * size)
+    # Labels are legible on the side of the other body, where nothing is hatched.
+    side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0
+    for surface, pen, its_lengths in zip(_surfaces(case)[::-1], (MASTER, SLAVE), lengths[::-1], strict=True):
+        labels = [format_number(length, course.roundoff / unit) for length in (its_lengths / unit).tolist()]
+        draw_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
+    draw_arrows(axes, positions, forces, exact, longest=_ARROW * size)
+    _label_axes(axes, unit_name)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    notes = [_gap_note(gaps, course.roundoff) + change]
+    shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
+    if shortest < _SHORT * size:
+        notes.append(f"shortest segment {format_number(shortest, course.roundoff / unit)}")
+    lines = [*textwrap.wrap(title, 92), ", ".join(notes)]
+    axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
     return figure
 
 
-def _shown(case: Case, gaps: Gaps, roundoff: float, apart: bool) -> tuple[FloatArray, str]:
-    """Positions (n_nodes, 2) to draw, a length each, and in words what was done to those of the slave."""
+def _surfaces(case: Case) -> tuple[Surface, Surface]:
+    """Return the slave and the master surface."""
+    return case.interface.slave, case.interface.master
+
+
+def _lengths(case: Case) -> list[FloatArray]:
+    """Return the lengths of the segments, of the slave and of the master."""
+    return [surface.lengths(case.positions) for surface in _surfaces(case)]
+
+
+def _empty_figure(positions: FloatArray, width: float, *, margin: float) -> tuple[Figure, Axes]:
+    """Return a figure whose height suits the positions, with `margin` around them, a length."""
+    across, high = np.ptp(positions, axis=0) + 2 * margin
+    height = float(np.clip((width - 1) * high / across, 1.6, width)) + 1.4
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_aspect("equal", adjustable="datalim")
+    return figure, axes
+
+
+def _positions_to_draw(case: Case, gaps: Gaps, roundoff: float, with_forces: bool) -> tuple[FloatArray, str]:
+    """Return positions (n_nodes, 2) to draw, a length each, and say how far the slave is moved for it."""
     positions = case.positions.copy()
     size = float(np.ptp(positions, axis=0).max())
-    if apart:
-        moves = np.full(len(gaps.gap), _APART * size + max(0.0, -float(gaps.gap.min())))
-        how = ", drawn apart"
+    if with_forces:
+        moves = np.full(len(gaps.gap), _DISTANCE * size + max(0.0, -float(gaps.gap.min())))
+        change = ", drawn apart"
     else:
         factor = magnification(gaps.gap, roundoff, size)
         moves = (factor - 1) * gaps.gap
-        how = "" if factor == 1 else f", drawn {format_number(factor)} times larger"
+        change = "" if factor == 1 else f", drawn {format_number(factor)} times larger"
     positions[: case.interface.n_slave_nodes] += moves[:, None] * gaps.normal
-    return positions, how
+    return positions, change
 
 
 def magnification(gap: FloatArray, roundoff: float, size: float) -> float:
-    """One significant digit, so that the largest gap is seen; 1 where it is seen already or is none."""
+    """Return the factor, of one significant digit, that makes the largest gap visible.
+
+    Parameters
+    ----------
+    gap : FloatArray, shape (n_nodes,)
+        The gaps, a length each.
+    roundoff : float
+        The rounding of a length; gaps far below it are none.
+    size : float
+        The size of the interface, a length.
+
+    Returns
+    -------
+    float
+        The factor; 1 if the gap is visible already or there is none.
+    """
     largest = float(np.abs(gap).max())
-    if largest <= roundoff * 1e-3 or largest >= _SEEN_GAP * size:
+    if largest <= roundoff * 1e-3 or largest >= _VISIBLE_GAP * size:
         return 1.0
-    wanted = _SEEN_GAP * size / largest
-    power = 10.0 ** floor(log10(wanted))
-    return max(1.0, round(wanted / power) * power)
+    factor = _VISIBLE_GAP * size / largest
+    power = 10.0 ** floor(log10(factor))
+    return max(1.0, round(factor / power) * power)
 
 
 def _gap_note(gaps: Gaps, roundoff: float) -> str:
-    found = gaps.gap[gaps.facing]
-    if not len(found):
+    facing_gaps = gaps.gap[gaps.facing]
+    if not len(facing_gaps):
         return "no slave node faces the master"
     if gaps.uniform(roundoff):
-        return f"gap {format_number(float(found.mean()), roundoff)}"
-    return f"gap {format_number(found.min(), roundoff)} to {format_number(found.max(), roundoff)}"
+        return f"gap {format_number(float(facing_gaps.mean()), roundoff)}"
+    return f"gap {format_number(facing_gaps.min(), roundoff)} to {format_number(facing_gaps.max(), roundoff)}"
 
 
-def _finish(axes: Axes, unit_name: str) -> None:
+def _label_axes(axes: Axes, unit_name: str) -> None:
     axes.set_xlabel(f"x / {unit_name}" if unit_name else "x")
     axes.set_ylabel(f"y / {unit_name}" if unit_name else "y")
     axes.margins(0.05)
     axes.spines[["top", "right"]].set_visible(False)
-    figure = axes.get_figure()
-    assert isinstance(figure, Figure)
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
 
 
 def save(figure: Figure, target: Path) -> None:
-    """The same bytes for the same picture: no date, no random ids.
+    """Write a figure to a file; the same figure gives the same bytes, without a date or random ids.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    target : Path
+        A .png or .svg file; an older one is replaced.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""What a drawing needs to know of a case: which way the interface runs, whether it is flat, and its gaps.
+"""The geometry that a drawing of a case needs: the direction of its interface, its flatness and its gaps.
 
-A drawing may be rough where a judge may not: nothing here is used for a verdict.
+Rule: a drawing may be rough where a judge may not; nothing here is used for a verdict.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 
-NEARLY_FLAT = 0.05  # largest rise of a surface, over its length, that is drawn as a straight line
+NEARLY_FLAT = 0.05  # A surface is drawn as a straight line if its rise is at most this share of its length.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,11 +25,11 @@ class Course:
     direction : FloatArray, shape (2,)
         Unit vector along which the slave runs, with its body on the left.
     along, above : FloatArray, shape (n_nodes,)
-        Coordinates of the nodes along it and to its left, a length each.
+        Coordinates of the nodes along `direction` and to its left, a length each.
     rise : float
         Largest difference of `above` within a surface, a length.
     roundoff : float
-        Below which a length is rounding of the coordinates.
+        A length; a smaller one is rounding of the coordinates.
     straight : bool
         Whether each slave segment runs along `direction` and each master segment against it.
     """
@@ -43,15 +43,15 @@ class Course:
 
     @classmethod
     def from_case(cls, case: Case) -> Course:
-        """Measured from the left-most node."""
+        """Measure a case. Coordinates begin at the node furthest back along the direction."""
         positions, interface = case.positions, case.interface
         chords = _chords(interface.slave, positions)
         if not np.linalg.norm(chords.sum(axis=0)) > 1e-6 * np.linalg.norm(chords, axis=1).sum():
-            chords = np.array([[1.0, 0.0]])  # a ring runs nowhere
+            chords = np.array([[1.0, 0.0]])  # A ring has no mean direction.
         direction = chords.sum(axis=0) / np.linalg.norm(chords.sum(axis=0))
         left = np.array([-direction[1], direction[0]])
-        moved = positions - positions[np.argmin(positions @ direction)]
-        along, above = moved @ direction, moved @ left
+        offsets = positions - positions[np.argmin(positions @ direction)]
+        along, above = offsets @ direction, offsets @ left
         n_slave = interface.n_slave_nodes
         roundoff = 64 * UNIT_ROUNDOFF * case.largest_coordinate
         forwards = np.diff(along[interface.slave.segments], axis=1)
@@ -67,32 +67,32 @@ class Course:
 
     @property
     def flat(self) -> bool:
-        """Whether both surfaces are straight lines, parallel to each other."""
+        """Return whether both surfaces are straight lines, parallel to each other."""
         return self.straight and self.rise <= self.roundoff
 
     @property
     def nearly_flat(self) -> bool:
-        """Whether both surfaces may be drawn as straight lines."""
+        """Return whether both surfaces may be drawn as straight lines."""
         return self.straight and self.rise <= NEARLY_FLAT * float(np.ptp(self.along))
 
     @property
-    def turned(self) -> float:
-        """Angle of `direction` to the x axis, in degrees."""
+    def angle(self) -> float:
+        """Return the angle of `direction` to the x axis, in degrees."""
         return float(np.degrees(np.arctan2(self.direction[1], self.direction[0])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """Where the slave nodes lie to the nearest master segment.
+    """The gaps of the slave nodes to their nearest master segments.
 
     Attributes
     ----------
     gap : FloatArray, shape (n_slave_nodes,)
-        A length, negative in penetration.
+        The gap, a length, negative in penetration.
     normal : FloatArray, shape (n_slave_nodes, 2)
-        Of that segment, out of the master.
+        The normal of that segment, out of the master.
     facing : BoolArray, shape (n_slave_nodes,)
-        False where the node lies beyond an end of the master surface.
+        Whether the node faces the master; False beyond an end of the master surface.
     """
 
     gap: FloatArray
@@ -101,7 +101,7 @@ class Gaps:
 
     @classmethod
     def from_case(cls, case: Case) -> Gaps:
-        """By comparison with every master segment."""
+        """Compare each slave node with every master segment."""
         positions, master = case.positions, case.interface.master
         first, chords = positions[master.segments[:, 0]], _chords(master, positions)
         lengths = np.maximum(np.linalg.norm(chords, axis=1), np.finfo(float).tiny)
@@ -120,12 +120,12 @@ class Gaps:
         return cls(np.array(gaps), np.array(nearest_normals), np.array(facing))
 
     def uniform(self, roundoff: float) -> bool:
-        """Whether all nodes that face the master have the same gap."""
-        found = self.gap[self.facing]
-        return bool(len(found) and np.ptp(found) <= max(roundoff, 1e-9 * np.abs(found).max()))
+        """Return whether all nodes that face the master have the same gap, up to a length `roundoff`."""
+        gap = self.gap[self.facing]
+        return bool(len(gap) and np.ptp(gap) <= max(roundoff, 1e-9 * np.abs(gap).max()))
 
 
 def _chords(surface: Surface, positions: FloatArray) -> FloatArray:
-    """Vectors (n_segments, 2) from first to second node."""
+    """Return vectors (n_segments, 2) from first to second node."""
     chords: FloatArray = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
     return chords

@@ -1,4 +1,4 @@
-"""Numbers as one would write them beside a drawing by hand: 3/2, 0.5, 3·2^-40."""
+"""Numbers as a person writes them beside a drawing: 3/2, 0.5, 3·2^-40."""
 
 from __future__ import annotations
 
@@ -14,19 +14,26 @@ _LARGEST_DENOMINATOR = 64
 
 
 def format_number(value: float, slack: float = 0.0, digits: int = 4) -> str:
-    """The shortest text within `slack` of the value: an integer, a decimal, a fraction or an integer times 2^k.
+    """Return the shortest text for a number: an integer, a decimal, a fraction or an integer times 2^k.
 
-    Where there is none, `digits` significant digits.
+    Parameters
+    ----------
+    value : float
+        The number.
+    slack : float
+        The largest difference between the number and what the text says.
+    digits : int
+        The number of significant digits if no short text is near enough.
     """
     if not math.isfinite(value):
         return "–"
     slack = min(slack, 1e-6 * abs(value))
-    found = [text for text, number in _candidates(value, digits) if abs(number - value) <= slack]
-    return min(found, key=len, default=_decimal(value, digits))
+    texts = [text for text, number in _candidates(value, digits) if abs(number - value) <= slack]
+    return min(texts, key=len, default=_decimal(value, digits))
 
 
 def unit_of(lengths: FloatArray) -> tuple[float, str]:
-    """A power of two to measure the lengths in, and its name; 1 and nothing where they are of everyday size."""
+    """Return a power of two as unit of the lengths, and its name; 1 and no name if they are of everyday size."""
     shortest, longest = float(np.min(lengths)), float(np.max(lengths))
     if longest >= 1e-3 and shortest < 1e5:
         return 1.0, ""
@@ -35,12 +42,12 @@ def unit_of(lengths: FloatArray) -> tuple[float, str]:
 
 
 def _candidates(value: float, digits: int) -> list[tuple[str, float]]:
-    found = []
+    """Return short texts near a number, each with the number that it says."""
+    candidates = []
     if abs(value) < 1e6:
-        found += [(f"{round(value)}", float(round(value)))]
         fraction = Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
-        found += [(str(fraction), float(fraction))]
-    found += [(text, float(text)) for text in (_decimal(value, count) for count in range(1, digits + 1))]
+        candidates += [(f"{round(value)}", float(round(value))), (str(fraction), float(fraction))]
+    candidates += [(text, float(text)) for text in (_decimal(value, count) for count in range(1, digits + 1))]
     if value:
         significand, exponent = math.frexp(value)
         odd, power = round(significand * 1024), exponent - 10
@@ -48,12 +55,12 @@ def _candidates(value: float, digits: int) -> list[tuple[str, float]]:
             odd, power = odd // 2, power + 1
         if abs(power) > 3:
             times = {1: "", -1: "-"}.get(odd, f"{odd}·")
-            found += [(f"{times}2^{power}", _times(odd, power))]
-    return found
+            candidates += [(f"{times}2^{power}", _times(odd, power))]
+    return candidates
 
 
 def _decimal(value: float, digits: int) -> str:
-    """`%g` with the exponent as one writes it: 1e-5, 1e6."""
+    """Return a number with so many digits, and a plain exponent: 1e-5, 1e6."""
     return re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
 
 

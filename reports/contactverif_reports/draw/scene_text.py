@@ -9,7 +9,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif_reports.draw.case_geometry import Course
 from contactverif_reports.draw.lengths import unit_of
-from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, strips
+from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, draw_strips
 
 _LABEL = 8  # columns that `strips` writes the sides' names in
 _HEIGHT = 20  # rows of silhouettes
@@ -25,7 +25,7 @@ def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> st
     """
     course = Course.from_case(case)
     lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
-    rows, note = strips(case, course, unit_of(np.concatenate(lengths))[0], max(width, 40))
+    rows, note = draw_strips(case, course, unit_of(np.concatenate(lengths))[0], max(width, 40))
     upper, lower = (row[_LABEL:] for row in rows[1:3])
     top = _box(upper, SLAVE_NODE, "slave", ("┌", "┐"))
     if (slave.load != 0).any() or (slave.imposed != 0).any():

@@ -1,4 +1,4 @@
-"""Draws an interface that is straight, or nearly, as two lines with their nodes to scale and the lengths between."""
+"""The drawing of a straight interface, or a nearly straight one, as two lines with their nodes to scale."""
 
 from __future__ import annotations
 
@@ -15,23 +15,40 @@ from contactverif_reports.draw.case_geometry import NEARLY_FLAT, Course
 from contactverif_reports.draw.lengths import format_number
 
 SLAVE_NODE, MASTER_NODE = "●", "o"
-MARGIN = 8  # columns of "slave" and "master"
+MARGIN = 8  # The columns of the words "slave" and "master".
 TOO_MANY = "too many segments to write lengths between; nodes may share a column"
 
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """A segment between two columns to be: indices into the places along the line, and its label."""
+    """A segment between two places along the line, whose columns are not known yet, and its label."""
 
     start: int
     end: int
     label: str
 
 
-def strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[str], str]:
-    """Two lines with ticks, node numbers above and below; and what is to be said of the scale."""
+def draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[str], str]:
+    """Draw the surfaces as two lines, with node numbers above and below.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    course : Course
+        Its geometry; the interface is flat or nearly so.
+    unit : float
+        The unit of the lengths that are written.
+    width : int
+        The largest number of columns.
+
+    Returns
+    -------
+    tuple[list[str], str]
+        The rows, and a remark about the scale, empty if the lines are to scale.
+    """
     places, number = _places(course, case.interface.n_slave_nodes)
-    width -= MARGIN + len(str(case.interface.n_nodes)) - 1  # the last node number ends behind its node
+    width -= MARGIN + len(str(case.interface.n_nodes)) - 1  # The last node number ends behind its node.
     surfaces = (case.interface.slave, case.interface.master)
     for digits in (4, 2):
         links = [_links(surface, number, case.positions, course, unit, digits) for surface in surfaces]
@@ -57,7 +74,7 @@ def strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[st
 
 
 def _places(course: Course, n_slave: int) -> tuple[FloatArray, list[int]]:
-    """Ascending places along the line, nodes that face each other in one; and the place of each node."""
+    """Return ascending places along the line, nodes that face each other in one, and the place of each node."""
     together = course.roundoff if course.flat else max(course.roundoff, NEARLY_FLAT * course.rise)
     order = np.argsort(course.along, kind="stable")
     places: list[float] = []
@@ -85,26 +102,40 @@ def _links(
 
 
 def _columns(places: FloatArray, links: Sequence[_Link], width: int) -> tuple[list[int] | None, str]:
-    """A column for each place: to scale in the least width that leaves room for the labels, else as they fit."""
+    """Return a column for each place: to scale if the labels fit so, else as they fit; None if they do not."""
+    columns = _columns_to_scale(places, links, width)
+    if columns is not None:
+        return columns, ""
+    for room in (5, 3, 2):
+        columns = _columns_in_turn(len(places), links, room)
+        if columns[-1] < width:
+            return columns, "not to scale"
+    return None, ""
+
+
+def _columns_to_scale(places: FloatArray, links: Sequence[_Link], width: int) -> list[int] | None:
+    """Return columns to scale in the least width that leaves room for the labels, None if there is none."""
     shares = (places - places[0]) / (places[-1] - places[0])
     for room in (3, 2):
         for span in range(min(24, width - 1), width):
             columns = np.round(shares * span).astype(int).tolist()
             distinct = all(before < after for before, after in pairwise(columns))
             if distinct and all(columns[link.end] - columns[link.start] >= len(link.label) + room for link in links):
-                return columns, ""
-    for room in (5, 3, 2):
-        columns = [0] * len(places)
-        for place in range(1, len(places)):
-            ending = [columns[link.start] + len(link.label) + room for link in links if link.end == place]
-            columns[place] = max([columns[place - 1] + 1, *ending])
-        if columns[-1] < width:
-            return columns, "not to scale"
-    return None, ""
+                return list(columns)
+    return None
+
+
+def _columns_in_turn(n_places: int, links: Sequence[_Link], room: int) -> list[int]:
+    """Return the first free column for each place, with room for the labels."""
+    columns = [0] * n_places
+    for place in range(1, n_places):
+        ending = [columns[link.start] + len(link.label) + room for link in links if link.end == place]
+        columns[place] = max([columns[place - 1] + 1, *ending])
+    return columns
 
 
 def _strip(links: Sequence[_Link], columns: Sequence[int], node: str) -> str:
-    """`●──2──●────4────●`, with a blank where two chains leave room between them."""
+    """Return a line such as `●──2──●────4────●`, with a blank between two chains."""
     line = [" "] * (columns[-1] + 1)
     for link in links:
         start, end = columns[link.start], columns[link.end]
@@ -116,7 +147,7 @@ def _strip(links: Sequence[_Link], columns: Sequence[int], node: str) -> str:
 
 
 def _numbers(surface: Surface, number: Sequence[int], columns: Sequence[int]) -> str:
-    """Node numbers at their columns; one that does not fit beside the one before it is left out."""
+    """Return a line of node numbers; one that does not fit beside the number before it is left out."""
     line = ""
     for node in sorted(surface.nodes.tolist(), key=lambda node: columns[number[node]]):
         column = columns[number[node]]

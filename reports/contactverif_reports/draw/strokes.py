@@ -1,4 +1,4 @@
-"""How a surface and its forces look in a figure: lines, markers, hatches, numbers, arrows."""
+"""The look of a surface and its forces in a figure: lines, markers, hatches, numbers, arrows."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from matplotlib.collections import LineCollection, PolyCollection
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Surface
 
-_NUMBERED = 20  # nodes a side that get their numbers
-_LABELLED = 10  # segments a side that get their lengths, nodes that get their forces
-_ROOM = 0.04  # of the picture; a shorter segment gets no label
+_NUMBERED = 20  # About so many nodes a side get their numbers.
+_LABELLED = 10  # Lengths of segments and sizes of forces are written for at most so many a side.
+_ROOM = 0.04  # A segment shorter than this share of the picture gets no label.
 
 
 @dataclass(frozen=True, slots=True)
 class Pen:
-    """How one surface is told from the other, without colours."""
+    """The look that tells one surface from the other, without colours."""
 
     name: str
     color: str
@@ -34,12 +34,36 @@ SLAVE = Pen("slave", "black", "solid", "o", "black", "///")
 MASTER = Pen("master", "0.4", "dashed", "s", "white", "\\\\\\")
 
 
+_ARROWS: dict[str, dict[str, Any]] = {
+    "exact": {
+        "color": "0.72", "width": 0.010, "headwidth": 2.2, "headlength": 2.4, "headaxislength": 2.4,
+        "label": "exact force",
+    },
+    "formulation": {"color": "black", "width": 0.003, "label": "force of the formulation"},
+}
+
+
 def draw_surface(
     axes: Axes, surface: Surface, nodes: FloatArray, labels: Sequence[str], pen: Pen, *, body: float, side: float
 ) -> None:
-    """Segments, nodes and a hatched strip of the body, `body` wide.
+    """Draw segments, nodes and a hatched strip of the body.
 
-    `labels` are the lengths of the segments; they and the node numbers lie towards the body (side = 1) or away (−1).
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw to.
+    surface : Surface
+        The surface.
+    nodes : FloatArray, shape (n_nodes, 2)
+        Positions of all nodes of the interface.
+    labels : Sequence[str]
+        The length of each segment, as text.
+    pen : Pen
+        The look of the surface.
+    body : float
+        The width of the hatched strip, a length.
+    side : float
+        1 writes labels and node numbers on the side of the body, −1 on the other side.
     """
     ends = nodes[surface.segments]  # (n_segments, 2, 2)
     lefts = _lefts(surface, nodes)
@@ -50,14 +74,14 @@ def draw_surface(
     )
     axes.add_collection(LineCollection(list(ends), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3))
     few = len(surface.nodes) <= _NUMBERED
-    look: dict[str, Any] = {
+    marks: dict[str, Any] = {
         "color": pen.color,
         "marker": pen.marker,
         "markerfacecolor": pen.fill,
         "markersize": 5.5 if few else 3,
     }
-    axes.plot(*nodes[surface.nodes].T, linestyle="none", zorder=4, **look)
-    axes.plot([], [], linestyle=pen.style, label=f"{pen.name} (body hatched {pen.hatch[0]})", **look)
+    axes.plot(*nodes[surface.nodes].T, linestyle="none", zorder=4, **marks)
+    axes.plot([], [], linestyle=pen.style, label=f"{pen.name} (body hatched {pen.hatch[0]})", **marks)
     size = float(np.ptp(nodes, axis=0).max())
     for node in _spread(surface, nodes, size):
         style: dict[str, Any] = {"fontsize": 8 if few else 6, "color": pen.color, "zorder": 5}
@@ -74,40 +98,55 @@ def draw_surface(
 def draw_arrows(
     axes: Axes, nodes: FloatArray, forces: FloatArray | None, exact: FloatArray | None, *, longest: float
 ) -> None:
-    """Nodal forces of one scale: found, thin and black, over exact, broad and light; in numbers where there are few."""
-    pairs = [
-        None if values is None else np.asarray(values, dtype=np.float64).reshape(-1, 2) for values in (exact, forces)
-    ]
-    given = [values for values in pairs if values is not None]
-    largest = max((float(np.linalg.norm(values, axis=1).max()) for values in given), default=0.0)
+    """Draw nodal forces as arrows of one scale: those of the formulation, thin, over the exact ones, broad and light.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw to.
+    nodes : FloatArray, shape (n_nodes, 2)
+        The positions of the nodes.
+    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
+        Nodal forces of the formulation and exact ones; None is not drawn.
+    longest : float
+        The length of the longest arrow.
+    """
+    by_kind = {
+        kind: np.asarray(values, dtype=np.float64).reshape(-1, 2)
+        for kind, values in (("exact", exact), ("formulation", forces))
+        if values is not None
+    }
+    largest = max((float(np.linalg.norm(values, axis=1).max()) for values in by_kind.values()), default=0.0)
     if not (np.isfinite(largest) and largest > 0):
         return
-    looks: tuple[dict[str, Any], dict[str, Any]] = (
-        {"color": "0.72", "width": 0.010, "headwidth": 2.2, "headlength": 2.4, "headaxislength": 2.4},
-        {"color": "black", "width": 0.003},
-    )
-    for values, look, label in zip(pairs, looks, ("exact force", "force found"), strict=True):
-        if values is not None:
-            arrows = values * (longest / largest)
-            axes.quiver(*nodes.T, *arrows.T, angles="xy", scale_units="xy", scale=1, zorder=6, label=label, **look)
-            axes.plot(*(nodes + 1.15 * arrows).T, linestyle="none")  # so that the axes reach beyond the tips
-    if len(nodes) > 2 * _LABELLED:
-        return
-    for node in range(len(nodes)):
-        sizes = [float(np.linalg.norm(values[node])) for values in given]
-        tip = max((values[node] for values in given), key=lambda force: float(force @ force))
-        reach = float(np.linalg.norm(tip))
+    for kind, values in by_kind.items():
+        arrows = values * (longest / largest)
+        axes.quiver(*nodes.T, *arrows.T, angles="xy", scale_units="xy", scale=1, zorder=6, **_ARROWS[kind])
+        axes.plot(*(nodes + 1.15 * arrows).T, linestyle="none")  # The axes reach beyond the tips.
+    if len(nodes) <= 2 * _LABELLED:
+        _write_sizes(axes, nodes, list(by_kind.values()), longest / largest, 1e-6 * largest)
+
+
+def _write_sizes(axes: Axes, nodes: FloatArray, forces: list[FloatArray], scale: float, slack: float) -> None:
+    """Write the size of each force at the tip of its arrow, and the exact one if it differs by more than `slack`."""
+    for node, at_node in enumerate(np.stack(forces, axis=1)):  # (n_kinds, 2), the exact force first
+        sizes = np.linalg.norm(at_node, axis=1).tolist()
+        tip, reach = at_node[int(np.argmax(sizes))], max(sizes)
         if reach > 0:
-            said = f"{sizes[-1]:.3g}"
-            if abs(sizes[0] - sizes[-1]) > 1e-6 * largest:
-                digits = next(d for d in range(3, 17) if f"{sizes[-1]:.{d}g}" != f"{sizes[0]:.{d}g}")
-                said = f"{sizes[-1]:.{digits}g} ≠ {sizes[0]:.{digits}g}"
-            place = nodes[node] + tip * (longest / largest)
-            _write(axes, said, place, 7 * tip / reach, fontsize=7, color="black", zorder=7)
+            words = _size_in_words(sizes[-1], sizes[0], slack)
+            _write(axes, words, nodes[node] + tip * scale, 7 * tip / reach, fontsize=7, color="black", zorder=7)
+
+
+def _size_in_words(size: float, exact: float, slack: float) -> str:
+    """Return the size of a force; if the exact one differs, both, with the digits that tell them apart."""
+    if abs(exact - size) <= slack:
+        return f"{size:.3g}"
+    digits = next(count for count in range(3, 17) if f"{size:.{count}g}" != f"{exact:.{count}g}")
+    return f"{size:.{digits}g}, exact {exact:.{digits}g}"
 
 
 def _write(axes: Axes, words: str, place: FloatArray, offset: FloatArray, **style: Any) -> None:
-    """Words beside a place, `offset` in points."""
+    """Write words beside a place; `offset` is in points."""
     axes.annotate(
         words,
         (float(place[0]), float(place[1])),
@@ -121,17 +160,17 @@ def _write(axes: Axes, words: str, place: FloatArray, offset: FloatArray, **styl
 
 
 def _spread(surface: Surface, nodes: FloatArray, size: float) -> list[int]:
-    """The nodes that get their numbers: at most about twenty, none on top of the last."""
-    chosen: list[int] = []
+    """Return the nodes that get their numbers: about twenty at most, none on top of the one before."""
+    numbered: list[int] = []
     numbers = surface.nodes.tolist()
     for node in numbers[:: -(-len(numbers) // _NUMBERED)]:
-        if not chosen or np.linalg.norm(nodes[node] - nodes[chosen[-1]]) > _ROOM / 2 * size:
-            chosen.append(node)
-    return chosen
+        if not numbered or np.linalg.norm(nodes[node] - nodes[numbered[-1]]) > _ROOM / 2 * size:
+            numbered.append(node)
+    return numbered
 
 
 def _lefts(surface: Surface, nodes: FloatArray) -> FloatArray:
-    """(n_nodes, 2) unit vectors into the body, the mean of the adjacent segments; zero off this surface."""
+    """Return (n_nodes, 2) unit vectors into the body, the mean of the adjacent segments; zero off this surface."""
     chords = nodes[surface.segments[:, 1]] - nodes[surface.segments[:, 0]]
     chords = chords / np.maximum(np.linalg.norm(chords, axis=1, keepdims=True), np.finfo(float).tiny)
     lefts = np.zeros_like(nodes)
