@@ -60,7 +60,7 @@ def make_case_figure(
         draw_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
     draw_arrows(axes, positions, forces, exact, longest=_ARROW * size)
     _label_axes(axes, unit_name)
-    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
     notes = [_gap_note(gaps, course.roundoff) + change]
     shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
     if shortest < _SHORT * size:
@@ -83,7 +83,7 @@ def _lengths(case: Case) -> list[FloatArray]:
 def _empty_figure(positions: FloatArray, width: float, *, margin: float) -> tuple[Figure, Axes]:
     """Return a figure whose height suits the positions, with `margin` around them, a length."""
     across, high = np.ptp(positions, axis=0) + 2 * margin
-    height = float(np.clip((width - 1) * high / across, 1.6, width)) + 1.4
+    height = float(np.clip((width - 1) * high / across, 1.6, width)) + 1.7
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.add_subplot()
     axes.set_aspect("equal", adjustable="datalim")

@@ -36,7 +36,11 @@ MASTER = Pen("master", "0.4", "dashed", "s", "white", "\\\\\\")
 
 _ARROWS: dict[str, dict[str, Any]] = {
     "exact": {
-        "color": "0.72", "width": 0.010, "headwidth": 2.2, "headlength": 2.4, "headaxislength": 2.4,
+        "color": "0.72",
+        "width": 0.010,
+        "headwidth": 2.2,
+        "headlength": 2.4,
+        "headaxislength": 2.4,
         "label": "exact force",
     },
     "formulation": {"color": "black", "width": 0.003, "label": "force of the formulation"},
@@ -134,7 +138,16 @@ def _write_sizes(axes: Axes, nodes: FloatArray, forces: list[FloatArray], scale:
         tip, reach = at_node[int(np.argmax(sizes))], max(sizes)
         if reach > 0:
             words = _size_in_words(sizes[-1], sizes[0], slack)
-            _write(axes, words, nodes[node] + tip * scale, 7 * tip / reach, fontsize=7, color="black", zorder=7)
+            lines = 1 + words.count("\n")
+            _write(
+                axes,
+                words,
+                nodes[node] + tip * scale,
+                (3 + 4 * lines) * tip / reach,
+                fontsize=7,
+                color="black",
+                zorder=7,
+            )
 
 
 def _size_in_words(size: float, exact: float, slack: float) -> str:
@@ -142,7 +155,7 @@ def _size_in_words(size: float, exact: float, slack: float) -> str:
     if abs(exact - size) <= slack:
         return f"{size:.3g}"
     digits = next(count for count in range(3, 17) if f"{size:.{count}g}" != f"{exact:.{count}g}")
-    return f"{size:.{digits}g}, exact {exact:.{digits}g}"
+    return f"{size:.{digits}g}\nexact {exact:.{digits}g}"
 
 
 def _write(axes: Axes, words: str, place: FloatArray, offset: FloatArray, **style: Any) -> None:
