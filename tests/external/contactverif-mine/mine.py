@@ -1,4 +1,4 @@
-"""A contact formulation of one's own, in three steps: the tutorial in contactverif's README."""
+"""A contact formulation of one's own, written in three steps."""
 
 import numpy as np
 
@@ -65,7 +65,7 @@ class SegmentToSegment:
 
 
 class Exact(SegmentToSegment):
-    """The same residual, with promises and an exact tangent: a complex step has no truncation error."""
+    """The same residual, with promises and an exact tangent."""
 
     traits = Traits(
         passes_flat_patch=True,

@@ -1,4 +1,4 @@
-"""What the tutorial's author writes into the tests of the project."""
+"""Every property of the two formulations is a test of its own."""
 
 from contactverif.testing import parametrize_with_properties
 

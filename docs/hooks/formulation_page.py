@@ -1,0 +1,52 @@
+"""The page of the installed formulations: what each promises, then the text of plugins/README.md."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+from page_text import plain, table
+from repository_pages import relink
+
+from contactverif import Subject, Traits
+from contactverif.run.registry import load_formulations
+
+_COLUMNS = {
+    "passes_flat_patch": "flat patch test",
+    "covers_overhang": "overhang",
+    "tangent": "tangent",
+    "symmetric": "symmetric",
+    "conserves_force": "force balance",
+    "conserves_moment": "moment balance",
+    "penalty": "penalty",
+    "enforcement": "enforcement",
+}
+
+
+def _cell(value: object) -> str:
+    return {True: "yes", False: "no", None: "–"}.get(value, str(value))  # type: ignore[call-overload, no-any-return]
+
+
+def formulation_page(root: Path) -> str:
+    """Return the page of the formulations that are installed."""
+    names = [field.name for field in fields(Traits) if field.name in _COLUMNS]
+    subjects = [item for item in load_formulations() if isinstance(item, Subject)]
+    rows = [[f"`{item.name}`", *(_cell(getattr(item.traits, name)) for name in names)] for item in subjects]
+    sources = [[f"`{item.name}`", plain(item.traits.source)] for item in subjects if item.traits.source]
+    families = relink((root / "plugins" / "README.md").read_text(encoding="utf-8"), "plugins/README.md")
+    body = families.partition("\n")[2]
+    text = [
+        "# Formulations\n",
+        "The command `contactverif list --traits` prints what every installed formulation promises. "
+        "[Promise and witness](../concepts/promises.md) says what a promise is.\n",
+        "## Promises\n",
+        '<div class="wide" markdown>\n',
+        table(["name", *(_COLUMNS[name] for name in names)], rows),
+        "</div>\n",
+        "A dash means that the formulation promises nothing.\n",
+        "## Sources\n",
+        table(["name", "source"], sources),
+        "## Families\n",
+        body.replace("\n## ", "\n### "),
+    ]
+    return "\n".join(text)

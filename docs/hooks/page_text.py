@@ -1,0 +1,41 @@
+"""Small pieces of Markdown that several generated pages need."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table; a bar inside a cell is escaped."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "&#124;") for cell in line) + " |" for line in lines) + "\n"
+
+
+def sentence(text: str) -> str:
+    """Return the text with a capital first letter and a full stop."""
+    text = text.strip()
+    if not text:
+        return ""
+    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?…" else ".")
+
+
+def docstring_parts(thing: object) -> dict[str, str]:
+    """Return {title of a numpydoc section: its text} of a docstring; what stands first has the title "".
+
+    Text is dedented, so that it can stand in a page as it is.
+    """
+    text = inspect.getdoc(thing) or ""
+    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", text, flags=re.MULTILINE)
+    parts = {"": pieces[0].strip()}
+    for title, body in zip(pieces[1::2], pieces[2::2], strict=True):
+        parts[title] = textwrap.dedent(body).strip()
+    return parts
+
+
+def plain(text: str) -> str:
+    """Return running text with the signs escaped that Markdown would read as markup or HTML."""
+    outside = re.split(r"(`[^`]*`)", text)
+    return "".join(part if part.startswith("`") else re.sub(r"([*_<\[])", r"\\\1", part) for part in outside)

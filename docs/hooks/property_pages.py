@@ -1,0 +1,144 @@
+"""One page for each installed property: what it asks, what it measures, and against which tolerance."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from itertools import combinations
+from pathlib import Path
+
+from page_text import docstring_parts, plain, sentence, table
+
+from contactverif import Property, Quantity, Traits
+
+_VALUES = {
+    "passes_flat_patch": (True,),
+    "covers_overhang": (True,),
+    "tangent": ("exact",),
+    "symmetric": (True,),
+    "conserves_force": (True,),
+    "conserves_moment": (True,),
+    "continuity": ("C0",),
+    "area": ("current",),
+    "penalty": ("distributed",),
+    "independent_multipliers": (True,),
+}
+
+
+def promised_by(question: Property) -> str:
+    """Return in words which traits promise that the property passes; each small set of traits is tried."""
+    if question.promise(Traits()):
+        return "every formulation, whatever its traits say"
+    singles = {name: values[0] for name, values in _VALUES.items() if name in {field.name for field in fields(Traits)}}
+    for size in (1, 2):
+        hits = [set(names) for names in combinations(singles, size) if _promises(question, names, singles)]
+        if hits:
+            return " or ".join(" with ".join(f"`{name}={singles[name]!r}`" for name in sorted(hit)) for hit in hits)
+    return "no trait"
+
+
+def _promises(question: Property, names: tuple[str, ...], values: dict[str, object]) -> bool:
+    traits = Traits(**{name: values[name] for name in names})  # type: ignore[arg-type]
+    return bool(question.promise(traits))
+
+
+def property_page(question: Property) -> str:
+    """Return the page of one property."""
+    parts = docstring_parts(question.measure)
+    cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
+    needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
+    facts = [
+        ("Cases", cases),
+        ("Parts of the plugin that it needs", needs),
+        ("Promised by", promised_by(question)),
+    ]
+    text = [
+        f"# {question.id}\n",
+        sentence(plain(question.summary)) + "\n",
+        "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
+        "## Measured numbers\n",
+    ]
+    text += _quantities(question)
+    if question.series:
+        names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
+        text.append(f"The report also keeps, for each iterate: {names}.\n")
+    text += _method(parts)
+    text += [
+        "## See also\n",
+        "- [Where tolerances come from](../../concepts/tolerances.md), with all symbols\n"
+        "- [Which formulations pass](index.md#who-does-what)\n"
+        f"- On the command line: `contactverif verify NAME -p {question.id}`\n",
+    ]
+    return "\n".join(text)
+
+
+def _quantities(question: Property) -> list[str]:
+    """Return the table of tolerances and their reasons; what several quantities share stands once."""
+    groups: dict[tuple[str, str], list[Quantity]] = {}
+    for quantity in question.quantities:
+        sign = "≤" if quantity.sense == "at most" else "≥"
+        groups.setdefault((f"{sign} {quantity.tolerance}", quantity.unit), []).append(quantity)
+    rows = [
+        ["<br>".join(plain(quantity.name) for quantity in members), plain(tolerance), _unit(unit)]
+        for (tolerance, unit), members in groups.items()
+    ]
+    text = [table(["number", "tolerance", "unit"], rows), "Why these tolerances:\n"]
+    clauses = [_clauses(quantity.reason) for quantity in question.quantities]
+    common = [clause for clause in clauses[0] if all(clause in others for others in clauses)] if clauses else []
+    text += [f"- {sentence(plain(clause))}" for clause in common]
+    special: dict[str, list[str]] = {}
+    for quantity, parts in zip(question.quantities, clauses, strict=True):
+        for clause in parts:
+            if clause not in common:
+                special.setdefault(clause, []).append(quantity.name)
+    text += [f"- *{plain(', '.join(names))}:* {sentence(plain(clause))}" for clause, names in special.items()]
+    return [*text, ""]
+
+
+def _clauses(reason: str) -> list[str]:
+    return [clause.strip() for clause in reason.split(";") if clause.strip()]
+
+
+def _unit(unit: str) -> str:
+    return "ratio" if unit == "1" else unit
+
+
+def _method(parts: dict[str, str]) -> list[str]:
+    text = []
+    if parts[""]:
+        text += ["## How it is measured\n", plain(parts[""]) + "\n"]
+    if "Returns" in parts:
+        text += [_describe_result(parts["Returns"]) + "\n"]
+    for title in ("Notes", "References"):
+        if title in parts:
+            text += [f"## {title}\n", plain(parts[title]) + "\n"]
+    return text
+
+
+def _describe_result(section: str) -> str:
+    """Return what a Returns section says, without its line that names the type."""
+    lines = section.splitlines()
+    body = [line.strip() for line in lines if line.startswith(" ")] or lines
+    return sentence(plain("\n".join(body)))
+
+
+def property_index(properties: list[Property], root: Path) -> str:
+    """Return the page that lists all properties and shows which formulation passes which."""
+    rows = [[f"[{item.id}]({item.id}.md)", sentence(plain(item.summary))] for item in properties]
+    text = [
+        "# Properties\n",
+        "A property is one question to a formulation. Each has a page with its formulas.\n",
+        table(["property", "what must hold"], rows),
+    ]
+    source = (root / "properties" / "README.md").read_text(encoding="utf-8")
+    verdicts = re.search(r"<!-- verdicts: begin -->\n(.*?)<!-- verdicts: end -->", source, re.DOTALL)
+    if verdicts:
+        text += [
+            "## Who does what\n",
+            "The table holds for 100 random cases and the witness of each. ✓ passes; ✗ fails as the formulation "
+            "itself states, with a witness; · is not applicable.\n",
+            '<div class="wide" markdown>\n',
+            verdicts[1],
+            "</div>\n",
+        ]
+    return "\n".join(text)

@@ -1,0 +1,310 @@
+"""Quotations in the pages: outputs of commands, code of files, pictures. `python tests/docs/quotes.py` renews them.
+
+A page marks a quotation by a comment before the block:
+
+    <!-- output: PATTERN | PATTERN -->     output of the last command in the shell block before it
+    <!-- output of PAGE.md: PATTERN -->    the same, of the first quoted command of another page
+    <!-- source: FILE -->                  a whole file of the repository
+    <!-- source: FILE CLASS -->            a class of it
+
+An output is cut into pieces, each of which begins with a line that is not indented. A piece is kept if its first line
+matches one of the patterns; `all` keeps everything. One line with "…" stands for pieces that are left out.
+
+Rules for the next editor: nobody writes a quotation by hand, and a page runs its commands in order, in one folder.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PICTURES = DOCS / "pictures"
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+MINE = ROOT / "tests" / "external" / "contactverif-mine"
+README = ROOT / "README.md"
+
+# The classes of mine.py that exist at each step of the tutorial.
+STEPS = {
+    "residual.md": ("NodeToSegment",),
+    "patch-test.md": ("NodeToSegment", "SegmentToSegment"),
+    "tangent.md": ("NodeToSegment", "SegmentToSegment", "Exact"),
+}
+PROGRAMS = {
+    "contactverif": [sys.executable, "-c", "from contactverif.cli import main; main()"],
+    "pytest": [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir=."],
+    "python": [sys.executable],
+}
+WIDTH = "100"  # Columns of a quoted output.
+# The report that examples/read_report.py reads.
+REPORT = ("vts-me", "vts-ppt", "-p", "patch.flat.transmission", "--seed", "1", "--out", "report.nc")
+
+_QUOTE = re.compile(
+    r"^<!-- (output|source)(?: of (\S+?))?: *(.*?) *-->\n```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL
+)
+
+
+@dataclass(frozen=True)
+class Quote:
+    """A block that quotes something, and where it stands.
+
+    Attributes
+    ----------
+    kind : str
+        "output" or "source".
+    argument : str
+        The patterns, or the file and the class.
+    block : str
+        The text in the page today.
+    command : str
+        The quoted command; empty if a file is quoted.
+    foreign : bool
+        The command stands on another page.
+    """
+
+    kind: str
+    argument: str
+    block: str
+    command: str
+    foreign: bool
+
+
+def pages() -> list[Path]:
+    """Return README.md and all Markdown files of the site."""
+    return [README, *sorted(DOCS.rglob("*.md"))]
+
+
+def blocks(language: str, text: str) -> list[str]:
+    """Return the code blocks of a language, in order."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def commands(text: str) -> list[str]:
+    """Return the lines of all shell blocks."""
+    return [line for block in blocks("sh", text) for line in block.splitlines() if line.strip()]
+
+
+def quotes(page: Path) -> Iterator[Quote]:
+    """Iterate over the quotations of a page."""
+    text = page.read_text(encoding="utf-8")
+    for match in _QUOTE.finditer(text):
+        kind, other, argument, _, block = match.groups()
+        if kind == "source":
+            command = ""
+        elif other:
+            command = next(quote.command for quote in quotes(page.parent / other) if quote.command)
+        else:
+            command = commands(text[: match.start()])[-1]
+        yield Quote(kind, argument, block, command, bool(other))
+
+
+def classes(source: str) -> dict[str, str]:
+    """Return {name: text} of the classes of a file; the lines before the first class belong to it."""
+    lines = source.splitlines(keepends=True)
+    nodes = [node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
+    starts = [0, *(node.lineno - 1 for node in nodes[1:])]
+    return {node.name: "".join(lines[start : node.end_lineno]) for start, node in zip(starts, nodes, strict=True)}
+
+
+def mine_classes() -> dict[str, str]:
+    """Return {name: text} of the classes of the tutorial's file."""
+    return classes((MINE / "mine.py").read_text(encoding="utf-8"))
+
+
+def install_mine(folder: Path, source: str) -> None:
+    """Write what `pip install` leaves in a folder of a project whose mine.py has this source."""
+    project = tomllib.loads((MINE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    name, version = project["name"], project["version"]
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir(parents=True, exist_ok=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.4\nName: {name}\nVersion: {version}\n", encoding="utf-8")
+    lines = []
+    for group, points in project["entry-points"].items():
+        lines += [f"[{group}]", *(f"{point} = {target}" for point, target in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "mine.py").write_text(source, encoding="utf-8")
+
+
+def call(program: str, *arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a program in a process of its own that sees what is installed in `folder/site`."""
+    style = folder / "style"
+    style.mkdir(exist_ok=True)
+    (style / "matplotlibrc").write_text("svg.hashsalt: contactverif\n", encoding="utf-8")
+    environment = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
+    environment |= {
+        "PYTHONPATH": os.pathsep.join(filter(None, [str(folder / "site"), os.environ.get("PYTHONPATH")])),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONIOENCODING": "utf-8",
+        "COLUMNS": WIDTH,
+        "MPLBACKEND": "Agg",
+        "MATPLOTLIBRC": str(style),
+        "SOURCE_DATE_EPOCH": "0",
+    }
+    return subprocess.run(
+        [*PROGRAMS[program], *map(str, arguments)],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
+        check=False,
+    )
+
+
+def prepare(page: Path, folder: Path) -> None:
+    """Put the files that a page speaks of into the folder in which its commands run."""
+    if not (folder / "tests").exists():
+        (folder / "tests").symlink_to(ROOT / "tests")
+    if page.parent.name == "tutorial":
+        names = STEPS.get(page.name, tuple(mine_classes()))
+        install_mine(folder / "site", "\n\n\n".join(mine_classes()[name] for name in names))
+
+
+def _needed_commands(page: Path) -> list[str]:
+    """Return the commands of a page whose output or picture is shown, and those that write the files they read."""
+    known = [line for line in commands(page.read_text(encoding="utf-8")) if line.startswith("contactverif ")]
+    quoted = {quote.command for quote in quotes(page) if not quote.foreign}
+    needed: list[str] = []
+    for line in reversed(known):
+        files = re.findall(r"--out (\S+)", line)
+        if line in quoted or picture_of(line) or any(file in later.split() for file in files for later in needed):
+            needed.insert(0, line)
+    return needed
+
+
+def picture_of(command: str) -> str:
+    """Return the name of the picture that a command writes for the site; empty if there is none."""
+    match = re.search(r"--out (\S+\.svg)", command)
+    return match[1] if match else ""
+
+
+def outputs(page: Path, folder: Path, extra: Sequence[str] = ()) -> dict[str, subprocess.CompletedProcess[str]]:
+    """Run the commands of a page whose output or picture is shown, and those before them.
+
+    Parameters
+    ----------
+    page : Path
+        The Markdown file.
+    folder : Path
+        An empty folder, in which the commands run.
+    extra : Sequence[str]
+        Options for `verify` and `compare`, such as fewer examples.
+
+    Returns
+    -------
+    dict[str, subprocess.CompletedProcess[str]]
+        {command as it stands in the page: what came out}.
+    """
+    prepare(page, folder)
+    results = {}
+    for line in _needed_commands(page):
+        program, *arguments = shlex.split(line)
+        more = extra if arguments[0] in ("verify", "compare") else ()
+        results[line] = call(program, *arguments, *more, folder=folder)
+    return results
+
+
+def excerpt(output: str, patterns: str) -> str:
+    """Return the pieces of an output whose first line matches one of the patterns; "…" stands for the others."""
+    lines = [line.rstrip() for line in output.splitlines()]
+    if patterns == "all":
+        return "\n".join(lines).strip("\n") + "\n"
+    tests = [re.compile(pattern.strip()) for pattern in patterns.split(" | ")]
+    excerpt_lines: list[str] = []
+    for piece in _pieces(lines):
+        if any(test.search(piece[0]) for test in tests):
+            excerpt_lines += piece
+        elif excerpt_lines and excerpt_lines[-1] != "…":
+            excerpt_lines.append("…")
+    return "\n".join(excerpt_lines).strip("\n…") + "\n"
+
+
+def _pieces(lines: Sequence[str]) -> list[list[str]]:
+    pieces: list[list[str]] = []
+    for line in lines:
+        if not pieces or (line and not line.startswith(" ")):
+            pieces.append([])
+        pieces[-1].append(line)
+    return pieces
+
+
+def source_block(argument: str) -> str:
+    """Return the text of a file, or of one of its classes."""
+    name, _, wanted = argument.partition(" ")
+    text = (ROOT / name).read_text(encoding="utf-8")
+    if not wanted:
+        return text
+    if name.endswith("mine.py"):
+        return classes(text)[wanted]
+    node = next(item for item in ast.parse(text).body if isinstance(item, ast.ClassDef) and item.name == wanted)
+    return "".join(text.splitlines(keepends=True)[node.lineno - 1 : node.end_lineno])
+
+
+def renew_text(page: Path, results: dict[str, str]) -> str:
+    """Return the text of a page with its quotations anew, from {command: its output}."""
+    fresh = iter(
+        [
+            source_block(quote.argument) if quote.kind == "source" else excerpt(results[quote.command], quote.argument)
+            for quote in quotes(page)
+        ]
+    )
+
+    def replace(match: re.Match[str]) -> str:
+        comment = match[0].partition("\n")[0]
+        return f"{comment}\n```{match[4]}\n{next(fresh)}```"
+
+    return _QUOTE.sub(replace, page.read_text(encoding="utf-8"))
+
+
+def keep_pictures(folder: Path) -> None:
+    """Copy the pictures in a folder to those of the site."""
+    for path in sorted(folder.glob("*.svg")):
+        shutil.copyfile(path, PICTURES / path.name)
+        print(f"    {path.name}")
+
+
+def main(names: Sequence[str]) -> None:
+    """Run every quoted command and every example, and write pages and pictures anew.
+
+    Parameters
+    ----------
+    names : Sequence[str]
+        Paths of pages and examples; all of them if there are none.
+    """
+    selection = [Path(name).resolve() for name in names if name.endswith(".md")] or ([] if names else pages())
+    results: dict[str, str] = {}
+    for page in selection:
+        with tempfile.TemporaryDirectory() as folder:
+            for command, finished in outputs(page, Path(folder)).items():
+                results[command] = finished.stdout
+                print(f"{page.relative_to(ROOT)}: {command}\n{finished.stderr}", end="")
+            keep_pictures(Path(folder))
+    for page in selection:
+        page.write_text(renew_text(page, results), encoding="utf-8")
+    run_examples([Path(name).resolve() for name in names if name.endswith(".py")] or ([] if names else EXAMPLES))
+
+
+def run_examples(scripts: Sequence[Path]) -> None:
+    """Run examples in one folder and keep their pictures."""
+    with tempfile.TemporaryDirectory() as folder:
+        if scripts:
+            call("contactverif", "verify", *REPORT, folder=Path(folder))
+        for script in scripts:
+            finished = call("python", script, folder=Path(folder))
+            print(f"{script.relative_to(ROOT)}\n{finished.stderr}", end="")
+        keep_pictures(Path(folder))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

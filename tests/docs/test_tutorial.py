@@ -1,0 +1,133 @@
+"""A formulation from a project outside the tree is found and verified; the tutorial, run step by step.
+
+tox's environment `external` installs the project for real. Here, without a network, an installation is what Python
+sees of one: the module and a `dist-info` on the path.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from quotes import DOCS, MINE, STEPS, blocks, call, commands, install_mine, mine_classes, outputs, quotes
+from test_docs import last_lines, rows
+
+from contactverif.run.registry import property_ids
+
+QUICK = ("--examples", "12")  # The tutorial's commands ask for a hundred.
+TUTORIAL = DOCS / "tutorial"
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def run_program(tmp_path: Path) -> Run:
+    """Return a function that runs a command in `tmp_path` with what is installed in `tmp_path/site`."""
+    return lambda *words: call(*words, folder=tmp_path)
+
+
+@pytest.fixture
+def whole_project(tmp_path: Path) -> Path:
+    """Install the whole project."""
+    folder = tmp_path / "site"
+    install_mine(folder, (MINE / "mine.py").read_text(encoding="utf-8"))
+    return folder
+
+
+def test_it_is_found(whole_project: Path, run_program: Run) -> None:
+    printed = run_program("contactverif", "list").stdout
+    lines = {line.split()[0]: line for line in printed.splitlines() if line.strip()}
+    assert "nothing; not provided: pair, tangent, contact_points" in lines["mine"]
+    assert "passes the flat patch test; exact tangent; not provided: pair, contact_points" in lines["mine-exact"]
+    assert "mine-nodes" in lines
+
+
+def test_its_report_says_what_is_not_provided(whole_project: Path, run_program: Run, tmp_path: Path) -> None:
+    answer = run_program("contactverif", "verify", "mine", "--profile", "ci", *QUICK, "--out", "mine.nc")
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    with xr.open_datatree(tmp_path / "mine.nc") as report:
+        summary = report["summary"].to_dataset().sel(formulation="mine")
+        assert "pair: not provided, tangent: not provided" in summary.parts
+        provided = summary.provided.to_series().to_dict()
+        assert provided == {"pair": 0, "tangent": 0, "contact_points": 0}
+        meanings = summary.row_verdict.flag_meanings.split()
+        verdicts = {str(name): meanings[int(code)] for name, code in summary.row_verdict.to_series().items()}
+        assert verdicts["patch.flat.transmission"] == "pass"
+        assert verdicts["tangent.directional"] == "not_provided"
+        assert str(summary.reason.sel(property="tangent.directional").item()) == "tangent: not provided"
+
+
+def test_a_file_that_is_not_finished_is_a_row_that_did_not_load(run_program: Run, tmp_path: Path) -> None:
+    install_mine(tmp_path / "site", mine_classes()["NodeToSegment"])
+    answer = run_program("contactverif", "verify", "mine-nodes", "mine-exact", "-p", "balance.force", "--examples", "2")
+    assert answer.returncode == 1
+    assert rows(answer.stdout) == [("balance.force", "–", "pass")], "the others run"
+    assert "not loaded" in answer.stdout
+    assert "Exact" in answer.stdout
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_step_of_the_tutorial_ends_as_it_says(name: str, tmp_path: Path) -> None:
+    page = TUTORIAL / name
+    for line in commands(page.read_text(encoding="utf-8")):
+        assert line.startswith(("contactverif verify mine", "pip install -e contactverif-mine"))
+    (quote,) = [quote for quote in quotes(page) if quote.kind == "output"]
+    finished = outputs(page, tmp_path, QUICK)[quote.command]
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert rows(quote.block) == rows(finished.stdout) != []
+    assert set(last_lines(quote.block)) <= set(last_lines(finished.stdout))
+    for word in {"residual.md": ["slave   ●", "master  o"]}.get(name, []):
+        assert word in quote.block
+        assert word in finished.stdout
+
+
+def test_the_steps_pasted_one_below_the_other_are_the_file() -> None:
+    whole = "\n\n\n".join(block.rstrip("\n") for block in mine_classes().values()) + "\n"
+    assert whole == (MINE / "mine.py").read_text(encoding="utf-8")
+    sources = [quote.argument for name in STEPS for quote in quotes(TUTORIAL / name) if quote.kind == "source"]
+    assert [argument.partition(" ")[2] for argument in sources] == list(mine_classes())
+
+
+def test_an_exact_tangent_is_judged(whole_project: Path, run_program: Run, tmp_path: Path) -> None:
+    (quote,) = [quote for quote in quotes(TUTORIAL / "tangent.md") if quote.kind == "output"]
+    assert ("tangent.directional", "passes", "pass") in rows(quote.block)
+    answer = run_program(
+        *("contactverif", "verify", "mine-exact", "-p", "tangent.*", "--profile", "ci", *QUICK),
+        *("--out", "exact.nc"),
+    )
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    with xr.open_datatree(tmp_path / "exact.nc") as report:
+        tangent = report["tangent/directional"].to_dataset().sel(formulation="mine-exact")
+        assert int((tangent.verdict == 0).sum()) >= 0.9 * int(QUICK)
+        assert float(tangent.value.sel(quantity="error against a complex step").max()) < 1e-8
+        assert tangent.value.sel(quantity="error against a central difference").notnull().all()
+
+
+def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
+    source = (MINE / "mine.py").read_text(encoding="utf-8")
+    wrong = source.replace("return np.column_stack(columns)", "return -np.column_stack(columns)")
+    fixed_step = source.replace("h = 2.0**-100 * np.ptp(z)", "h = 1e-20")
+    for text, property_id in ((wrong, "tangent.directional"), (fixed_step, "scaling")):
+        assert text != source
+        install_mine(tmp_path / "site", text)
+        answer = run_program(
+            "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "40"
+        )
+        assert answer.returncode == 1
+        assert rows(answer.stdout) == [(property_id, "passes", "fail")]
+        assert "PROMISED, AND FAILS" in answer.stdout
+
+
+def test_its_own_tests_pass(whole_project: Path, run_program: Run, tmp_path: Path) -> None:
+    text = (TUTORIAL / "tests.md").read_text(encoding="utf-8")
+    (block,) = blocks("text", text)
+    command, folder, *options = shlex.split(commands(text)[-1])
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "test_mine.py").write_text(blocks("python", text)[0], encoding="utf-8")
+    answer = run_program(command, folder, *options, "--contactverif-examples", QUICK[1])
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert block.strip() in answer.stdout
+    assert f"contactverif: {2 * len(property_ids())} checks" in answer.stdout

@@ -1,0 +1,88 @@
+"""Each script of examples/ runs in an empty folder, and prints or writes what its first lines promise."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
+PICTURES = ROOT / "docs" / "pictures"
+
+# {script: patterns that its output must match}
+PROMISES = {
+    "compare_with_vts_ppt": [
+        r"patch\.flat\.transmission +pass +fail +pass",
+        r"mortar passes where VTS-PPT fails: balance\.force, balance\.moment, patch\.dead-zone",
+    ],
+    "exact_tangent": [
+        r"vts-ppt +largest .*e-1[5-7]",
+        r"vts-ppt-basic +largest .*e-0[1-4]",
+        r"mortar +largest .*e-1[4-7]",
+    ],
+    "figure_30": [r"vts-ppt-basic: converged after 1\d iterations", r"vts-ppt: converged after [3-6] iterations"],
+    "first_residual": [r"25\.", r"balance\.force: pass", r"patch\.flat\.transmission: fail"],
+    "locking": [
+        r"nts-ar .*stiffest [1-9]e-01",
+        r"two-pass/nts-ar .*stiffest [1-9]e-05",
+        r"vts-ppt .*softest [1-9]e-1[4-7]",
+    ],
+    "newton_trace": [r"vts-ppt\n(?s:.*?)converged: ", r"vts-me\n(?s:.*)2-cycle: "],
+    "own_mesh": [r"2 slave segments on 2 master segments", r"vts-me +patch\.flat\.transmission +fail"],
+    "own_scene": [r"converged after \d iterations", r"largest pressure in the block: \d+"],
+    "read_report": [r"vts-me: largest error [1-9]e-01", r"vts-ppt: largest error [1-9]e-1\d"],
+    "smallest_failing_mesh": [r"1 slave segment on 2 master segments", r"error of a nodal force 0\.\d+"],
+}
+
+
+def run_script(*arguments: str | Path, folder: Path) -> str:
+    """Run Python in a folder and return what it prints."""
+    environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"}
+    finished = subprocess.run(
+        [sys.executable, "-W", "error::DeprecationWarning:__main__", *map(str, arguments)],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
+    )
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    return finished.stdout
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_an_example_does_what_it_says(script: Path, tmp_path: Path) -> None:
+    if script.stem == "read_report":
+        verify = "from contactverif.cli import main; main()"
+        options = ("-p", "patch.flat.transmission", "--examples", "20", "--seed", "1", "--out", "report.nc")
+        run_script("-c", verify, "verify", "vts-me", "vts-ppt", *options, folder=tmp_path)
+    printed = run_script(script, folder=tmp_path)
+    for pattern in PROMISES[script.stem]:
+        assert re.search(pattern, printed), f"{pattern!r} is not in:\n{printed}"
+    for name in re.findall(r'savefig\("(.+)"\)', script.read_text(encoding="utf-8")):
+        assert (tmp_path / name).read_text(encoding="utf-8").rstrip().endswith("</svg>")
+        assert (PICTURES / name).is_file(), "the gallery shows it; python tests/docs/quotes.py writes it"
+
+
+def test_there_are_enough_examples() -> None:
+    assert len(SCRIPTS) >= 8
+    assert {script.stem for script in SCRIPTS} == set(PROMISES)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_an_example_is_short_and_uses_public_names_only(script: Path) -> None:
+    text = script.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    assert "\n\n" in (ast.get_docstring(tree) or ""), "one line says what one learns, then a paragraph explains it"
+    assert 20 <= len(text.splitlines()) <= 60
+    modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    modules += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    ours = {module for module in modules if module.startswith("contactverif")}
+    assert ours <= {"contactverif", "contactverif.testing"}
