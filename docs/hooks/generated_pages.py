@@ -32,8 +32,12 @@ log = logging.getLogger("mkdocs.hooks.generated_pages")
 
 
 def installed_properties() -> list[Property]:
-    """Return the installed properties, sorted by id."""
-    return [item for item in load_properties() if isinstance(item, Property)]
+    """Return the installed properties, sorted by id; warn about one that does not load."""
+    items = load_properties()
+    for item in items:
+        if not isinstance(item, Property):
+            log.warning("a property did not load: %s", item)
+    return [item for item in items if isinstance(item, Property)]
 
 
 def pages() -> dict[str, str]:
