@@ -13,8 +13,9 @@ from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 
-EXAMPLES = 100  # for the property that is meant to catch it
-OTHERS = 25  # for each of the others
+EXAMPLES = 100  # Cases of the property that is meant to catch the mutant.
+OTHERS = 10  # Cases of each other property, which fill the matrix and decide nothing.
+OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
 SEED = 0
 KEY = "kills"  # under which a row of the matrix travels in the report of a test
 
@@ -47,11 +48,11 @@ def caught_at(question: Property, subject: Subject, examples: int) -> int:
     return 0
 
 
-def kills(mutant: Mutant) -> dict[str, int]:
-    """{property id: `caught_at`} of a mutant."""
+def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
+    """Return {property id: `caught_at`} of a mutant."""
     subject = Subject(mutant.name, mutant.make)
     return {
-        question.id: caught_at(question, subject, EXAMPLES if question.id == mutant.caught_by else OTHERS)
+        question.id: caught_at(question, subject, EXAMPLES if question.id == mutant.caught_by else others)
         for question in properties()
     }
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 
 import pytest
-from killing import KEY, as_lines, cases, kills, properties
+from killing import KEY, OTHERS_FOR_A_SURVIVOR, as_lines, cases, kills, properties
 from mutate import Mutant, changed_line
 from wrong import MUTANTS, SURVIVORS
 
@@ -36,7 +36,7 @@ def test_what_no_property_asks_after_yet_survives(
     mutant: Mutant, record_property: Callable[[str, object], None]
 ) -> None:
     """Once this fails, the mutant belongs to MUTANTS."""
-    row = kills(mutant)
+    row = kills(mutant, OTHERS_FOR_A_SURVIVOR)
     record_property(KEY, json.dumps([f"survives: {mutant.name}", mutant.caught_by, row]))
     assert not any(row.values()), row
 
