@@ -157,7 +157,7 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
     ("make", "end", "remark"),
     [
         (without_points, "", "contact_points: returned a str; needed ContactPoints"),
-        (to_infinity, "diverged", "drawn: "),
+        (to_infinity, "diverged", "drawn is iterate "),
     ],
 )
 def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., Any], end: str, remark: str) -> None:

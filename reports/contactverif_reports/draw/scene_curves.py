@@ -1,4 +1,4 @@
-"""Draws pressures along the interface and histories of residuals, one formulation beside another. Slow to import."""
+"""Curves of a solved scene: pressures along the interface, and residuals of Newton's method. Importing it is slow."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from matplotlib.ticker import MaxNLocator
 
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 
-_MANY = 40  # points a curve that get their markers
+_MANY = 40  # The points of a curve get markers up to this number.
 
 
 @dataclass(frozen=True, slots=True)
 class Pen:
-    """How the curves of one formulation are told from the others', in grey too."""
+    """The look of the curves of one formulation, which differs from the others in grey too."""
 
     color: str
     style: Any
@@ -24,7 +24,7 @@ class Pen:
     fill: str
 
     def look(self, n_points: int) -> dict[str, Any]:
-        """Arguments of a plot."""
+        """Return the arguments of a plot of so many points."""
         look: dict[str, Any] = {"color": self.color, "linestyle": self.style, "linewidth": 1.2}
         if n_points <= _MANY:
             fill = self.color if self.fill == "full" else "white"
@@ -43,12 +43,25 @@ _PENS = (
 
 
 def choose_pen(number: int) -> Pen:
-    """Of the formulation of that number; they come again after six."""
+    """Return the pen of the formulation of that number. There are six; then they repeat."""
     return _PENS[number % len(_PENS)]
 
 
 def draw_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "master"]) -> None:
-    """Nodal forces over the nodes' shares of the interface; on the slave also what the contact points say, dotted."""
+    """Draw the pressure along one side of the interface, for each formulation.
+
+    The curve is the nodal force over the node's share of the interface. On the slave, thin lines show the pressure at
+    the contact points too.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw to.
+    solved : SolvedScene
+        The scene and its solutions.
+    side : "slave" or "master"
+        The side.
+    """
     order = [index for index, its_side in enumerate(solved.sides) if its_side == side]
     for number, solution in enumerate(solved.solutions):
         along, pressures, look = solved.along, solved.node_pressures(solution), choose_pen(number)
@@ -62,34 +75,46 @@ def draw_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "mast
     for pressure in solved.pressures:
         axes.axhline(pressure, color="0.6", linewidth=2.2, zorder=1)
     axes.set_ylabel(f"{side}: nodal force\nover its share\n(force / length)")
-    _roomy(axes)
+    _widen(axes)
 
 
-def draw_history(axes: Axes, solved: SolvedScene, which: Literal["residuals", "energies"]) -> None:
-    """A norm against the iterates on a logarithmic scale; 0 is drawn at the roundoff of the residual."""
+def draw_history(axes: Axes, solved: SolvedScene, quantity: Literal["residuals", "energies"]) -> None:
+    """Draw a norm against the iterates of Newton's method, for each formulation.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw to; the scale is logarithmic.
+    solved : SolvedScene
+        The scene and its solutions.
+    quantity : "residuals" or "energies"
+        The norm. A residual of 0 is drawn at the roundoff of the residual.
+    """
     for number, solution in enumerate(solved.solutions):
-        values = getattr(solution, which)
-        floors = solution.floors if which == "residuals" else np.full_like(values, np.finfo(float).tiny)
-        shown = np.where(values == 0, floors, values)
-        iterates = np.flatnonzero(np.isfinite(shown) & (shown > 0))
-        axes.plot(iterates, shown[iterates], zorder=3, **choose_pen(number).look(len(iterates)))
+        values = getattr(solution, quantity)
+        floors = solution.floors if quantity == "residuals" else np.full_like(values, np.finfo(float).tiny)
+        norms = np.where(values == 0, floors, values)
+        iterates = np.flatnonzero(np.isfinite(norms) & (norms > 0))
+        axes.plot(iterates, norms[iterates], zorder=3, **choose_pen(number).look(len(iterates)))
         for step in np.flatnonzero(np.diff(solution.factors)) if len(solved.solutions) == 1 else ():
             axes.axvline(step + 0.5, color="0.8", linewidth=0.8, zorder=1)
     axes.set_yscale("log")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     last = max(len(solution.residuals) for solution in solved.solutions) - 1
     axes.set_xlim(-0.3, max(last, 1) + 0.3)
-    if which == "residuals":
-        axes.axhspan(0, max(float(one.floors[-1]) for one in solved.solutions), color="0.92", zorder=0, linewidth=0)
+    if quantity == "residuals":
+        axes.axhspan(
+            0, max(float(solution.floors[-1]) for solution in solved.solutions), color="0.92", zorder=0, linewidth=0
+        )
     axes.set_ylabel(
-        {"residuals": "largest residual\n(force)", "energies": "energy of the step\n(force × length)"}[which]
+        {"residuals": "largest residual\n(force)", "energies": "energy of the step\n(force × length)"}[quantity]
     )
 
 
 def _draw_points(axes: Axes, solved: SolvedScene, solution: Solution, color: str) -> None:
-    """Each point's pressure over its area of competence, or at its place where the plugin names no area."""
+    """Draw each point's pressure over its area of competence, or at its place if the plugin gives no area."""
     assert solution.points is not None
-    at, areas = solved.points_along(solution.points)
+    places, areas = solved.points_along(solution.points)
     pressures = solution.points.pressure
     here = np.isfinite(pressures)
     known = here & np.isfinite(areas).all(axis=1)
@@ -97,11 +122,11 @@ def _draw_points(axes: Axes, solved: SolvedScene, solution: Solution, color: str
         pressures[known], areas[known].min(axis=1), areas[known].max(axis=1), color=color, linewidth=0.8, zorder=2
     )
     bare = here & ~known
-    axes.plot(at[bare], pressures[bare], ls="none", marker=".", ms=4, color=color, zorder=2)
+    axes.plot(places[bare], pressures[bare], ls="none", marker=".", ms=4, color=color, zorder=2)
 
 
-def _roomy(axes: Axes) -> None:
-    """At least a tenth of the pressure from bottom to top, so that roundoff is not drawn as a landscape."""
+def _widen(axes: Axes) -> None:
+    """Widen the axis to at least a tenth of the pressure, so that roundoff does not look like a result."""
     low, high = axes.get_ylim()
     middle = (low + high) / 2
     half = max((high - low) / 2, 0.1 * abs(middle))

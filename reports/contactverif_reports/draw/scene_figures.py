@@ -1,4 +1,4 @@
-"""One figure of a solved scene: bodies, pressure along the interface, how Newton got there. Slow to import."""
+"""The figure of a solved scene: bodies, pressures along the interface, Newton's iterates. Importing it is slow."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from contactverif_reports.draw.scene_meshes import close_up, colour_scale, draw_
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 from contactverif_reports.files import checked_name
 
-_WIDTH = 10.0  # inches
-_ACROSS = 3  # bodies side by side
+_WIDTH = 10.0  # Width of the figure in inches.
+_ACROSS = 3  # The largest number of panels side by side.
 _SMALL: dict[Any, Any] = {
     "font.size": 9,
     "axes.labelsize": 9,
@@ -36,21 +36,21 @@ _SMALL: dict[Any, Any] = {
 
 
 def draw_scene(solved: SolvedScene, path: str | os.PathLike[str], *, title: str = "") -> None:
-    """Draws a solved scene to a .png or .svg file.
+    """Draw a solved scene to a .png or .svg file.
 
     Parameters
     ----------
     solved : SolvedScene
-        With at least one solution.
+        The scene, with at least one solution.
     path : str | os.PathLike[str]
-        File to write, replaced if it is there.
+        The file to write; an older one is replaced.
     title : str
-        Above the picture, wrapped.
+        The title above the picture; it is wrapped.
 
     Raises
     ------
     MisuseError
-        If the file cannot be written, or is to be of another kind.
+        If the file cannot be written, or its name ends otherwise.
     """
     target = checked_name(path, SUFFIXES)
     with matplotlib.rc_context(_SMALL):
@@ -58,7 +58,7 @@ def draw_scene(solved: SolvedScene, path: str | os.PathLike[str], *, title: str 
 
 
 def make_scene_figure(solved: SolvedScene) -> Figure:
-    """The figure that `draw_scene` writes, without a title, for a page."""
+    """Return the figure that `draw_scene` writes, without a title, for a page."""
     with matplotlib.rc_context(_SMALL):
         return _figure(solved, "")
 
@@ -68,9 +68,9 @@ def _figure(solved: SolvedScene, title: str) -> Figure:
     panels = len(solved.solutions) + (box is not None)
     across = min(panels, _ACROSS)
     rows = -(-panels // across)
-    wide, high = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
-    wide, high = (wide, high) if box is None else (1.0, 1.0)
-    panel = float(np.clip((_WIDTH - 2.2) / across * high / wide, 1.6, 4.2))
+    width, height = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
+    slope = height / width if box is None else 1.0
+    panel = float(np.clip((_WIDTH - 2.2) / across * slope, 1.6, 4.2))
     heights = rows * (panel + 0.5) + 0.6, 4.8
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(h_pad=0.07))
     grid = figure.add_gridspec(2, 1, height_ratios=heights)
@@ -88,7 +88,7 @@ def _draw_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int)
     if box is not None:
         whole = panels.ravel()[0]
         draw_meshes(whole, solved, box)
-        whole.set_title("all of the meshes;\nframed, what is beside")
+        whole.set_title("all of the meshes; the frame\nis drawn on the right")
         _bare(whole, alone=True)
     from_near = panels.ravel()[int(box is not None) :]
     for axes, solution in zip(from_near, solved.solutions, strict=False):
@@ -112,14 +112,15 @@ def _draw_curves(figure: SubFigure, solved: SolvedScene) -> None:
     for axes in (slave, master, residuals, energies):
         axes.spines[["top", "right"]].set_visible(False)
     handles: list[Artist] = [
-        Line2D([], [], label=_end(one), **choose_pen(number).look(1)) for number, one in enumerate(solved.solutions)
+        Line2D([], [], label=_end(solution), **choose_pen(number).look(1))
+        for number, solution in enumerate(solved.solutions)
     ]
-    if any(one.points is not None for one in solved.solutions):
+    if any(solution.points is not None for solution in solved.solutions):
         handles.append(
-            Line2D([], [], color="0.3", linewidth=0.8, marker=".", label="at contact points, over their areas")
+            Line2D([], [], color="0.3", linewidth=0.8, marker=".", label="pressure at contact points, over their areas")
         )
     if solved.pressures:
-        exact = " and ".join(map(format_number, solved.pressures))  # by penalty and by multipliers
+        exact = " and ".join(map(format_number, solved.pressures))  # A penalty and multipliers may have one each.
         handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {exact}"))
     handles.append(Patch(color="0.92", label="roundoff of the residual"))
     figure.legend(
@@ -128,12 +129,14 @@ def _draw_curves(figure: SubFigure, solved: SolvedScene) -> None:
 
 
 def _end(solution: Solution) -> str:
+    """Say how Newton's method ended."""
     count = solution.n_iterations
     times = f"{count} iteration{'s' * (count != 1)}"
     return f"{solution.formulation}: {solution.end}{' after' if solution.converged else ','} {times}"
 
 
 def _facts(solved: SolvedScene) -> str:
+    """Return the penalty and the moduli."""
     moduli = ", ".join(
         f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}"
         for body in solved.bodies
@@ -147,5 +150,5 @@ def _bare(axes: Axes, *, alone: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_xlabel("x (length)")
     axes.set_ylabel("y (length)")
-    if not alone:  # else its scale is its own
+    if not alone:  # A panel that stands alone has a scale of its own.
         axes.label_outer()

@@ -1,6 +1,6 @@
-"""Draws the bodies of a solved scene, displacements and penetration each with its magnification. Slow to import.
+"""The bodies of a solved scene, displacements and penetration each with its magnification. Importing it is slow.
 
-A contact that is small against the bodies is drawn from near, and beside it all of the meshes.
+A contact that is small against the bodies is drawn enlarged, and beside it all of the meshes.
 """
 
 from __future__ import annotations
@@ -21,61 +21,70 @@ from contactverif.contract.case import Case
 from contactverif_reports.draw.case_geometry import Gaps
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene, pressures_across
 
-_SEEN_MOVE = 0.06  # of the scene: the largest displacement is drawn about as large
-_SEEN_GAP = 0.06  # of the scene: so is the deepest penetration
-_SUPPORT = 0.1  # of the scene: width of the hatching that stands for a rigid body
-_SMALL = 0.2  # of the scene; a contact that is shorter is drawn from near
-_AROUND = 1.6  # half-widths of the contact from its middle to the edge of such a drawing
-_MANY = 500  # cells; more of them are drawn with finer lines
-_COLOURS = "cividis"  # its lightness rises steadily, so that it reads in grey
-_FLAT = 1e-6  # relative differences of stress below which all is drawn in one colour
+# Lengths as shares of the size of the scene.
+_VISIBLE_MOVE = 0.06  # The largest displacement is drawn about so large.
+_VISIBLE_GAP = 0.06  # The deepest penetration is drawn about so large.
+_SUPPORT = 0.1  # Width of the hatching that stands for a rigid body.
+_SMALL = 0.2  # A contact that is shorter is drawn enlarged.
+_AROUND = 1.6  # Half-width of an enlarged drawing over that of its contact.
+_MANY = 500  # Cells are drawn with finer lines if there are more.
+_MANY_NODES = 40  # So are the markers of contact nodes.
+_COLOURS = "cividis"  # Its lightness rises steadily, so that it can be read in grey.
+_FLAT = 1e-6  # Relative differences of stress below this are drawn in one colour.
 
 
 @dataclass(frozen=True, slots=True)
 class Magnification:
-    """By how much displacements are magnified, and gaps."""
+    """The factors by which displacements and gaps are magnified."""
 
     move: float
     gap: float
 
     @classmethod
-    def of(cls, solved: SolvedScene, solutions: list[Solution]) -> Magnification:
-        """One significant digit each, for solutions that are to be compared.
+    def for_solutions(cls, solved: SolvedScene, solutions: list[Solution]) -> Magnification:
+        """Return factors of one significant digit, for solutions that are compared.
 
-        From near, displacements are as they are: magnified they would close gaps that stay open.
+        An enlarged drawing does not magnify displacements, because that would close gaps that stay open.
         """
-        moves = max(float(np.abs(u).max(initial=0.0)) for one in solutions for u in one.displacements)
-        gaps = max(float(np.abs(_gaps(solved, one.z).gap).max()) for one in solutions)
+        moves = max(float(np.abs(u).max(initial=0.0)) for solution in solutions for u in solution.displacements)
+        gaps = max(float(np.abs(_gaps(solved, solution.z).gap).max()) for solution in solutions)
         roundoff = 64 * UNIT_ROUNDOFF * solved.case.largest_coordinate
         if (box := close_up(solved)) is not None:
-            deep = max(-float(_gaps(solved, one.z).gap.min()) for one in solutions)
-            return cls(1.0, 1.0 if deep <= roundoff else _one_digit(_SEEN_GAP * float(np.ptp(box[:, 0])) / deep))
-        move = 1.0 if moves <= roundoff else _one_digit(_SEEN_MOVE * solved.size / moves)
-        return cls(move, 1.0 if gaps <= roundoff else _one_digit(_SEEN_GAP * solved.size / gaps))
+            deep = max(-float(_gaps(solved, solution.z).gap.min()) for solution in solutions)
+            return cls(1.0, 1.0 if deep <= roundoff else _one_digit(_VISIBLE_GAP * float(np.ptp(box[:, 0])) / deep))
+        move = 1.0 if moves <= roundoff else _one_digit(_VISIBLE_MOVE * solved.size / moves)
+        return cls(move, 1.0 if gaps <= roundoff else _one_digit(_VISIBLE_GAP * solved.size / gaps))
 
     @property
     def words(self) -> str:
-        """For the reader of the figure."""
+        """Return the factors in words, for the reader of the figure."""
         return f"displacements × {self.move:g}, penetration × {self.gap:g}"
 
 
 def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
-    """{formulation: magnification}: the same for all that stayed near, or they could not be compared."""
-    near = [one for one in solved.solutions if all(np.abs(u).max(initial=0.0) < solved.size for u in one.displacements)]
-    shared = Magnification.of(solved, near) if near else Magnification(1.0, 1.0)
-    return {one.formulation: shared if one in near else Magnification.of(solved, [one]) for one in solved.solutions}
+    """Return {formulation: magnification}, the same for all solutions that stay near, so that they can be compared."""
+    near = [
+        solution
+        for solution in solved.solutions
+        if all(np.abs(u).max(initial=0.0) < solved.size for u in solution.displacements)
+    ]
+    shared = Magnification.for_solutions(solved, near) if near else Magnification(1.0, 1.0)
+    return {
+        solution.formulation: shared if solution in near else Magnification.for_solutions(solved, [solution])
+        for solution in solved.solutions
+    }
 
 
 def colour_scale(solved: SolvedScene) -> ScalarMappable:
-    """From the least to the largest pressure of all cells of all solutions; the exact one, if one, in the middle."""
+    """Return a scale over the pressures of all cells of all solutions; a single exact pressure is in the middle."""
     values = [
         pressures_across(body, s)
-        for one in solved.solutions
-        for body, s in zip(solved.bodies, one.stresses, strict=True)
+        for solution in solved.solutions
+        for body, s in zip(solved.bodies, solution.stresses, strict=True)
     ]
-    found = np.concatenate(values)
-    found = found[np.isfinite(found)]
-    low, high = (float(found.min()), float(found.max())) if len(found) else (0.0, 1.0)
+    pressures = np.concatenate(values)
+    pressures = pressures[np.isfinite(pressures)]
+    low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 1.0)
     if len(solved.pressures) == 1:
         reach = max(high - solved.pressures[0], solved.pressures[0] - low)
         low, high = solved.pressures[0] - reach, solved.pressures[0] + reach
@@ -86,10 +95,12 @@ def colour_scale(solved: SolvedScene) -> ScalarMappable:
 
 
 def close_up(solved: SolvedScene) -> FloatArray | None:
-    """Lower left and upper right corner (2, 2) of a square around what penetrates; None if that is not small."""
+    """Return the lower left and upper right corner (2, 2) of a square around the contact; None if it is not small."""
     if solved.course.flat:
         return None
-    touching = [one.z.reshape(-1, 2)[np.flatnonzero(_gaps(solved, one.z).gap < 0)] for one in solved.solutions]
+    touching = [
+        solution.z.reshape(-1, 2)[np.flatnonzero(_gaps(solved, solution.z).gap < 0)] for solution in solved.solutions
+    ]
     places = np.vstack(
         [nodes for nodes in touching if np.ptp(nodes, axis=0).max(initial=0.0) < solved.size] or touching
     )
@@ -102,7 +113,7 @@ def close_up(solved: SolvedScene) -> FloatArray | None:
 
 
 def draw_meshes(axes: Axes, solved: SolvedScene, box: FloatArray) -> None:
-    """All of the meshes before anything moves, and where the close-up is taken."""
+    """Draw all of the undeformed meshes, and a frame around the enlarged part."""
     for body in solved.bodies:
         axes.add_collection(
             PolyCollection(list(body.nodes[body.cells]), facecolor="none", edgecolor="0.35", linewidth=0.15, zorder=2)
@@ -117,56 +128,81 @@ def draw_meshes(axes: Axes, solved: SolvedScene, box: FloatArray) -> None:
 def draw_bodies(
     axes: Axes, solved: SolvedScene, solution: Solution, large: Magnification, scale: ScalarMappable
 ) -> None:
-    """Bodies by the pressure across the interface, the slave over the master, what penetrates hatched."""
+    """Draw the bodies, coloured by the pressure across the interface; penetration is hatched.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw to.
+    solved : SolvedScene
+        The scene.
+    solution : Solution
+        One of its solutions.
+    large : Magnification
+        The factors for displacements and gaps.
+    scale : ScalarMappable
+        The colours, as `colour_scale` returns them.
+    """
     box = close_up(solved)
-    moved = [body.nodes + large.move * u for body, u in zip(solved.bodies, solution.displacements, strict=True)]
-    surface = solved.case.interface.nodes + large.move * (
-        solution.z.reshape(-1, 2) - solved.case.interface.nodes
-    )  # (n_nodes, 2) of the interface
-    gaps, drawn = _gaps(solved, solution.z), _gaps(solved, surface.reshape(-1))
-    shown = large.gap * gaps.gap if box is None else np.where(gaps.gap < 0, large.gap * gaps.gap, drawn.gap)
-    shifts = (shown - drawn.gap)[:, None] * drawn.normal  # (n_slave_nodes, 2)
+    reference = solved.case.interface.nodes
+    surface = reference + large.move * (solution.z.reshape(-1, 2) - reference)  # (n_nodes, 2) of the interface
+    gaps, magnified = _gaps(solved, solution.z), _gaps(solved, surface.reshape(-1))
+    wanted = large.gap * gaps.gap if box is None else np.where(gaps.gap < 0, large.gap * gaps.gap, magnified.gap)
+    shifts = (wanted - magnified.gap)[:, None] * magnified.normal  # (n_slave_nodes, 2)
+    # The slave is drawn over the master.
     for index, side in sorted(enumerate(solved.sides), key=lambda pair: pair[1] == "slave"):
-        body, nodes = solved.bodies[index], moved[index]
+        body = solved.bodies[index]
+        nodes = body.nodes + large.move * solution.displacements[index]
         if side == "slave":
-            nodes = nodes + _carried(solved, index, shifts)
+            nodes = nodes + _carry_along(solved, index, shifts)
         if body.rigid:
             _draw_rigid(axes, body, nodes, _SUPPORT * solved.size)
         else:
-            seen = slice(None) if box is None else _seen(nodes[body.cells], box)
-            cells = nodes[body.cells[seen]]
-            thin = 0.4 if len(cells) <= _MANY else 0.2
-            faces = axes.add_collection(
-                PolyCollection(list(cells), edgecolor="0.25", linewidth=thin, zorder=2, alpha=None)
-            )
-            faces.set_array(pressures_across(body, solution.stresses[index])[seen])
-            faces.set(cmap=scale.cmap, norm=scale.norm)
-        line = "solid" if side == "slave" else (0, (4, 1.5))
-        axes.add_collection(
-            LineCollection(list(nodes[body.contact]), colors="black", linewidths=1.3, linestyles=[line], zorder=5)
-        )
-        at = nodes[body.contact_nodes]
-        fill = "black" if side == "slave" else "white"
-        few = len(at) <= 40
-        axes.plot(
-            *at.T,
-            ls="none",
-            marker="o" if side == "slave" else "s",
-            ms=3.6 if few else 1.5,
-            mfc=fill,
-            mec="black",
-            mew=0.8,
-            zorder=6,
-        )
-    _draw_penetration(axes, solved, surface[: len(shifts)] + shifts, large.gap * gaps.gap, drawn.normal)
+            _draw_cells(axes, nodes[body.cells], pressures_across(body, solution.stresses[index]), scale, box)
+        _draw_contact_side(axes, body, nodes, side)
+    _draw_penetration(axes, solved, surface[: len(shifts)] + shifts, large.gap * gaps.gap, magnified.normal)
     axes.set_aspect("equal", adjustable="box")
     axes.margins(0.04)
     if box is not None:
         axes.set(xlim=box[:, 0], ylim=box[:, 1])
 
 
-def _seen(corners: FloatArray, box: FloatArray) -> IntArray:
-    """The cells, of corners (n_cells, n_corners, 2), that the box may show."""
+def _draw_cells(
+    axes: Axes, corners: FloatArray, pressures: FloatArray, scale: ScalarMappable, box: FloatArray | None
+) -> None:
+    """Draw the cells, with corners (n_cells, n_corners, 2), in the colours of their pressures."""
+    if box is not None:
+        visible = _cells_in_box(corners, box)
+        corners, pressures = corners[visible], pressures[visible]
+    thickness = 0.4 if len(corners) <= _MANY else 0.2
+    faces = axes.add_collection(
+        PolyCollection(list(corners), edgecolor="0.25", linewidth=thickness, zorder=2, alpha=None)
+    )
+    faces.set_array(pressures)
+    faces.set(cmap=scale.cmap, norm=scale.norm)
+
+
+def _draw_contact_side(axes: Axes, body: Body, nodes: FloatArray, side: str) -> None:
+    """Draw the segments and the nodes of a body that may touch: the slave solid and black, the master dashed."""
+    style = "solid" if side == "slave" else (0, (4, 1.5))
+    axes.add_collection(
+        LineCollection(list(nodes[body.contact]), colors="black", linewidths=1.3, linestyles=[style], zorder=5)
+    )
+    contact_nodes = nodes[body.contact_nodes]
+    axes.plot(
+        *contact_nodes.T,
+        ls="none",
+        marker="o" if side == "slave" else "s",
+        ms=3.6 if len(contact_nodes) <= _MANY_NODES else 1.5,
+        mfc="black" if side == "slave" else "white",
+        mec="black",
+        mew=0.8,
+        zorder=6,
+    )
+
+
+def _cells_in_box(corners: FloatArray, box: FloatArray) -> IntArray:
+    """Return the numbers of the cells, with corners (n_cells, n_corners, 2), that the box may show."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     return np.flatnonzero((high >= box[0]).all(axis=1) & (low <= box[1]).all(axis=1))
 
@@ -175,20 +211,20 @@ def _gaps(solved: SolvedScene, z: FloatArray) -> Gaps:
     return Gaps.from_case(Case(solved.case.interface, z))
 
 
-def _carried(solved: SolvedScene, index: int, shifts: FloatArray) -> FloatArray:
-    """Shifts (n_nodes, 2) of a slave body that move its contact nodes as given, and columns of cells with them."""
+def _carry_along(solved: SolvedScene, index: int, shifts: FloatArray) -> FloatArray:
+    """Return shifts (n_nodes, 2) of all nodes of a slave body: columns of cells move with their contact nodes."""
     body, on = solved.bodies[index], solved.on_interface[index]
-    own = shifts[on]  # (n_contact_nodes, 2)
+    at_nodes = shifts[on]  # (n_contact_nodes, 2)
     if not solved.course.nearly_flat:
-        return np.broadcast_to(own.mean(axis=0), body.nodes.shape)
+        return np.broadcast_to(at_nodes.mean(axis=0), body.nodes.shape)
     along = body.nodes @ solved.course.direction
     order = np.argsort(along[body.contact_nodes], kind="stable")
     places = along[body.contact_nodes][order]
-    return np.column_stack([np.interp(along, places, own[order, axis]) for axis in (0, 1)])
+    return np.column_stack([np.interp(along, places, at_nodes[order, axis]) for axis in (0, 1)])
 
 
 def _draw_rigid(axes: Axes, body: Body, nodes: FloatArray, width: float) -> None:
-    """A hatched strip behind the surface."""
+    """Draw a hatched strip behind the surface."""
     ends = nodes[body.contact]  # (n_segments, 2, 2)
     chords = ends[:, 1] - ends[:, 0]
     lefts = np.column_stack([-chords[:, 1], chords[:, 0]]) / np.linalg.norm(chords, axis=1)[:, None]
@@ -196,11 +232,11 @@ def _draw_rigid(axes: Axes, body: Body, nodes: FloatArray, width: float) -> None
     axes.add_collection(
         PolyCollection(list(strips), facecolor="none", edgecolor="0.5", linewidth=0, hatch="////", zorder=1)
     )
-    axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # so that the axes reach around it
+    axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # The axes reach around it.
 
 
 def _draw_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: FloatArray, normal: FloatArray) -> None:
-    """Hatched between the slave's surface and the master's, where it is beyond that."""
+    """Hatch what lies between the slave's surface and the master's where the slave penetrates."""
     feet = slave - gap[:, None] * normal
     segments = solved.case.interface.slave.segments
     inside = segments[(np.minimum(gap, 0.0)[segments] < 0).any(axis=1)]
@@ -215,5 +251,6 @@ def _draw_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: F
 
 
 def _one_digit(value: float) -> float:
+    """Round to one significant digit."""
     power = 10.0 ** floor(log10(value))
     return float(f"{round(value / power) * power:.3g}")

@@ -1,6 +1,6 @@
-"""Draws the bodies of a stored scene before anything is solved: cells, supports, loads, surfaces. Slow to import.
+"""The bodies of a stored scene before anything is solved: cells, supports, loads, surfaces. Importing it is slow.
 
-All of it is in the case (`parameter_bodies_…`, see reports/README.md), in one numbering of nodes.
+The case holds all of it (`parameter_bodies_…`, see reports/README.md), in one numbering of nodes.
 """
 
 from __future__ import annotations
@@ -17,25 +17,37 @@ from contactverif.contract.case import Case
 from contactverif_reports.draw.strokes import MASTER, SLAVE
 
 _BODIES = "bodies_"
-_SHADES = {True: "0.88", False: "0.96"}  # of slave and master, told apart in grey
-_ARROW = 0.14  # longest load, of the scene
-_SUPPORT = 0.02  # half of the mark of a support, of the scene
+_SHADES = {True: "0.88", False: "0.96"}  # The slave is darker than the master.
+_ARROW = 0.14  # Length of the longest load, as a share of the scene.
+_SUPPORT = 0.02  # Half the length of the mark of a support, as a share of the scene.
 
 
 def has_outline(case: Case) -> bool:
-    """Whether the case holds bodies."""
+    """Return whether the case holds bodies."""
     return f"{_BODIES}nodes" in case.parameters
 
 
 def make_outline_figure(case: Case, width: float) -> Figure:
-    """The reference configuration of the bodies; `width` in inches. Rigid bodies are their surfaces."""
-    packed = {name.removeprefix(_BODIES): found for name, found in case.parameters.items() if name.startswith(_BODIES)}
+    """Return a figure of the bodies in their reference configuration; a rigid body is its surface.
+
+    Parameters
+    ----------
+    case : Case
+        A case that holds bodies.
+    width : float
+        The width of the figure in inches.
+    """
+    packed = {
+        name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
+    }
     nodes = packed["nodes"]  # (n_nodes, 2) of all bodies
     of_body = np.repeat(np.arange(len(packed["count"])), packed["count"].astype(np.int64))  # (n_nodes,)
     is_slave = packed["is_slave"] != 0
     size = float(np.ptp(nodes, axis=0).max())
-    wide, high = np.ptp(nodes, axis=0) / size + 2 * _ARROW
-    figure = Figure(figsize=(width, float(np.clip(width * high / wide, 1.8, 0.75 * width)) + 0.5), layout="constrained")
+    across, high = np.ptp(nodes, axis=0) / size + 2 * _ARROW
+    figure = Figure(
+        figsize=(width, float(np.clip(width * high / across, 1.8, 0.75 * width)) + 0.5), layout="constrained"
+    )
     axes = figure.add_subplot()
     axes.set_aspect("equal", adjustable="datalim")
     _draw_cells(axes, packed["cells"].astype(np.int64), nodes, is_slave[of_body])
@@ -56,15 +68,15 @@ def make_outline_figure(case: Case, width: float) -> Figure:
 
 def _corners(cells: FloatArray) -> IntArray:
     numbers = cells.astype(np.int64).ravel()
-    found: IntArray = numbers[numbers >= 0]  # a triangle has −1 for its fourth
-    return found
+    corners: IntArray = numbers[numbers >= 0]  # A triangle has −1 for a fourth corner.
+    return corners
 
 
 def _draw_cells(axes: Axes, cells: IntArray, nodes: FloatArray, is_slave: Any) -> None:
     for side, shade in _SHADES.items():
-        own = [nodes[cell[cell >= 0]] for cell in cells if bool(is_slave[cell[0]]) == side]
-        axes.add_collection(PolyCollection(own, facecolor=shade, edgecolor="0.55", linewidth=0.5, zorder=1))
-    axes.plot(*nodes.T, linestyle="none")  # so that the axes reach around it
+        polygons = [nodes[cell[cell >= 0]] for cell in cells if bool(is_slave[cell[0]]) == side]
+        axes.add_collection(PolyCollection(polygons, facecolor=shade, edgecolor="0.55", linewidth=0.5, zorder=1))
+    axes.plot(*nodes.T, linestyle="none")  # The axes reach around it.
 
 
 def _draw_surfaces(axes: Axes, contact: IntArray, nodes: FloatArray, is_slave: Any, rigid: Any) -> None:
@@ -87,19 +99,20 @@ def _draw_surfaces(axes: Axes, contact: IntArray, nodes: FloatArray, is_slave: A
 def _draw_supports(
     axes: Axes, nodes: FloatArray, fixed: Any, frame: tuple[FloatArray, FloatArray], half: float
 ) -> None:
-    """A short bar across each direction in which a node is held."""
+    """Draw a short bar across each direction in which a node is fixed."""
     first, second = frame
     bars = []
     for component, across in ((0, second), (1, first)):
-        held = fixed[:, component]
-        bars += list(np.stack([nodes[held] - half * across[held], nodes[held] + half * across[held]], axis=1))
+        ends = half * across[fixed[:, component]]
+        at_nodes = nodes[fixed[:, component]]
+        bars += list(np.stack([at_nodes - ends, at_nodes + ends], axis=1))
     if bars:
         axes.add_collection(LineCollection(bars, colors="black", linewidths=2.2, zorder=5))
         axes.plot([], [], color="black", linewidth=2.2, label="support")
 
 
 def _draw_loads(axes: Axes, nodes: FloatArray, loads: FloatArray, longest: float) -> None:
-    """Arrows that end at the nodes."""
+    """Draw arrows that end at the nodes."""
     sizes = np.linalg.norm(loads, axis=1)
     if not sizes.max(initial=0.0) > 0:
         return

@@ -1,4 +1,4 @@
-"""Draws bodies in a few lines of text: two blocks with their meeting sides to scale, any others as silhouettes."""
+"""The drawing of two bodies in a few lines of text: blocks with their contact sides to scale, others as silhouettes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,30 @@ from contactverif_reports.draw.case_geometry import Course
 from contactverif_reports.draw.lengths import unit_of
 from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, draw_strips
 
-_LABEL = 8  # columns that `strips` writes the sides' names in
-_HEIGHT = 20  # rows of silhouettes
-_ASPECT = 2.0  # a character is twice as high as wide
+_LABEL = 8  # `draw_strips` writes the names of the sides in so many columns.
+_HEIGHT = 20  # The largest number of rows of silhouettes.
+_ASPECT = 2.0  # A character is twice as high as wide.
 _INKS = {"slave": "▒", "master": "░"}
 
 
 def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
-    """The blocks of a case as text of at most `width` columns (at least 40), lines separated by newlines.
+    """Draw the two blocks of a case as text.
 
-    The interface has to run straight, or nearly so. What presses on the slave, and on the master beside it, is a row of
-    arrows; a rigid master is hatched.
+    Loads on the slave, and on the master beside it, are a row of arrows; a rigid master is hatched.
+
+    Parameters
+    ----------
+    case : Case
+        The case; its interface runs straight, or nearly so.
+    slave, master : Body
+        The blocks.
+    width : int
+        The largest number of columns, at least 40.
+
+    Returns
+    -------
+    str
+        Lines separated by newlines.
     """
     course = Course.from_case(case)
     lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
@@ -39,7 +52,7 @@ def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> st
 
 
 def _box(side: str, node: str, name: str, corners: tuple[str, str]) -> list[str]:
-    """The far side of a body and a row with its name, as wide as the nodes of its meeting side."""
+    """Return the far side of a body and a row with its name, as wide as the nodes of its contact side."""
     first, last = side.index(node), side.rindex(node)
     inner = last - first - 1
     left, right = corners
@@ -58,11 +71,26 @@ def _rigid(side: str) -> list[str]:
 
 
 def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
-    """Two bodies of any shape, filled, to scale, and what presses on them; lines of at most `width` columns."""
+    """Draw two bodies of any shape as text: filled, to scale, with the loads on the slave.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    slave, master : Body
+        The bodies.
+    width : int
+        The largest number of columns.
+
+    Returns
+    -------
+    str
+        Lines separated by newlines.
+    """
     inked = [(_INKS["master"], master), (_INKS["slave"], slave)]
     nodes = np.vstack([slave.nodes, master.nodes])
     (left, low), (right, high) = nodes.min(axis=0), nodes.max(axis=0)
-    row = max((high - low) / _HEIGHT, (right - left) * _ASPECT / width)  # height of a row, a length
+    row = max((high - low) / _HEIGHT, (right - left) * _ASPECT / width)  # The height of a row, a length.
     columns, rows = (max(int(np.ceil(size)), 1) for size in ((right - left) * _ASPECT / row, (high - low) / row))
     x = left + (np.arange(columns) + 0.5) * row / _ASPECT
     y = high - (np.arange(rows) + 0.5) * row
@@ -75,15 +103,15 @@ def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) 
     for place in slave.nodes[(slave.load != 0).any(axis=1)]:
         arrows[min(int((place[0] - left) / row * _ASPECT), columns - 1)] = "↓"
     sides = zip(_INKS, (case.interface.slave, case.interface.master), strict=True)
-    said = [
+    legend = [
         f"{_INKS[name]} {name}, {len(side)} segments of {side.lengths(case.positions).min():.3g} or more"
         for name, side in sides
     ]
-    return "\n".join(line.rstrip() for line in ["".join(arrows), *lines, *said])
+    return "\n".join(line.rstrip() for line in ["".join(arrows), *lines, *legend])
 
 
 def _inside(body: Body, places: FloatArray) -> BoolArray:
-    """(n_places,) whether a place lies in a body: a ray from it crosses the boundary an odd number of times."""
+    """Return (n_places,) whether a place lies in a body: a ray from it crosses the boundary an odd number of times."""
     following = np.roll(body.cells, -1, axis=1)
     edges = {(a, b) for a, b in np.stack([body.cells, following], axis=-1).reshape(-1, 2).tolist()}
     outer = body.nodes[np.array([edge for edge in edges if edge[::-1] not in edges])]  # (n_edges, 2, 2)

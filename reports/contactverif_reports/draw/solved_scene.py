@@ -1,6 +1,7 @@
-"""What a solved scene is for a picture: arrays alone. Who fills it solves; who draws it does not.
+"""The data of a solved scene for a picture: arrays alone, filled by `studies` and drawn here.
 
-What a drawing needs besides is computed here: where along the interface a node lies, and its pressure.
+Rule: nothing is solved here. Only what follows from the arrays is computed: where along the interface a node lies, and
+its pressure.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 from contactverif_reports.draw.case_geometry import Course
 
-_SLIVER = 1e-6  # of a segment; less of it under the other side is none
+_SLIVER = 1e-6  # A smaller share of a segment under the other side counts as none.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointPressures:
-    """Where a formulation looks for contact, and the pressure that it finds there.
+    """The contact points of a formulation, and the pressure at each.
 
     Attributes
     ----------
     segment : IntArray, shape (n_points,)
         The slave segment that carries the point.
     c : FloatArray, shape (n_points,)
-        Where on it, −1 at its first node, +1 at its second.
+        The place on the segment, −1 at its first node, +1 at its second.
     area : FloatArray, shape (n_points, 2)
         The ends of the area of competence, as `c`; NaN where the plugin does not say.
     pressure : FloatArray, shape (n_points,)
@@ -43,20 +44,21 @@ class PointPressures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A scene as one formulation leaves it.
+    """A scene as one formulation solves it.
 
     Attributes
     ----------
     formulation : str
-        As typed on the command line.
+        The name on the command line.
     end : str
         How the solution ended, in a few words: "converged", "2-cycle", ….
     converged : bool
         Whether the last iterate is a solution.
     displacements : tuple[FloatArray, ...]
-        Of the nodes of each body (n_nodes, 2), global axes, a length.
+        Displacements of the nodes of each body (n_nodes, 2), global axes, a length.
     stresses : tuple[FloatArray, ...]
-        Of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per length².
+        Stresses of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per
+        length².
     z : FloatArray, shape (n_unknowns,)
         Positions of the interface, flat.
     forces : FloatArray, shape (n_nodes, 2)
@@ -71,9 +73,9 @@ class Solution:
     stress_error : float
         Largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
     remark : str
-        What did not come out as it should, empty if all did.
+        A remark on what did not come out as it should; empty if all did.
     advice : str
-        What happened and what to try next, where Newton's method did not converge; else empty.
+        If Newton's method did not converge: what happened, and what to try next; else empty.
     """
 
     formulation: str
@@ -95,7 +97,7 @@ class Solution:
 
     @property
     def n_iterations(self) -> int:
-        """Linear systems solved."""
+        """Return the number of linear systems that were solved."""
         return int(np.isfinite(self.energies).sum())
 
 
@@ -108,14 +110,14 @@ class SolvedScene:
     case : Case
         The interface, before it is solved.
     bodies : tuple[Body, ...]
-        All of them.
+        All bodies.
     on_interface : tuple[IntArray, ...]
         For each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can touch
         nothing.
     solutions : tuple[Solution, ...]
         At least one.
     failures : Mapping[str, str]
-        {formulation: why there is no solution}, a line each.
+        {formulation: why there is no solution}, one line of text each.
     """
 
     case: Case
@@ -126,33 +128,34 @@ class SolvedScene:
 
     @property
     def sides(self) -> list[str]:
-        """ "slave" or "master" for each body, "" for one that can touch nothing."""
+        """Return "slave" or "master" for each body, "" for one that can touch nothing."""
         first_master = self.case.interface.n_slave_nodes
         return ["" if not len(on) else "slave" if on[0] < first_master else "master" for on in self.on_interface]
 
     @property
     def pressures(self) -> list[float]:
-        """The exact pressures that are known, each once: a penalty gives way where multipliers do not."""
-        return list(dict.fromkeys(one.pressure for one in self.solutions if np.isfinite(one.pressure)))
+        """Return the known exact pressures, each once. A penalty may have another than multipliers, as it gives way."""
+        known = [solution.pressure for solution in self.solutions if np.isfinite(solution.pressure)]
+        return list(dict.fromkeys(known))
 
     @property
     def size(self) -> float:
-        """The larger side of the box around all bodies, a length."""
+        """Return the larger side of the box around all bodies, a length."""
         return float(np.ptp(np.vstack([body.nodes for body in self.bodies]), axis=0).max())
 
     @property
     def course(self) -> Course:
-        """Which way the interface runs in its reference configuration."""
+        """Return the direction and the shape of the interface in its reference configuration."""
         return Course.from_case(Case(self.case.interface, self.case.interface.nodes.reshape(-1)))
 
     @property
     def along(self) -> FloatArray:
-        """Coordinates (n_nodes,) of the interface's nodes along it in the reference configuration."""
+        """Return coordinates (n_nodes,) of the interface's nodes along it, in the reference configuration."""
         along: FloatArray = self.case.interface.nodes @ self.course.direction
         return along
 
     def points_along(self, points: PointPressures) -> tuple[FloatArray, FloatArray]:
-        """Coordinates along the interface of the points (n_points,), and of the ends of their areas (n_points, 2)."""
+        """Return coordinates along the interface: of points (n_points,), and of the ends of their areas (n_points, 2)."""
         ends = self.along[self.case.interface.slave.segments[points.segment]]  # (n_points, 2)
 
         def at(c: FloatArray, ends: FloatArray) -> FloatArray:
@@ -162,10 +165,10 @@ class SolvedScene:
         return at(points.c, ends), at(points.area, ends[:, None, :])
 
     def node_pressures(self, solution: Solution) -> FloatArray:
-        """Pressure (n_nodes,) of the nodal forces: along the normal, over the node's share of the interface.
+        """Return the pressure (n_nodes,) of the nodal forces: along the normal, over the node's share of the interface.
 
-        A uniform pressure comes out exactly. The share is the integral of the node's shape function over what lies
-        under the other side; NaN where that is nothing.
+        A uniform pressure comes out exactly. The share is the integral of the node's shape function over the part of
+        the surface that lies under the other side; without such a part the pressure is NaN.
         """
         shares = self.shares(solution.z.reshape(-1, 2))
         lengths = np.linalg.norm(shares, axis=1)
@@ -174,13 +177,13 @@ class SolvedScene:
         return pressures
 
     def shares(self, positions: FloatArray) -> FloatArray:
-        """(n_nodes, 2) vectors into each node's body, as long as its share of the interface at the positions."""
+        """Return vectors (n_nodes, 2) into each node's body, as long as its share of the interface at the positions."""
         interface, flat = self.case.interface, self.course.nearly_flat
         along = positions @ self.course.direction
         shares = np.zeros_like(positions)
         for surface, other in ((interface.slave, interface.master), (interface.master, interface.slave)):
             facing = along[other.nodes] if flat else np.array([-np.inf, np.inf])
-            firsts, seconds = _covered(along[surface.segments], float(facing.min()), float(facing.max()))
+            firsts, seconds = _shape_integrals(along[surface.segments], float(facing.min()), float(facing.max()))
             lefts = _lefts(surface, positions)
             np.add.at(shares, surface.segments[:, 0], firsts[:, None] * lefts)
             np.add.at(shares, surface.segments[:, 1], seconds[:, None] * lefts)
@@ -188,7 +191,20 @@ class SolvedScene:
 
 
 def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
-    """−σ (n_cells,) across the body's first axis, along which its interface lies, of stresses (n_cells, 3)."""
+    """Return the pressure across the interface in each cell.
+
+    Parameters
+    ----------
+    body : Body
+        The body; its interface lies along its first axis.
+    stresses : FloatArray, shape (n_cells, 3)
+        Stresses xx, yy and xy in global axes, force per length².
+
+    Returns
+    -------
+    FloatArray, shape (n_cells,)
+        −σ across the first axis, force per length².
+    """
     x, y = body.axis
     xx, yy, xy = stresses.T
     pressures: FloatArray = 2 * x * y * xy - y * y * xx - x * x * yy
@@ -196,13 +212,13 @@ def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
 
 
 def _lefts(surface: Surface, positions: FloatArray) -> FloatArray:
-    """(n_segments, 2) vectors into the body, as long as the segments."""
+    """Return vectors (n_segments, 2) into the body, as long as the segments."""
     chords = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
     return np.column_stack([-chords[:, 1], chords[:, 0]])
 
 
-def _covered(ends: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-    """Integrals (n_segments,) of both shape functions over what of the segment lies in [low, high], over its length."""
+def _shape_integrals(ends: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+    """Return integrals (n_segments,) of both shape functions over the part in [low, high], divided by the length."""
     first, length = ends[:, 0], ends[:, 1] - ends[:, 0]
     if not (np.isfinite([low, high]).all() and (length != 0).all()):
         return np.full(len(ends), 0.5), np.full(len(ends), 0.5)

@@ -1,7 +1,8 @@
-"""Writes a solved scene for ParaView: all bodies in one unstructured grid, in their reference configuration."""
+"""A solved scene as a file for ParaView: all bodies in one unstructured grid, in their reference configuration."""
 
 from __future__ import annotations
 
+import itertools
 import os
 from pathlib import Path
 
@@ -14,16 +15,26 @@ from contactverif_reports.files import checked_name, whole
 
 SUFFIXES = (".vtu",)
 _KINDS = {2: "line", 3: "triangle", 4: "quad"}
+_CELL_DATA = ("stress_xx", "stress_yy", "stress_xy", "pressure", "body", "side")
 SIDES = {"slave": 0, "master": 1, "": -1}
 
 
 def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[str]) -> None:
-    """Writes one solution to a .vtu file, replacing a file that is there.
+    """Write one solution to a .vtu file.
 
     On points: `displacement` and `contact_force` (three components, the last 0), `contact_pressure` (nodal force over
     the node's share of the interface; 0 off the interface). On cells: `stress_xx`, `stress_yy`, `stress_xy` (means
     over the Gauss points), `pressure` (−σ across the body's first axis; 0 in a rigid body), `body` (its number) and
     `side` (0 slave, 1 master, −1 out of reach). A rigid body is the line cells of its surface.
+
+    Parameters
+    ----------
+    solved : SolvedScene
+        The scene.
+    solution : Solution
+        One of its solutions.
+    path : str | os.PathLike[str]
+        The file to write; an older one is replaced.
 
     Raises
     ------
@@ -42,47 +53,60 @@ def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[s
 
 
 def _grid(solved: SolvedScene, solution: Solution) -> dict[str, object]:
-    """The arguments of a `meshio.Mesh`; cells of one kind lie together, since a file may hold triangles and quads."""
-    points = np.vstack([body.nodes for body in solved.bodies])
-    forces, pressures = np.zeros_like(points), np.zeros(len(points))
-    found = solved.node_pressures(solution)
-    cells: dict[str, list[IntArray]] = {}
-    data: dict[str, list[FloatArray]] = {}
-    first = 0
-    for number, (body, side) in enumerate(zip(solved.bodies, solved.sides, strict=True)):
-        on = solved.on_interface[number]
-        if len(on):
-            forces[first + body.contact_nodes] = solution.forces[on]
-            pressures[first + body.contact_nodes] = np.nan_to_num(found[on])
-        numbers = body.contact if body.rigid else body.cells
-        kind = _KINDS[numbers.shape[1]]
-        stresses = np.zeros((len(numbers), 3)) if body.rigid else solution.stresses[number]
-        columns = [
-            stresses,
-            pressures_across(body, stresses),
-            np.full(len(numbers), number),
-            np.full(len(numbers), SIDES[side]),
-        ]
-        cells.setdefault(kind, []).append(numbers + first)
-        data.setdefault(kind, []).append(np.column_stack(columns))
-        first += len(body.nodes)
-    names = ("stress_xx", "stress_yy", "stress_xy", "pressure", "body", "side")
-    blocks = {kind: np.vstack(parts) for kind, parts in data.items()}
-    on_cells = {name: [block[:, column] for block in blocks.values()] for column, name in enumerate(names)}
-    for name in ("body", "side"):
-        on_cells[name] = [values.astype(np.int64) for values in on_cells[name]]
+    """Return the arguments of a `meshio.Mesh`."""
+    cells, on_cells = _cells(solved, solution)
+    forces, pressures = _contact(solved, solution)
     return {
-        "points": _in_space(points),
-        "cells": [(kind, np.vstack(parts)) for kind, parts in cells.items()],
+        "points": _in_space(np.vstack([body.nodes for body in solved.bodies])),
+        "cells": cells,
         "point_data": {
             "displacement": _in_space(np.vstack(solution.displacements)),
-            "contact_force": _in_space(np.nan_to_num(forces)),
+            "contact_force": _in_space(forces),
             "contact_pressure": pressures,
         },
         "cell_data": on_cells,
     }
 
 
+def _contact(solved: SolvedScene, solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return forces (n_points, 2) and pressures (n_points,) of all bodies' nodes, 0 off the interface."""
+    sizes = [len(body.nodes) for body in solved.bodies]
+    forces, pressures = np.zeros((sum(sizes), 2)), np.zeros(sum(sizes))
+    node_pressures = solved.node_pressures(solution)
+    for body, on, first in zip(solved.bodies, solved.on_interface, _first_nodes(solved), strict=True):
+        if len(on):
+            forces[first + body.contact_nodes] = solution.forces[on]
+            pressures[first + body.contact_nodes] = np.nan_to_num(node_pressures[on])
+    return np.nan_to_num(forces), pressures
+
+
+def _cells(
+    solved: SolvedScene, solution: Solution
+) -> tuple[list[tuple[str, IntArray]], dict[str, list[FloatArray] | list[IntArray]]]:
+    """Return the cells by kind and their data; a file may hold triangles and quadrilaterals, each kind in one block."""
+    cells: dict[str, list[IntArray]] = {}
+    data: dict[str, list[FloatArray]] = {}
+    for number, (body, first) in enumerate(zip(solved.bodies, _first_nodes(solved), strict=True)):
+        numbers = body.contact if body.rigid else body.cells
+        stresses = np.zeros((len(numbers), 3)) if body.rigid else solution.stresses[number]
+        side = np.full(len(numbers), SIDES[solved.sides[number]])
+        columns = [stresses, pressures_across(body, stresses), np.full(len(numbers), number), side]
+        kind = _KINDS[numbers.shape[1]]
+        cells.setdefault(kind, []).append(numbers + first)
+        data.setdefault(kind, []).append(np.column_stack(columns))
+    blocks = [np.vstack(parts) for parts in data.values()]
+    on_cells: dict[str, list[FloatArray] | list[IntArray]] = {}
+    for column, name in enumerate(_CELL_DATA):
+        values = [block[:, column] for block in blocks]
+        on_cells[name] = [array.astype(np.int64) for array in values] if name in ("body", "side") else values
+    return [(kind, np.vstack(parts)) for kind, parts in cells.items()], on_cells
+
+
+def _first_nodes(solved: SolvedScene) -> list[int]:
+    """Return the number of each body's first node among the nodes of all bodies."""
+    return list(itertools.accumulate((len(body.nodes) for body in solved.bodies[:-1]), initial=0))
+
+
 def _in_space(vectors: FloatArray) -> FloatArray:
-    """Vectors (n, 2) with a third component 0, which ParaView wants."""
+    """Return vectors (n, 3) with a third component 0, which ParaView needs, from vectors (n, 2)."""
     return np.column_stack([vectors, np.zeros(len(vectors))])
