@@ -277,9 +277,9 @@ def test_a_file_name_says_which_file_is_meant() -> None:
 
 
 # What the house may measure. `pytest tests/test_house.py -s -k measure` prints what it does measure.
-MOST_FUNCTIONS_ABOVE_TEN = 62  # Functions with a cyclomatic complexity above 10, by radon: at the end 25.
+MOST_FUNCTIONS_ABOVE_TEN = 45  # Functions with a cyclomatic complexity above 10, by radon: at the end 25.
 MOST_ARGUMENTS = 19  # Arguments of one function, `self` not counted: at the end 12.
-MOST_LONG_FILES = 3  # Files with more than LONG lines.
+MOST_LONG_FILES = 5  # Files with more than LONG lines.
 LONG = 400
 MEDIAN_LINES = (50, 200)
 

@@ -84,7 +84,6 @@ for source in sources():
 UNFINISHED = {
     "names": {
         "contactverif/cli",
-        "contactverif/contract",
         "contactverif/geometry",
         "contactverif/mechanics",
         "contactverif/meshes",
@@ -93,7 +92,6 @@ UNFINISHED = {
         "contactverif/scenes",
         "contactverif/strategies",
         "contactverif/studies",
-        "contactverif/testing",
         "plugins/contactverif_mortar",
         "plugins/contactverif_nts",
         "reports/contactverif_paper",
@@ -131,7 +129,6 @@ UNFINISHED = {
         "contactverif/scenes",
         "contactverif/strategies",
         "contactverif/studies",
-        "contactverif/testing",
         "plugins/contactverif_mortar",
         "plugins/contactverif_nts",
         "reports/contactverif_paper",
@@ -156,14 +153,12 @@ UNFINISHED = {
         "tests/studies",
     },
     "comments": {
-        "contactverif/cli",
         "contactverif/mechanics",
         "contactverif/meshes",
         "contactverif/oracle",
         "contactverif/scenes",
         "contactverif/strategies",
         "contactverif/studies",
-        "contactverif/testing",
         "plugins/contactverif_mortar",
         "plugins/contactverif_nts",
         "reports/contactverif_paper",
