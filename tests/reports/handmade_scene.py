@@ -74,6 +74,7 @@ def solved(
             factors=np.ones(3),
             points=PointPressures(np.array([0, 1, 2]), np.zeros(3), np.array([[-1.0, 1.0]] * 3), np.full(3, PRESSURE)),
             pressure=PRESSURE,
+            advice="" if end == "converged" else "try load steps",
         )
         for name, end in zip(names, ends, strict=True)
     )

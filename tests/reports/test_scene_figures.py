@@ -69,6 +69,7 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
         "displacements × 40, penetration × 40",
         "one: converged after 2 iterations",
         "two: 2-cycle, 2 iterations",
+        "two: try load steps",
         "exact pressure 100",
         "at contact points, over their areas",
         "position along the interface (length)",

@@ -165,6 +165,7 @@ def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., 
     assert end in one.end
     assert one.converged == (not end)
     assert one.remark.startswith(remark)
+    assert bool(one.advice) == bool(end)
     assert np.isfinite(one.z).all()
     assert all(np.isfinite(u).all() for u in one.displacements)
 

@@ -77,7 +77,8 @@ def _figure(solved: SolvedScene, title: str) -> Figure:
     bodies, curves = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
     _draw_meshes(bodies, solved, rows, across)
     _draw_curves(curves, solved)
-    figure.suptitle("\n".join([*textwrap.wrap(title, 110), _facts(solved)]), fontsize=10, parse_math=False)
+    lines = [*textwrap.wrap(title, 110), _facts(solved), *_advice(solved)]
+    figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
     return figure
 
 
@@ -144,6 +145,12 @@ def _facts(solved: SolvedScene) -> str:
     )
     words = f"penalty {format_number(float(f'{solved.case.penalty:.4g}'))}; {moduli}"
     return "\n".join(textwrap.wrap(words, 110, max_lines=2, placeholder=" …"))
+
+
+def _advice(solved: SolvedScene) -> list[str]:
+    """Say what happened where Newton's method did not converge, and what to try next."""
+    advice = [f"{solution.formulation}: {solution.advice}" for solution in solved.solutions if solution.advice]
+    return [line for words in advice for line in textwrap.wrap(words, 110)]
 
 
 def _bare(axes: Axes, *, alone: bool) -> None:

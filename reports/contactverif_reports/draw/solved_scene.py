@@ -155,7 +155,7 @@ class SolvedScene:
         return along
 
     def points_along(self, points: PointPressures) -> tuple[FloatArray, FloatArray]:
-        """Return coordinates along the interface: of points (n_points,), and of the ends of their areas (n_points, 2)."""
+        """Return coordinates along the interface of points (n_points,) and of the ends of their areas (n_points, 2)."""
         ends = self.along[self.case.interface.slave.segments[points.segment]]  # (n_points, 2)
 
         def at(c: FloatArray, ends: FloatArray) -> FloatArray:
