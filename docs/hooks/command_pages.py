@@ -58,8 +58,10 @@ class Parameter:
 
     @property
     def flags(self) -> list[str]:
-        """The spellings of an option, `--name` where none is declared."""
-        return list(self.info.param_decls or [f"--{self.name.rstrip('_').replace('_', '-')}"])
+        """The spellings of an option; as in typer, `--name` is one if no long one is declared."""
+        declared = list(self.info.param_decls or [])
+        long = any(flag.startswith("--") for flag in declared)
+        return declared if long else [f"--{self.name.rstrip('_').replace('_', '-')}", *declared]
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:

@@ -15,11 +15,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return the text with a capital first letter and a full stop."""
+    """Return the text with a capital first letter, unless that is a symbol, and a full stop."""
     text = text.strip()
     if not text:
         return ""
-    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?…" else ".")
+    first = text[0].upper() if re.match(r"[a-z]{2}|a ", text) else text[0]
+    return first + text[1:] + ("" if text[-1] in ".!?…" else ".")
 
 
 def docstring_parts(thing: object) -> dict[str, str]:

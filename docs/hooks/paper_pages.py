@@ -27,7 +27,7 @@ def paper_page(root: Path) -> str:
         statements = tree["statements"].to_dataset().load()
     meanings = str(statements.verdict.attrs["flag_meanings"]).split()
     verdicts = [meanings[int(code)] for code in statements.verdict.values]
-    count = ", ".join(f"{verdicts.count(word)} {word.replace('_', ' ')}" for word in meanings if word in verdicts)
+    count = ", ".join(f"{word.replace('_', ' ')} {verdicts.count(word)}" for word in meanings if word in verdicts)
     rows = [
         [str(figure), plain(str(says)), plain(str(result)), f"**{word.replace('_', ' ')}**"]
         for figure, says, result, word in zip(
@@ -37,7 +37,7 @@ def paper_page(root: Path) -> str:
     text = [
         _introduction(readme),
         "## What the paper states\n",
-        f"Of {len(rows)} statements: {count}.\n",
+        f"{len(rows)} statements: {count}.\n",
         table(["in the paper", "the paper says", "computed here", "result"], rows),
         "## Figures\n",
     ]

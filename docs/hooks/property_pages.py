@@ -96,7 +96,8 @@ def _quantities(question: Property) -> list[str]:
 
 
 def _clauses(reason: str) -> list[str]:
-    return [clause.strip() for clause in reason.split(";") if clause.strip()]
+    """Return the sentences of a reason, or its parts between semicolons."""
+    return [clause.strip(" .") for clause in re.split(r";|\.(?= )", reason) if clause.strip(" .")]
 
 
 def _unit(unit: str) -> str:

@@ -219,7 +219,7 @@ def excerpt(output: str, patterns: str) -> str:
     """Return the pieces of an output whose first line matches one of the patterns; "…" stands for the others."""
     lines = [line.rstrip() for line in output.splitlines()]
     if patterns == "all":
-        return "\n".join(lines).strip("\n") + "\n"
+        return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n") + "\n"
     tests = [re.compile(pattern.strip()) for pattern in patterns.split(" | ")]
     excerpt_lines: list[str] = []
     for piece in _pieces(lines):
@@ -227,7 +227,7 @@ def excerpt(output: str, patterns: str) -> str:
             excerpt_lines += piece
         elif excerpt_lines and excerpt_lines[-1] != "…":
             excerpt_lines.append("…")
-    return "\n".join(excerpt_lines).strip("\n…") + "\n"
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(excerpt_lines)).strip("\n…") + "\n"
 
 
 def _pieces(lines: Sequence[str]) -> list[list[str]]:
