@@ -1,7 +1,10 @@
-"""One step of Newton's method: a linear system solved, its condition estimated, its rank told if it has multipliers.
+"""One linear system of Newton's method: its solution, an estimate of its condition, and the rank of its multipliers.
 
-Multipliers that are not unique (constraints that depend on one another) leave the positions unique. That is told by
-the number of multipliers too many, and the step has the shortest change of them; nothing else singular is solved.
+Multipliers that are not unique, because constraints depend on one another, leave the positions unique. Then the step
+has the shortest change of multipliers, and the number of multipliers too many is reported.
+
+Rule for the next editor: no other singular system is solved. A step that a singular matrix happens to give in floats is
+worse than none, because it looks like a solution.
 """
 
 from __future__ import annotations
@@ -16,22 +19,24 @@ from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 
-RANK_ROUNDOFF = 8.0  # of a singular value: how many units of roundoff, times the size of the matrix, count as zero
+# A singular value counts as zero if it is at most this many units of roundoff, times the size of the matrix, times the
+# largest one.
+RANK_ROUNDOFF = 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """What a linear system gave.
+    """The answer of a linear system.
 
     Attributes
     ----------
     change : FloatArray | None, shape (n,)
-        The step, None where the matrix has no inverse in floats.
+        The step; None if the matrix has no inverse in floats.
     condition : float
-        Estimate of 1/cond of the matrix, rows and columns of multipliers scaled; 0 where it has no inverse,
-        also where multipliers are not unique and there is a step all the same.
+        An estimate of 1/cond of the matrix, rows and columns of multipliers scaled. It is 0 if the matrix has no
+        inverse, even if multipliers are not unique and there is a step all the same.
     deficiency : int
-        How many of the multipliers are not unique.
+        The number of multipliers that are not unique.
     """
 
     change: FloatArray | None
@@ -40,26 +45,38 @@ class Step:
 
 
 def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None = None) -> Step:
-    """The solution of matrix · step = right.
+    """Solve matrix · step = right.
 
     Parameters
     ----------
-    matrix : Any, shape (n, n)
-        Dense or sparse.
+    matrix : FloatArray or scipy.sparse array, shape (n, n)
+        The derivative of the residual.
+    right : FloatArray, shape (n,)
+        The negative residual.
     n_positions : int
-        How many of the unknowns are positions; behind them are multipliers.
+        The number of unknowns that are positions; the multipliers come behind them.
     floor : FloatArray | None, shape (n,)
-        What roundoff makes of `right`. Constraints that depend on one another must not contradict one another
-        by more; zero by default.
+        The largest part of `right` that roundoff alone may cause; 0 by default. Constraints that depend on one another
+        must not contradict one another by more.
+
+    Returns
+    -------
+    Step
+        The step with the condition of the matrix.
     """
     if n_positions == len(right):
-        step, condition = _factorised(matrix, right)
+        step, condition = _factorise(matrix, right)
         singular = step is None or condition <= UNIT_ROUNDOFF * len(right) or not np.isfinite(step).all()
         return Step(None if singular else step, condition)
+    return _solve_saddle_point(matrix, right, n_positions, floor)
+
+
+def _solve_saddle_point(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None) -> Step:
+    """Solve a system with multipliers, whose constraints may depend on one another."""
     rows, columns = scale_factors(matrix, n_positions)
-    scaled = _scaled(matrix, rows, columns)
-    step, condition = _factorised(scaled, rows * right)
-    # a matrix whose rank is short may still have factors in floats, with a condition of some units of roundoff
+    scaled = _scale(matrix, rows, columns)
+    step, condition = _factorise(scaled, rows * right)
+    # A matrix of deficient rank may still have factors in floats, with a condition of some units of roundoff.
     if step is not None and condition > RANK_ROUNDOFF * UNIT_ROUNDOFF * len(right) and np.isfinite(step).all():
         return Step(columns * step, condition)
     if not np.isfinite(scaled.data if sparse.issparse(scaled) else scaled).all():
@@ -69,35 +86,49 @@ def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArr
 
 
 def scale_factors(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray]:
-    """(n,) factors of rows and of columns that make constraints and multipliers comparable with forces and positions.
+    """Return factors that make constraints and multipliers comparable with forces and positions.
 
-    A column's factor is the multiplier, a pressure or a force, that does as much as a unit of displacement.
+    Parameters
+    ----------
+    matrix : FloatArray or scipy.sparse array, shape (n, n)
+        The derivative of the residual.
+    n_positions : int
+        The number of unknowns that are positions.
+
+    Returns
+    -------
+    rows, columns : FloatArray, shape (n,)
+        The factors of rows and of columns, 1 for forces and positions. The factor of a multiplier's column is the
+        pressure or force that has as much effect as a unit of displacement.
     """
     bulk, transfer = abs(matrix[:n_positions, :n_positions]), abs(matrix[:n_positions, n_positions:])
     stiffest, widest = (float(part.max()) if min(part.shape) else 0.0 for part in (bulk, transfer))
     columns, rows = np.ones((2, matrix.shape[0]))
     if stiffest > 0 and widest > 0:
         columns[n_positions:] = stiffest / widest
-        constraints = abs(_scaled(matrix, rows, columns)[n_positions:])
+        constraints = abs(_scale(matrix, rows, columns)[n_positions:])
         largest = constraints.toarray().max(axis=1) if sparse.issparse(constraints) else constraints.max(axis=1)
         rows[n_positions:] = np.where(largest > 0, stiffest / np.where(largest > 0, largest, 1.0), 1.0)
     return rows, columns
 
 
-def _scaled(matrix: Any, rows: FloatArray, columns: FloatArray) -> Any:
+def _scale(matrix: Any, rows: FloatArray, columns: FloatArray) -> Any:
     if isinstance(matrix, np.ndarray):
         return rows[:, None] * matrix * columns
     return sparse.csr_array(sparse.diags_array(rows) @ matrix @ sparse.diags_array(columns))
 
 
 def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray) -> tuple[FloatArray | None, int]:
-    """The shortest solution, None where positions are not unique or nothing solves; how many multipliers are not."""
+    """Return the shortest solution and the number of multipliers that are not unique.
+
+    The solution is None if positions are not unique, or if constraints contradict one another.
+    """
     left, values, right_vectors = linalg.svd(dense(matrix))
     rank = int((values > RANK_ROUNDOFF * len(values) * UNIT_ROUNDOFF * values[0]).sum())
     deficiency = len(values) - rank
     if rank == 0:
         return None, deficiency
-    blur = RANK_ROUNDOFF * len(values) * UNIT_ROUNDOFF * values[0] / values[rank - 1]  # of computed singular vectors
+    blur = RANK_ROUNDOFF * len(values) * UNIT_ROUNDOFF * values[0] / values[rank - 1]  # Error of singular vectors.
     moving = np.abs(right_vectors[rank:, :n_positions]).max(initial=0.0)
     contradiction = np.abs(left[:, rank:].T @ right)
     rounding = np.abs(left[:, rank:].T) @ floor + blur * np.abs(right).max(initial=0.0)
@@ -108,11 +139,12 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
     return step, deficiency
 
 
-def _factorised(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
-    return (_dense if isinstance(matrix, np.ndarray) else _sparse)(matrix, right)
+def _factorise(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
+    """Return the solution, None if there is none, and an estimate of 1/cond."""
+    return (_solve_dense if isinstance(matrix, np.ndarray) else _solve_sparse)(matrix, right)
 
 
-def _dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
+def _solve_dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
     if not len(right):
         return right, 1.0
     if not np.isfinite(matrix).all():
@@ -125,27 +157,30 @@ def _dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, fl
     return step, float(condition)
 
 
-def _sparse(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
+def _solve_sparse(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
     try:
         factors = splu(matrix.tocsc())
-    except RuntimeError:  # scipy's word for an exactly singular matrix
+    except RuntimeError:  # The matrix is exactly singular.
         return None, 0.0
     step = factors.solve(right)
-    return step, float(1 / (abs(matrix).sum(axis=0).max() * _size_of_inverse(factors, matrix.shape[0], right, step)))
+    inverse_norm = _estimate_inverse_norm(factors, matrix.shape[0], right, step)
+    return step, float(1 / (abs(matrix).sum(axis=0).max() * inverse_norm))
 
 
-def _size_of_inverse(factors: Any, n: int, right: FloatArray, step: FloatArray) -> float:
-    """A lower bound of the one-norm of the inverse, rarely far below it; pivots alone do not tell a singular matrix.
+def _estimate_inverse_norm(factors: Any, n: int, right: FloatArray, step: FloatArray) -> float:
+    """Return a lower bound of the one-norm of the inverse, which is rarely far below it.
 
-    The largest of three: the estimate that begins with equal entries (one column, since more would be random ones),
-    which misses what is orthogonal to them; as in LAPACK's dlacn2 the growth of a vector of alternating signs; and that
-    of the right-hand side.
+    Pivots alone do not reveal a singular matrix. The bound is the largest of three growths: that of equal entries (one
+    column, since more would be random), which misses what is orthogonal to them; that of a vector of alternating signs,
+    as in LAPACK's dlacn2; and that of the right-hand side.
 
-    Source: Higham, ACM Trans. Math. Software 14 (1988) 381–396.
+    References
+    ----------
+    Higham, ACM Trans. Math. Software 14 (1988) 381–396.
     """
     inverse = LinearOperator((n, n), factors.solve, lambda v: factors.solve(v, "T"), dtype=np.float64)
     alternating = np.where(np.arange(n) % 2, -1.0, 1.0) * (1 + np.arange(n) / max(n - 1, 1))
-    found = [float(onenormest(inverse, t=1)), 2 * float(np.abs(factors.solve(alternating)).sum()) / (3 * n)]
+    growths = [float(onenormest(inverse, t=1)), 2 * float(np.abs(factors.solve(alternating)).sum()) / (3 * n)]
     if right.any():
-        found.append(float(np.abs(step).sum() / np.abs(right).sum()))
-    return max(found)
+        growths.append(float(np.abs(step).sum() / np.abs(right).sum()))
+    return max(growths)

@@ -1,8 +1,11 @@
-"""Newton's method on the unknowns of a scene, with its whole trace. That it does not converge is data, not an error.
+"""Newton's method on the unknowns of a scene, with its whole trace.
 
-No line search: what is traced is the method as a finite element code would run it with this formulation's tangent. With
-multipliers the unknowns u are those of the scene, q, and behind them the multipliers: a saddle point. Which constraints
-are active is decided anew at each iterate, by the pairing.
+The method is plain Newton, without line search, as a finite element code would run it with this formulation's tangent.
+The active set is decided anew at each iterate, by the pairing. With multipliers the unknowns u are those of the scene,
+q, and the multipliers behind them; the system is a saddle point.
+
+Rule for the next editor: a solution that does not converge is data, not an error. Every iterate is recorded, `End` says
+how the iteration ended, and only a plugin that breaks the contract raises an exception.
 """
 
 from __future__ import annotations
@@ -23,16 +26,30 @@ from contactverif.mechanics import linear
 from contactverif.mechanics.scene import Scene
 
 MAX_ITERATIONS = 40
-ROUNDOFF_FACTOR = 8.0  # of a residual: how many units of roundoff of its largest terms count as zero
-STAGNATION_ITERATIONS = 4  # iterations without a smaller residual
-NEAR_CONVERGENCE = 1e3  # roundoffs above convergence: what stops there is cancellation that we do not know of
-DIVERGENCE_FACTOR = 1e8  # times the first residual, or the size of the interface: it will not come back
+ROUNDOFF_FACTOR = 8.0  # A residual is zero if it is at most this many units of roundoff of its largest terms.
+STAGNATION_ITERATIONS = 4  # Newton's method stagnates if the residual has not decreased in so many iterations.
+# A residual within this factor of the roundoff that counts as converged is nearly converged: cancellation that the
+# bound does not know of may keep it there.
+NEAR_CONVERGENCE = 1e3
+# Newton has diverged once the residual exceeds the first one, or the iterate the size of the interface, by this factor.
+DIVERGENCE_FACTOR = 1e8
 
-TIMED_PARTS = ("pair", "residual", "tangent", "solve")  # of the time
+TIMED_PARTS = ("pair", "residual", "tangent", "solve")
 
 
 class End(IntEnum):
-    """How a solution ended. The numbers are those of a report."""
+    """The way in which Newton's method ended. The numbers are those of a report.
+
+    `label` is short, for a table; `advice` says what happened and what to try next.
+
+    Examples
+    --------
+    >>> from contactverif import End
+    >>> End.CYCLE.label
+    '2-cycle'
+    >>> End.SINGULAR.advice
+    'the matrix has no inverse: is anything in contact? Lower a body until it touches'
+    """
 
     CONVERGED = 0
     CYCLE = 1
@@ -43,16 +60,16 @@ class End(IntEnum):
 
     @property
     def label(self) -> str:
-        """Short, for a table."""
-        return _WORDS[self][0]
+        """A few words for a table."""
+        return _TEXTS[self][0]
 
     @property
     def advice(self) -> str:
-        """What happened, and what to try next."""
-        return _WORDS[self][1]
+        """One sentence that says what happened, and what to try next."""
+        return _TEXTS[self][1]
 
 
-_WORDS = {
+_TEXTS = {
     End.CONVERGED: ("converged", "the residual is down to its own roundoff"),
     End.CYCLE: ("2-cycle", "two states and their pairings take turns; move the node that sits on a decision"),
     End.STAGNATED: ("stagnated at roundoff", "the residual stays just above its roundoff; look at cancellation"),
@@ -64,35 +81,49 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """A solution, iterate by iterate; all iterates of all load steps in one row.
+    """The whole history of a solution by Newton's method, iterate by iterate; `solve` returns it.
+
+    The iterates of all load steps stand in one row. The last entry of each array belongs to the last iterate.
 
     Attributes
     ----------
     scene : Scene
-        What was solved.
+        The scene that was solved.
     end : End
-        How it ended.
+        How the iteration ended.
     u : FloatArray, shape (n_iterates, n_free + n_multipliers)
-        Unknowns: those of the scene, and multipliers behind them.
+        The unknowns: those of the scene, q, and the multipliers behind them.
     factors : FloatArray, shape (n_iterates,)
-        Share of loads and imposed displacements, 1 at the last load step.
+        The share of loads and imposed displacements, 1 in the last load step.
     residuals : FloatArray, shape (n_iterates,)
-        Largest entry of S q − g + R, a force; where there are multipliers, of the constraint rows too, each
-        with the factor that makes it comparable (`linear.scale_factors`).
+        The largest entry of the residual S q − g + R, a force. With multipliers, the constraint rows count too, each
+        with the factor that makes it comparable, see `contactverif.mechanics.linear.scale_factors`.
     energies : FloatArray, shape (n_iterates,)
-        |Δq · residual| of the step that was taken from there, an energy; NaN at the last.
+        |Δu · residual| of the step that was taken from the iterate, an energy; NaN at the last iterate.
     floors : FloatArray, shape (n_iterates,)
-        What roundoff alone makes of the residual, a force.
+        The part of the residual that roundoff alone may cause, a force.
     roundings : FloatArray, shape (n_iterates,)
-        Largest entry of the residual over what roundoff makes of that entry; up to 1 is converged.
+        The largest ratio of an entry of the residual to what roundoff may cause in that entry. Up to 1 is converged.
     changes : IntArray, shape (n_iterates,)
-        Entries of the pairing that differ from the iterate before; −1 where there is no pairing or none before.
+        The number of entries of the pairing that differ from those of the iterate before; −1 where there is no pairing,
+        or no iterate before.
     conditions : FloatArray, shape (n_iterates,)
-        Estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last.
+        An estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last iterate.
     deficiencies : IntArray, shape (n_iterates,)
-        How many multipliers were not unique in the step from there, 0 where none was taken.
+        The number of multipliers that were not unique in the step from the iterate; 0 where none was taken.
     seconds : dict[str, float]
-        {"pair", "residual", "tangent", "solve"}: time spent in each.
+        The time spent in "pair", "residual", "tangent" and "solve".
+
+    Examples
+    --------
+    >>> from contactverif import load_formulation, load_scene, solve
+    >>> scene, subject = load_scene("c-prime"), load_formulation("vts-ppt")
+    >>> trace = solve(scene, subject.for_case(scene.case()))
+    >>> trace.converged, trace.n_iterations, trace.end.label
+    (True, 1, 'converged')
+    >>> stresses = scene.stresses(trace.solution)  # one array (n_cells, n_points, 3) for each body
+    >>> abs(stresses[0][..., 1] + 100.0).max() < 1e-9  # the stress across the interface is minus the pressure
+    np.True_
     """
 
     scene: Scene
@@ -110,17 +141,17 @@ class Trace:
 
     @property
     def converged(self) -> bool:
-        """Whether the last iterate is a solution."""
+        """True if the last iterate is a solution."""
         return self.end is End.CONVERGED
 
     @property
     def n_iterations(self) -> int:
-        """Linear systems solved."""
+        """The number of linear systems that were solved."""
         return int(np.isfinite(self.energies).sum())
 
     @property
     def q(self) -> FloatArray:
-        """The unknowns of the scene (n_iterates, n_free)."""
+        """The unknowns of the scene at each iterate (n_iterates, n_free)."""
         return self.u[:, : self.scene.n_free]
 
     @property
@@ -131,24 +162,47 @@ class Trace:
 
     @property
     def multipliers(self) -> FloatArray:
-        """At the last iterate (n_multipliers,)."""
+        """The multipliers at the last iterate (n_multipliers,)."""
         last: FloatArray = self.u[-1, self.scene.n_free :]
         return last
 
     @property
     def deficiency(self) -> int:
-        """How many multipliers were not unique, in any step."""
+        """The largest number of multipliers that were not unique in a step."""
         return int(self.deficiencies.max(initial=0))
 
     @property
     def z(self) -> FloatArray:
-        """The state of the interface at the last iterate: positions (n_unknowns,), multipliers behind them."""
+        """The state of the interface at the last iterate: positions (n_unknowns,), then multipliers."""
         return np.concatenate([self.scene.positions(self.solution, float(self.factors[-1])), self.multipliers])
 
 
 @dataclass(slots=True)
 class System:
-    """The equations S q − g + R(z(u)) = 0 of a scene and a formulation, and what evaluating them costs."""
+    """The equations S q − g + R(z(u)) = 0 of a scene and a formulation.
+
+    S is the stiffness of the bodies, g their load, and R the contact forces on the unknowns. The scene's symbols are
+    those of `contactverif.mechanics.scene`.
+
+    Attributes
+    ----------
+    scene : Scene
+        The bodies.
+    formulation : CheckedFormulation
+        The formulation with its penalty.
+    factor : float
+        The share of loads and imposed displacements.
+    use_tangent : bool
+        False differentiates the residual on the frozen pairing, even if the formulation has a tangent.
+    seconds : dict[str, float]
+        The time spent in "pair", "residual", "tangent" and "solve" so far.
+    n_multipliers : int
+        The number of multipliers of the formulation on the scene's interface.
+    transformation : FloatArray or scipy.sparse array, shape (n_unknowns + n_multipliers, n)
+        The scene's transformation from unknowns to positions, with the multipliers behind both.
+    stiffness : FloatArray or scipy.sparse array, shape (n, n)
+        The scene's stiffness, 0 for multipliers.
+    """
 
     scene: Scene
     formulation: CheckedFormulation
@@ -173,23 +227,23 @@ class System:
 
     @property
     def size(self) -> int:
-        """Number of unknowns u."""
+        """The number n of unknowns u: n_free + n_multipliers."""
         return self.scene.n_free + self.n_multipliers
 
     def state(self, u: FloatArray) -> FloatArray:
-        """What a formulation is asked about: positions, multipliers behind them."""
+        """Return the state z that a formulation gets at the unknowns u (n,): positions, then multipliers."""
         n_free = self.scene.n_free
         return np.concatenate([self.scene.positions(u[:n_free], self.factor), u[n_free:]])
 
     def pair(self, u: FloatArray) -> Pairing | None:
-        """Who touches whom at u."""
+        """Return the pairing at the unknowns u (n,), None if the formulation has none."""
         start = perf_counter()
         pairing = self.formulation.pair(self.scene.interface, self.state(u))
         self.seconds["pair"] += perf_counter() - start
         return pairing
 
     def residual(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
-        """(n,) forces that are not in balance, and constraints that are not met."""
+        """Return the residual (n,) at the unknowns u (n,): forces out of balance, then constraint rows."""
         start = perf_counter()
         n_free = self.scene.n_free
         forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
@@ -199,9 +253,23 @@ class System:
         return residual
 
     def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
-        """Derivative (n, n) of the residual, and what the roundoff of positions and forces makes of the residual (n,).
+        """Return the derivative of the residual, and the part of the residual that roundoff alone may cause.
 
-        A formulation without a tangent is differentiated on the frozen pairing.
+        The residual of a formulation without a tangent is differentiated on the frozen pairing.
+
+        Parameters
+        ----------
+        u : FloatArray, shape (n,)
+            The unknowns.
+        pairing : Pairing | None
+            The frozen pairing.
+
+        Returns
+        -------
+        matrix : FloatArray or scipy.sparse array, shape (n, n)
+            The derivative.
+        floor : FloatArray, shape (n,)
+            The effect of the roundoff of positions and forces on each entry of the residual.
         """
         start = perf_counter()
         scene, n_free, z = self.scene, self.scene.n_free, self.state(u)
@@ -212,10 +280,10 @@ class System:
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
         contact = self.transformation.T @ tangent @ self.transformation
         matrix = self.stiffness + contact
-        # a gap is rounded like the largest coordinate, also where the node that it is measured from moves no force
+        # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
         sizes = np.full(self.size, np.abs(z[: scene.interface.n_unknowns]).max())
-        sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # also of one that is let go
-        # and a force along an inclined normal is rounded in both of its components
+        sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
+        # A force along an inclined normal is rounded in both of its components.
         forces = abs(self.transformation).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
         terms = abs(contact) @ sizes + forces
         terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + self.factor * np.abs(scene.load)
@@ -223,19 +291,19 @@ class System:
         return matrix, ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
-        """The solution of matrix · step = right; `floor` (n,) is what roundoff makes of the right-hand side."""
+        """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
         start = perf_counter()
         step = linear.solve_step(matrix, right, self.scene.n_free, floor)
         self.seconds["solve"] += perf_counter() - start
         return step
 
     def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
-        """Derivative (n_unknowns, n_unknowns) of the contact forces at the state z, by central differences."""
+        """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""
         n_positions = self.scene.interface.n_unknowns
         positions, multipliers = z[:n_positions], z[n_positions:]
         shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
         steps = np.full(z.size, shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3))
-        if len(multipliers):  # all is linear in them: a step as large as they are, or as the bodies are stiff
+        if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
             steps[n_positions:] = max(np.abs(multipliers).max(), abs(self.scene.stiffness).max(initial=1.0))
         shifts = np.diag(steps)
         states = np.concatenate([z + shifts, z - shifts])
@@ -256,29 +324,44 @@ def solve(
     iterations: int = MAX_ITERATIONS,
     use_tangent: bool = True,
 ) -> Trace:
-    """Solve the scene with full Newton steps, in one load step unless more are asked for.
+    """Solve a scene by Newton's method with full steps.
 
     Parameters
     ----------
+    scene : Scene
+        Bodies, supports and loads. Its own penalty is not used here.
     formulation : CheckedFormulation
-        With its penalty, `subject.for_case(case)` or `subject.with_penalty(…)`.
-    start : FloatArray | None, shape (n_free,)
-        First iterate, or (n_free + n_multipliers,); the scene's own by default, and no multipliers.
+        The formulation with its penalty: ``subject.for_case(scene.case())`` takes the penalty of the scene,
+        ``subject.with_penalty(…)`` any other.
+    start : FloatArray | None, shape (n_free,) or (n_free + n_multipliers,)
+        The first iterate; by default the first guess of the scene, and no multipliers.
     load_steps : int
-        Loads and imposed displacements grow in that many equal steps, each solved from the one before.
+        The number of equal steps in which loads and imposed displacements grow. Each starts from the solution before.
     iterations : int
-        Linear systems solved at most, in each load step.
+        The largest number of linear systems in each load step.
     use_tangent : bool
-        The formulation's, if it has one; else its residual is differentiated on the frozen pairing.
+        True uses the tangent of the formulation, if it has one. False differentiates its residual on the frozen
+        pairing.
+
+    Returns
+    -------
+    Trace
+        Every iterate, and how the iteration ended: a solution that does not converge raises no exception.
 
     Raises
     ------
+    MisuseError
+        If `load_steps` or `iterations` is below 1, or `start` has another shape or is not finite.
     ContractError
-        What the plugin raises or breaks.
+        If the plugin breaks the contract, or raises an exception itself.
+
+    See Also
+    --------
+    Trace : The result, with an example.
     """
-    if load_steps < 1 or iterations < 1:
-        name, number = ("load_steps", load_steps) if load_steps < 1 else ("iterations", iterations)
-        raise MisuseError(name, f"{number}", "at least 1")
+    for name, number in (("load_steps", load_steps), ("iterations", iterations)):
+        if number < 1:
+            raise MisuseError(name, f"{number}", "at least 1")
     system, record = System(scene, formulation, use_tangent=use_tangent), _Record()
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
@@ -297,16 +380,17 @@ def solve(
 
 
 def _load_step(system: System, record: _Record, u: FloatArray, iterations: int) -> tuple[End, FloatArray]:
+    """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
     first, before, n_free = len(record.u), None, system.scene.n_free
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
         if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= DIVERGENCE_FACTOR * size):
-            return End.DIVERGED, u  # no plugin is asked about such a state
+            return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
         residual = system.residual(u, pairing)
         matrix, floor = system.matrix(u, pairing)
         comparable = linear.scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
-        record.add(u, system.factor, residual, floor, comparable, _changed(pairing, before))
+        record.add(u, system.factor, residual, floor, comparable, _count_changes(pairing, before))
         end = _end(record, first, n_free)
         if end is not None:
             return end, u
@@ -318,12 +402,12 @@ def _load_step(system: System, record: _Record, u: FloatArray, iterations: int) 
             return End.SINGULAR, u
         record.energies[-1] = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
-    raise AssertionError("the loop ends by itself")
+    raise AssertionError("the loop returns")
 
 
 @dataclass(slots=True)
 class _Record:
-    """A trace in the making."""
+    """The trace of a solution that is still running."""
 
     u: list[FloatArray] = field(default_factory=list)
     factors: list[float] = field(default_factory=list)
@@ -342,7 +426,7 @@ class _Record:
         self.factors.append(factor)
         self.residuals.append(float(np.abs(comparable * residual).max(initial=0.0)))
         self.floors.append(float((comparable * floor).max(initial=0.0)))
-        with np.errstate(divide="ignore"):  # an entry without any term has no roundoff, and nothing but zero will do
+        with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
             roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
         self.roundings.append(float(roundings.max(initial=0.0)))
         self.changes.append(changes)
@@ -368,25 +452,30 @@ class _Record:
 
 
 def _end(record: _Record, first: int, n_free: int) -> End | None:
-    """What the iterates of a load step, which begin at `first`, say about its end; None to go on."""
+    """Return how the load step whose iterates begin at number `first` has ended, None if it goes on."""
     residuals, roundings = record.residuals[first:], record.roundings[first:]
-    q = [u[:n_free] for u in record.u[first:]]
     if roundings[-1] <= 1:
         return End.CONVERGED
     if not np.isfinite(residuals[-1]) or residuals[-1] > DIVERGENCE_FACTOR * max(residuals[0], record.floors[first]):
         return End.DIVERGED
-    if len(q) > 4:
-        back, steps = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)], np.abs(q[-1] - q[-2]).max()
-        if max(back) <= 2.0**-20 * steps and min(roundings[-4:]) > NEAR_CONVERGENCE:
-            return End.CYCLE
+    if _alternates([u[:n_free] for u in record.u[first:]]) and min(roundings[-4:]) > NEAR_CONVERGENCE:
+        return End.CYCLE
     earlier, latest = roundings[:-STAGNATION_ITERATIONS], roundings[-STAGNATION_ITERATIONS:]
     if earlier and min(latest) >= min(earlier) <= NEAR_CONVERGENCE:
         return End.STAGNATED
     return None
 
 
-def _changed(pairing: Pairing | None, before: Pairing | None) -> int:
-    """Entries that differ, or all of them where shapes do."""
+def _alternates(q: list[FloatArray]) -> bool:
+    """Return whether the last four iterates are two states that alternate."""
+    if len(q) <= 4:
+        return False
+    returns = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)]
+    return bool(max(returns) <= 2.0**-20 * np.abs(q[-1] - q[-2]).max())
+
+
+def _count_changes(pairing: Pairing | None, before: Pairing | None) -> int:
+    """Return how many entries of the pairing differ; an entry of another shape counts with its size."""
     if pairing is None or before is None:
         return -1
     return sum(

@@ -130,10 +130,7 @@ def block(
     >>> scene.interface.n_slave_nodes, scene.n_free
     (3, 4)
     """
-    x, y = (as_floats(f"{name}: {argument}", getattr(rectangle, argument), (-1,)) for argument in ("x", "y"))
-    for argument, values in (("x", x), ("y", y)):
-        if len(values) < 2 or not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
-            raise MisuseError(f"{name}: {argument}", f"{values.tolist()}", "at least two ascending coordinates")
+    x, y = _grid_lines(f"{name}: x", rectangle.x), _grid_lines(f"{name}: y", rectangle.y)
     axis = as_floats(f"{name}: axis", placing.axis, (2,))
     as_floats(f"{name}: shift", placing.shift, (2,))
     if contact not in ("bottom", "top"):
@@ -212,6 +209,14 @@ def rigid_surface(
         axis=np.asarray(axis, dtype=np.float64),
         name=name,
     )
+
+
+def _grid_lines(argument: str, values: ArrayLike) -> FloatArray:
+    """Return ascending coordinates (n,) as floats, checked."""
+    coordinates = as_floats(argument, values, (-1,))
+    if len(coordinates) < 2 or not (np.isfinite(coordinates).all() and (np.diff(coordinates) > 0).all()):
+        raise MisuseError(argument, f"{coordinates.tolist()}", "at least two ascending coordinates")
+    return coordinates
 
 
 def _quadrilaterals(number: IntArray) -> IntArray:
