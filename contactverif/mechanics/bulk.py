@@ -1,8 +1,9 @@
-"""What an elastic body does under load: stiffness, condensation onto its contact boundary, and recovery of the inside.
+"""The mechanics of one elastic body: stiffness, condensation onto its contact boundary, and recovery of the inside.
 
-scikit-fem gives meshes, shape functions and quadrature; the form of linear elasticity is contracted here in one go over
-all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene.
-The stiffness knows nothing of any contact formulation: its nodal forces judge them all.
+scikit-fem gives meshes, shape functions and quadrature. The form of linear elasticity is contracted here in one step
+over all cells, because a loop over pairs of shape functions takes longer than all the rest of a small scene.
+
+Rule for the next editor: the stiffness knows nothing of any contact formulation, since its nodal forces judge them all.
 """
 
 from __future__ import annotations
@@ -19,32 +20,35 @@ from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 from skfem.quadrature import get_quadrature
 
-from contactverif.contract.arrays import FloatArray, IntArray, dense
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
-CACHE_SIZE = 512  # condensed bodies, so that penalties and formulations of one run share them
-DENSE_LIMIT = 600  # unknowns up to which a matrix without structure is as quick to factorise
-_LEFT = 2.0**-40  # of a diagonal entry after elimination: less than 1e2 u of a loose part, 1e6 u of a long thin bar
-_FREE = 1e-9  # of a rigid motion of the body's size: less resistance is none
-_PART = 1e-6  # of a loose motion: a smaller part of it is not worth a word
-_MODES = ("move along its first axis", "move along its second axis", "turn")
+CACHE_SIZE = 512  # Number of condensed bodies that are remembered: penalties and formulations of one run share them.
+DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is factorised as fast as a sparse one.
+# A pivot below this share of its diagonal entry is zero: a loose part leaves less than 1e2 u, a long thin bar 1e6 u.
+_PIVOT_FLOOR = 2.0**-40
+_RESISTANCE_FLOOR = 1e-9  # A rigid motion of the body's size that meets less resistance than this is free.
+_MOTION_FLOOR = 1e-6  # A smaller part of a free motion is not mentioned.
+_MOTIONS = ("move along its first axis", "move along its second axis", "turn")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CondensedBody:
-    """A body as its contact boundary feels it: S q − g are the forces that somebody else must bring.
+    """A body condensed onto its contact boundary. S q − g are the forces that contact must supply.
+
+    `condense` makes one.
 
     Attributes
     ----------
     body : Body
-        Whose.
+        The body.
     unknowns : IntArray, shape (n,)
-        Free components on the contact boundary, 2 × node + component in the body's axes.
+        The free components on the contact boundary: 2 × node + component, in the body's axes.
     stiffness : FloatArray, shape (n, n)
-        S, symmetric.
+        The condensed stiffness S, symmetric, force per length.
     load : FloatArray, shape (n,)
-        g, of nodal forces and of imposed displacements.
+        The condensed load g, a force, of nodal forces and of imposed displacements.
     """
 
     body: Body
@@ -52,12 +56,25 @@ class CondensedBody:
     stiffness: FloatArray
     load: FloatArray
     _interior: IntArray
-    _particular: FloatArray  # displacements (2 n_nodes,) where all unknowns are 0
-    _influence: FloatArray  # of the unknowns on the interior (n_interior, n)
-    _gradients: FloatArray  # (n_cells, n_points, n_corners, 2), in the body's axes
+    _particular: FloatArray  # (2 n_nodes,): the displacements if all unknowns are 0.
+    _influence: FloatArray  # (n_interior, n): the effect of the unknowns on the interior.
+    _gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Displacements (n_nodes, 2) in global axes at the unknowns q (n,), loads and supports × factor."""
+        """Return the displacements of all nodes.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        FloatArray, shape (n_nodes, 2)
+            The displacements, a length each, in global axes.
+        """
         u = factor * self._particular
         u[self._interior] += self._influence @ q
         u[self.unknowns] = q
@@ -65,7 +82,21 @@ class CondensedBody:
         return displacements
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Stresses (n_cells, n_points, 3) at the Gauss points: along, across and shear, in the body's axes."""
+        """Return the stresses at the Gauss points.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        FloatArray, shape (n_cells, n_points, 3)
+            Normal stress along the first axis, normal stress across it, and shear stress, in the body's axes; force per
+            length squared, positive in tension.
+        """
         u = (self.displacements(q, factor) @ self.body.frame)[self.body.cells]  # (n_cells, n_corners, 2)
         gradient = np.einsum("eqad,eac->eqcd", self._gradients, u)
         strain = np.stack(
@@ -76,20 +107,25 @@ class CondensedBody:
 
 
 def elasticity(body: Body) -> FloatArray:
-    """The matrix (3, 3) from strains (along, across, shear angle) to stresses in plane strain."""
+    """Return the matrix (3, 3) from strains (along, across, shear angle) to stresses in plane strain."""
     lame = body.young * body.poisson / ((1 + body.poisson) * (1 - 2 * body.poisson))
     shear = body.young / (2 * (1 + body.poisson))
     return np.array([[lame + 2 * shear, lame, 0], [lame, lame + 2 * shear, 0], [0, 0, shear]])
 
 
-def stiffness(body: Body) -> tuple[Any, FloatArray]:
-    """K (2 n_nodes, 2 n_nodes) in the body's axes, and the gradients of shape functions at the Gauss points.
+def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
+    """Assemble the stiffness matrix of a body.
 
-    K is an array where that is small, else a sparse one.
+    Returns
+    -------
+    matrix : FloatArray or scipy.sparse array, shape (2 n_nodes, 2 n_nodes)
+        The stiffness K in the body's axes: dense up to `DENSE_LIMIT` unknowns, else sparse.
+    gradients : FloatArray, shape (n_cells, n_points, n_corners, 2)
+        The gradients of the shape functions at the Gauss points, in the body's axes.
     """
-    gradients, areas = _shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
+    gradients, areas = _evaluate_shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
     n_cells, n_points, n_corners, _ = gradients.shape
-    unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # strains of unit displacements
+    unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # Strains of unit displacements.
     unit[:, :, 0, :, 0] = unit[:, :, 2, :, 1] = gradients[..., 0]
     unit[:, :, 1, :, 1] = unit[:, :, 2, :, 0] = gradients[..., 1]
     strains = unit.reshape(n_cells, n_points, 3, 2 * n_corners)
@@ -103,19 +139,19 @@ def stiffness(body: Body) -> tuple[Any, FloatArray]:
     return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), gradients
 
 
-def _shapes(body: Body) -> tuple[FloatArray, FloatArray]:
-    """Gradients of the shape functions in the body's axes, and weights × areas, at the Gauss points of each cell."""
-    reference, weights = _reference(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
+def _evaluate_shapes(body: Body) -> tuple[FloatArray, FloatArray]:
+    """Return gradients of the shape functions, in the body's axes, and weights × areas at the Gauss points."""
+    reference, weights = _reference_cell(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
     corners = (body.nodes @ body.frame)[body.cells]  # (n_cells, n_corners, 2)
     jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
-    (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # written out, so that another unit of length changes no bit
+    (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # Written out, so that another unit of length changes no bit.
     areas = (a * d - b * c) * weights
     return np.matmul(reference, np.linalg.inv(jacobians)), areas
 
 
 @cache
-def _reference(corners: int) -> tuple[FloatArray, FloatArray]:
-    """Gradients of the shape functions on scikit-fem's reference cell at its Gauss points, and their weights."""
+def _reference_cell(corners: int) -> tuple[FloatArray, FloatArray]:
+    """Return gradients of the shape functions on scikit-fem's reference cell at its Gauss points, and weights."""
     element, order = (skfem.ElementTriP1(), 1) if corners == 3 else (skfem.ElementQuad1(), 2)
     points, weights = get_quadrature(element.refdom, order)
     gradients = np.stack([element.lbasis(points, corner)[1] for corner in range(corners)])  # (n_corners, 2, n_points)
@@ -123,7 +159,7 @@ def _reference(corners: int) -> tuple[FloatArray, FloatArray]:
 
 
 def free_on_contact(body: Body) -> IntArray:
-    """Free components (n,) on the contact boundary, 2 × node + component in the body's axes, ascending."""
+    """Return the free components (n,) on the contact boundary: 2 × node + component, in the body's axes, ascending."""
     on_contact = np.zeros(body.fixed.shape, bool)
     on_contact[body.contact_nodes] = True
     return np.flatnonzero((on_contact & ~body.fixed).reshape(-1))
@@ -131,12 +167,24 @@ def free_on_contact(body: Body) -> IntArray:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def condense(body: Body) -> CondensedBody:
-    """The body condensed onto the free components of its contact boundary; once for each body.
+    """Condense a body onto the free components of its contact boundary.
+
+    The answer is remembered, so that a body is condensed once.
+
+    Parameters
+    ----------
+    body : Body
+        An elastic or a rigid body. A rigid one has no unknowns.
+
+    Returns
+    -------
+    CondensedBody
+        Stiffness and load on the contact boundary, and whatever is needed to recover the interior.
 
     Raises
     ------
     MisuseError
-        If a part of the body hangs on nothing even while its contact boundary is held.
+        If a part of the body is held neither by a support nor by the contact boundary.
     """
     unknowns = free_on_contact(body)
     free = ~body.fixed.reshape(-1)
@@ -146,51 +194,56 @@ def condense(body: Body) -> CondensedBody:
     if body.rigid:
         none = np.zeros((0, 0))
         return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
-    matrix, gradients = stiffness(body)
+    matrix, gradients = assemble_stiffness(body)
     forces = body.load.reshape(-1) - matrix @ imposed
     across = matrix[interior][:, unknowns]
-    solved = _solved(body, matrix[interior][:, interior], np.column_stack([dense(across), forces[interior]]))
-    influence, own = -solved[:, :-1], solved[:, -1]
+    responses = _solve_interior(body, matrix[interior][:, interior], np.column_stack([dense(across), forces[interior]]))
+    influence, response = -responses[:, :-1], responses[:, -1]
     particular = imposed.copy()
-    particular[interior] = own
+    particular[interior] = response
     condensed = dense(matrix[unknowns][:, unknowns]) + across.T @ influence
-    load = forces[unknowns] - across.T @ own
+    load = forces[unknowns] - across.T @ response
     return CondensedBody(
         body, unknowns, (condensed + condensed.T) / 2, load, interior, particular, influence, gradients
     )
 
 
-def _solved(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
-    """The interior's answer (n_interior, …) to unit displacements of the unknowns and to loads."""
+def _solve_interior(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
+    """Return the displacements of the interior (n_interior, n_right) under the forces `right`."""
     if not len(right):
         return right
     if sparse.issparse(matrix):
         try:
             factors = splu(matrix.tocsc())
-        except RuntimeError:  # scipy's word for an exactly singular matrix
-            raise _loose(body) from None
-        left = np.abs(factors.U.diagonal()[factors.perm_c])
+        except RuntimeError:  # The matrix is exactly singular.
+            raise _loose_part_error(body) from None
+        pivots = np.abs(factors.U.diagonal()[factors.perm_c])
         answer: FloatArray = factors.solve(right)
     else:
         factor, info = lapack.dpotrf(matrix, lower=1)
         if info != 0:
-            raise _loose(body)
-        left = factor.diagonal() ** 2
+            raise _loose_part_error(body)
+        pivots = factor.diagonal() ** 2
         answer, _ = lapack.dpotrs(factor, right, lower=1)
-    if not (left > _LEFT * matrix.diagonal()).all():
-        raise _loose(body)
+    if not (pivots > _PIVOT_FLOOR * matrix.diagonal()).all():
+        raise _loose_part_error(body)
     return answer
 
 
-def _loose(body: Body) -> MisuseError:
-    found = "a part that hangs neither on a support nor on the contact boundary"
-    return MisuseError(f"{body.name}: cells", found, "one connected mesh, or supports for each part")
+def _loose_part_error(body: Body) -> MisuseError:
+    actual = "a part that hangs neither on a support nor on the contact boundary"
+    return MisuseError(f"{body.name}: cells", actual, "one connected mesh, or supports for each part")
 
 
 def loose_modes(body: Body) -> list[str]:
-    """How the body can move as a rigid one though neither its supports nor contact without friction resist, in words.
+    """Return the rigid motions of a body that neither its supports nor frictionless contact resist, in words.
 
-    A motion that has no component along the normal of any contact edge is resisted by no contact.
+    Contact resists a motion only if the motion has a component along the normal of a contact edge.
+
+    Returns
+    -------
+    list[str]
+        Any of "move along its first axis", "move along its second axis" and "turn"; empty if the body is held.
     """
     nodes = body.nodes @ body.frame
     centre, size = nodes.mean(axis=0), np.ptp(nodes, axis=0).max()
@@ -204,9 +257,11 @@ def loose_modes(body: Body) -> list[str]:
     resisted = np.concatenate([modes[body.fixed], *pressed])
     _, sizes, motions = np.linalg.svd(resisted, full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])
-    # motions are numbers without dimension, of order 1: what resists by less than _FREE resists by roundoff
-    free = motions[sizes <= _FREE * max(sizes.max(), 1.0)]
-    return [words for words, part in zip(_MODES, free.T, strict=True) if len(free) and np.abs(part).max() > _PART]
+    # Motions are numbers without dimension, of order 1: resistance below the floor is roundoff.
+    free = motions[sizes <= _RESISTANCE_FLOOR * max(sizes.max(), 1.0)]
+    return [
+        words for words, part in zip(_MOTIONS, free.T, strict=True) if len(free) and np.abs(part).max() > _MOTION_FLOOR
+    ]
 
 
 def body_from_mesh(
@@ -216,70 +271,109 @@ def body_from_mesh(
     supports: Mapping[str, Literal["along", "across", "both"]],
     young: float = 1.0,
     poisson: float = 0.0,
-    moved: Mapping[str, tuple[float, float]] | None = None,
+    displacements: Mapping[str, tuple[float, float]] | None = None,
     pressures: Mapping[str, float] | None = None,
     name: str = "mesh",
 ) -> Body:
-    """A body from a scikit-fem mesh of first-order triangles or quadrilaterals with named boundaries.
+    """Return a body from a scikit-fem mesh of first-order triangles or quadrilaterals with named boundaries.
 
     Parameters
     ----------
-    mesh : Any
-        `skfem.MeshTri` or `skfem.MeshQuad`.
+    mesh : skfem.MeshTri or skfem.MeshQuad
+        The mesh. ``mesh.with_boundaries({name: function})`` names its boundaries.
     contact : str
         The boundary that may touch something.
     supports : Mapping[str, Literal['along', 'across', 'both']]
-        {boundary: which components are fixed}, "along" the x-axis, "across" it, or both.
-    moved : Mapping[str, tuple[float, float]] | None
-        {boundary of supports: displacement (2,)} where it is not 0.
+        The components that are fixed on each supported boundary: "along" the x-axis, "across" it, or "both".
+    young : float
+        Young's modulus E > 0, force per length squared.
+    poisson : float
+        Poisson's ratio, −1 < ν < 1/2.
+    displacements : Mapping[str, tuple[float, float]] | None
+        The displacement (along, across), a length each, of each supported boundary that moves.
     pressures : Mapping[str, float] | None
-        {boundary: pressure}, towards the body.
+        The pressure on each loaded boundary, force per length, positive towards the body.
+    name : str
+        The name of the body in messages and drawings.
+
+    Returns
+    -------
+    Body
+        The body on the nodes and cells of the mesh; its axes are x and y.
 
     Raises
     ------
     MisuseError
-        If the mesh has no such boundary, or as `Body` does.
+        If the mesh has no such boundary, a displacement is imposed where nothing is fixed, or as `Body` does.
+
+    Examples
+    --------
+    >>> import numpy as np, skfem
+    >>> from contactverif import body_from_mesh
+    >>> mesh = skfem.MeshTri().refined(2).with_boundaries({"low": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
+    >>> body = body_from_mesh(mesh, contact="low", supports={"top": "both"}, displacements={"top": (0.0, -0.1)})
+    >>> len(body.contact), body.fixed.sum()
+    (4, np.int64(10))
     """
     if getattr(mesh, "elem", None) not in (skfem.ElementTriP1, skfem.ElementQuad1):
         raise MisuseError("mesh", f"a {type(mesh).__name__}", "a MeshTri or a MeshQuad of first order")
-    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
-    corners = points[cells]
-    cells = np.where((_signed_areas(corners) < 0)[:, None], cells[:, ::-1], cells)
     if not isinstance(supports, Mapping):
         raise MisuseError("supports", f"a {type(supports).__name__}", "{boundary: 'along', 'across' or 'both'}")
-    edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *(pressures or {})])}
+    displacements, pressures = displacements or {}, pressures or {}
+    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
+    cells = np.where((_signed_areas(points[cells]) < 0)[:, None], cells[:, ::-1], cells)
+    edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *pressures])}
+    fixed, imposed = _supports(points, edges, supports, displacements)
+    load = _loads(points, edges, pressures)
+    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
+
+
+def _supports(
+    points: FloatArray,
+    edges: Mapping[str, IntArray],
+    supports: Mapping[str, str],
+    displacements: Mapping[str, tuple[float, float]],
+) -> tuple[BoolArray, FloatArray]:
+    """Return which components are fixed, and the displacements imposed there, both (n_nodes, 2)."""
     fixed, imposed = np.zeros(points.shape, bool), np.zeros(points.shape)
-    for tag, which in supports.items():
-        components = {"along": [0], "across": [1], "both": [0, 1]}.get(which)
+    for tag, direction in supports.items():
+        components = {"along": [0], "across": [1], "both": [0, 1]}.get(direction)
         if components is None:
-            raise MisuseError(f"supports[{tag!r}]", repr(which), "'along', 'across' or 'both'")
-        held, move = np.unique(edges[tag]), _moved(tag, (moved or {}).get(tag, (0.0, 0.0)), components)
+            raise MisuseError(f"supports[{tag!r}]", repr(direction), "'along', 'across' or 'both'")
+        nodes = np.unique(edges[tag])
+        displacement = _check_displacement(tag, displacements.get(tag, (0.0, 0.0)), components)
         for component in components:
-            fixed[held, component] = True
-            imposed[held, component] = move[component]
-    if loose := set(moved or {}) - set(supports):
-        raise MisuseError(f"moved[{min(loose)!r}]", "no supports there", "a boundary that supports name")
+            fixed[nodes, component] = True
+            imposed[nodes, component] = displacement[component]
+    if unsupported := set(displacements) - set(supports):
+        needed = "a boundary that supports name"
+        raise MisuseError(f"displacements[{min(unsupported)!r}]", "no supports there", needed)
+    return fixed, imposed
+
+
+def _loads(points: FloatArray, edges: Mapping[str, IntArray], pressures: Mapping[str, float]) -> FloatArray:
+    """Return the nodal forces (n_nodes, 2) of pressures on boundaries."""
     load = np.zeros(points.shape)
-    for tag, pressure in (pressures or {}).items():
+    for tag, pressure in pressures.items():
         if np.ndim(pressure) != 0 or np.asarray(pressure).dtype.kind not in "fiu":
             raise MisuseError(f"pressures[{tag!r}]", repr(pressure), "a number")
         first, second = edges[tag].T
         along = points[second] - points[first]
         for end in (first, second):
             np.add.at(load, end, pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]]))
-    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
+    return load
 
 
-def _moved(tag: str, move: Any, components: list[int]) -> FloatArray:
-    """The displacement (2,) of a boundary, 0 where nothing is fixed."""
+def _check_displacement(tag: str, values: Any, components: list[int]) -> FloatArray:
+    """Return the displacement (2,) of a boundary, checked: 0 where nothing is fixed."""
     try:
-        displacement = np.array(move, dtype=np.float64)
+        displacement = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         displacement = np.zeros(0)
     if displacement.shape != (2,):
-        raise MisuseError(f"moved[{tag!r}]", repr(move), "two numbers, along and across")
+        raise MisuseError(f"displacements[{tag!r}]", repr(values), "two numbers, along and across")
     if displacement[[component for component in (0, 1) if component not in components]].any():
-        raise MisuseError(f"moved[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
+        raise MisuseError(f"displacements[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
     return displacement
 
 
@@ -290,11 +384,11 @@ def _signed_areas(corners: FloatArray) -> FloatArray:
 
 
 def _edges(mesh: Any, cells: IntArray, tag: str) -> IntArray:
-    """The edges (n, 2) of a named boundary, each with its cell on the left."""
+    """Return the edges (n, 2) of a named boundary, each with its cell on the left."""
     tags = getattr(mesh, "boundaries", None) or {}
     if tag not in tags:
-        there = f"one of {', '.join(sorted(tags))}" if tags else "a mesh with named boundaries (mesh.with_boundaries)"
-        raise MisuseError("mesh", f"no boundary {tag!r}", there)
+        needed = f"one of {', '.join(sorted(tags))}" if tags else "a mesh with named boundaries (mesh.with_boundaries)"
+        raise MisuseError("mesh", f"no boundary {tag!r}", needed)
     if not len(tags[tag]):
         raise MisuseError("mesh", f"no edges on boundary {tag!r}", "a boundary that has some")
     wanted = {tuple(sorted(edge)) for edge in np.asarray(mesh.facets).T[np.asarray(tags[tag])].tolist()}

@@ -1,14 +1,16 @@
-"""A scene: elastic bodies around an interface, as little of them as can matter, and how a `Case` keeps it.
+"""A scene: elastic bodies around an interface, and how a `Case` stores it.
 
-Bodies are condensed onto their contact boundaries, so that what remains are the free components q of the nodes there.
-A body that no other can reach is no part of the interface and none of q: nothing of it is visited while contact is
-solved.
+Symbols: q are the unknowns of a scene, the free components of the nodes on the contact boundaries; S is the stiffness
+and g the load of the bodies, condensed onto q; z are the positions of the interface's nodes.
+
+Rules for the next editor: a body that no other can reach is no part of the interface and has none of the unknowns, so
+nothing of it is visited while contact is solved. A case that holds a scene gives the same scene back to the last bit.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -22,30 +24,45 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import CACHE_SIZE, DENSE_LIMIT, CondensedBody, condense, free_on_contact, loose_modes
 
-_BODIES = "bodies_"  # before the names of the parameters of a case that hold its bodies
+_BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodies.
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Bodies, and which of them are slave and master.
+    """Elastic or rigid bodies in contact: a boundary value problem that `solve` solves with any formulation.
 
     Attributes
     ----------
     bodies : tuple[Body, ...]
-        All of them, those out of reach too.
+        All bodies, including those that nothing can reach.
     slave, master : tuple[int, ...]
-        Indices of bodies; every body is one or the other.
+        The indices of the slave bodies and of the master bodies. Every body is one or the other.
     penalty : float
-        Ε̂ that the scene is solved with unless somebody says otherwise.
+        The distributed stiffness ε̂ of `case`, force per length per length of penetration.
     facts : Mapping[str, FloatArray]
-        What is known exactly, arrays by name; they become parameters of a case.
+        Whatever is known exactly about the solution, arrays by name. They become parameters of the case.
     name : str
-        Of the scene on the command line, empty if it is a random one.
+        The name of the scene on the command line; empty for a random scene.
 
     Raises
     ------
     MisuseError
-        If a body is neither or both, or can move as a rigid one though nothing resists.
+        If a body is neither slave nor master, or both, or if a body can move as a rigid one and nothing resists.
+
+    See Also
+    --------
+    load_scene : A scene by its name on the command line.
+    two_blocks : Two blocks, one on the other.
+    block, rigid_surface, body_from_mesh : Bodies.
+
+    Examples
+    --------
+    >>> from contactverif import Rectangle, Scene, block, rigid_surface
+    >>> punch = block(Rectangle([0, 1, 2], [0, 1]), contact="bottom", approach=0.1, name="punch")
+    >>> floor = rigid_surface([[3, 0], [-1, 0]], name="floor")
+    >>> scene = Scene((punch, floor), penalty=100.0)
+    >>> scene.interface.n_nodes, scene.n_free
+    (5, 4)
     """
 
     bodies: tuple[Body, ...]
@@ -57,31 +74,36 @@ class Scene:
 
     def __post_init__(self) -> None:
         if sorted((*self.slave, *self.master)) != list(range(len(self.bodies))):
-            found = f"slave {self.slave} and master {self.master} of {len(self.bodies)} bodies"
-            raise MisuseError("bodies", found, "each body either slave or master, and at least one of both")
+            roles = f"slave {self.slave} and master {self.master} of {len(self.bodies)} bodies"
+            raise MisuseError("bodies", roles, "each body either slave or master, and at least one of both")
         if not self.slave or not self.master:
             raise MisuseError("bodies", "no slave" if not self.slave else "no master", "at least one of both")
         for body in self.bodies:
             if loose := loose_modes(body):
-                held = "fixed components that prevent it (contact without friction does not)"
+                needed = "fixed components that prevent it (contact without friction does not)"
                 supports = "no supports" if not body.fixed.any() else "supports"
-                raise MisuseError(f"supports of {body.name}", f"{supports}: it can {' and '.join(loose)}", held)
+                raise MisuseError(f"supports of {body.name}", f"{supports}: it can {' and '.join(loose)}", needed)
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:
-        """The bodies that another side's body can reach, slaves first.
+        """The indices of the bodies that a body of the other side can reach, slaves first.
 
-        Two bodies reach each other if the boxes around their contact boundaries, each widened by its own diagonal, meet
-        where the bodies start or where they lie.
+        Two bodies can reach each other if the boxes around their contact boundaries meet. Each box is widened by its
+        own diagonal, and holds both the reference and the first guess.
+
+        Raises
+        ------
+        MisuseError
+            If no slave can reach a master.
         """
-        boxes = [_reach(body) for body in self.bodies]
+        boxes = [_box_in_reach(body) for body in self.bodies]
 
-        def meet(one: int, other: int) -> bool:
-            (low, high), (other_low, other_high) = boxes[one], boxes[other]
+        def meet(first: int, second: int) -> bool:
+            (low, high), (other_low, other_high) = boxes[first], boxes[second]
             return bool((low <= other_high).all() and (other_low <= high).all())
 
-        slaves = tuple(one for one in self.slave if any(meet(one, other) for other in self.master))
-        masters = tuple(one for one in self.master if any(meet(one, other) for other in self.slave))
+        slaves = tuple(body for body in self.slave if any(meet(body, other) for other in self.master))
+        masters = tuple(body for body in self.master if any(meet(body, other) for other in self.slave))
         if not slaves:
             raise MisuseError("bodies", "no slave within reach of a master", "bodies that can touch")
         return slaves + masters
@@ -107,23 +129,23 @@ class Scene:
 
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
-        """What q is made of: the free components on the contact boundary of each body within reach."""
+        """The unknowns of each body within reach: 2 × node + component of what is free on its contact boundary."""
         return tuple(free_on_contact(self.bodies[index]) for index in self.bodies_in_reach)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
-        """Where each body within reach has its unknowns in q."""
+        """The slice of q that holds the unknowns of each body within reach."""
         ends = np.cumsum([0, *map(len, self.unknowns)]).tolist()
         return tuple(slice(start, end) for start, end in itertools.pairwise(ends))
 
     @property
     def n_free(self) -> int:
-        """Number of unknowns q."""
+        """The number of unknowns q."""
         return self.slices[-1].stop if self.slices else 0
 
     @cached_property
     def stiffness(self) -> FloatArray | sparse.csr_array:
-        """(n_free, n_free) of all bodies within reach: dense where that is small, else sparse."""
+        """The stiffness S (n_free, n_free) of all bodies within reach: dense if it is small, else sparse."""
         blocks = [body.stiffness for body in self.condensed_bodies]
         if self.n_free <= DENSE_LIMIT:
             matrix: FloatArray = linalg.block_diag(*blocks)
@@ -132,12 +154,15 @@ class Scene:
 
     @cached_property
     def load(self) -> FloatArray:
-        """(n_free,) forces of loads and imposed displacements."""
+        """The load g (n_free,), a force: that of nodal forces and of imposed displacements."""
         return np.concatenate([body.load for body in self.condensed_bodies])
 
     @cached_property
     def transformation(self) -> FloatArray | sparse.csr_array:
-        """(n_unknowns of the interface, n_free): what unit values of q do to the positions."""
+        """The matrix (n_unknowns of the interface, n_free) from unknowns q to changes of the positions z.
+
+        Its transpose takes nodal forces to forces on q. It is dense up to `DENSE_LIMIT` unknowns, else sparse.
+        """
         rows, columns, values = [], [], []
         first = 0
         for index, unknowns, part in zip(self.bodies_in_reach, self.unknowns, self.slices, strict=True):
@@ -159,72 +184,160 @@ class Scene:
 
     @cached_property
     def imposed_displacements(self) -> FloatArray:
-        """(n_unknowns,) what the imposed displacements do to the positions."""
+        """The change (n_unknowns,) of the positions z by the imposed displacements, a length each."""
         bodies = [self.bodies[index] for index in self.bodies_in_reach]
         parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in bodies]
         return np.vstack(parts).reshape(-1)
 
     @cached_property
     def start(self) -> FloatArray:
-        """(n_free,) the first guess of q."""
+        """The first guess (n_free,) of q."""
         pairs = zip(self.bodies_in_reach, self.unknowns, strict=True)
         return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Current positions (n_unknowns,), flat, with imposed displacements × factor."""
+        """Return the current positions of the interface's nodes.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n_free,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        FloatArray, shape (n_unknowns,)
+            The positions z, flat, a length each.
+        """
         positions: FloatArray = (
             self.interface.nodes.reshape(-1) + factor * self.imposed_displacements + self.transformation @ q
         )
         return positions
 
     def bulk_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """S q − g (n_free,): the forces that contact must bring, by the bodies alone."""
+        """Return S q − g: the forces that contact must supply.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n_free,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        FloatArray, shape (n_free,)
+            The forces on the unknowns.
+        """
         forces: FloatArray = self.stiffness @ q - factor * self.load
         return forces
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """The same on the nodes of the interface (n_nodes, 2), in global axes; without what supports there take."""
+        """Return the forces that contact must supply, at the nodes of the interface.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n_free,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        FloatArray, shape (n_nodes, 2)
+            The forces in global axes, without the reactions of supports on the contact boundary.
+        """
         forces: FloatArray = (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
         return forces
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Of the nodes of every body (n_nodes, 2), in global axes; a body out of reach is solved on its own."""
-        return [body.displacements(own, factor) for body, own in self._every(q, factor)]
+        """Return the displacements of all bodies; a body out of reach is solved on its own.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n_free,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        list[FloatArray], each of shape (n_nodes, 2)
+            The displacements of the nodes of each body, a length each, in global axes.
+        """
+        return [body.displacements(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """At the Gauss points of every body (n_cells, n_points, 3): along, across and shear, in the body's axes."""
-        return [body.stresses(own, factor) for body, own in self._every(q, factor)]
+        """Return the stresses of all bodies at their Gauss points.
+
+        Parameters
+        ----------
+        q : FloatArray, shape (n_free,)
+            The unknowns, a length each.
+        factor : float
+            The share of loads and imposed displacements.
+
+        Returns
+        -------
+        list[FloatArray], each of shape (n_cells, n_points, 3)
+            For each body the normal stresses along its first and second axis and the shear stress, force per length
+            squared, positive in tension; a rigid body has no cells.
+        """
+        return [body.stresses(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def case(self, *, seed: int = 0) -> Case:
-        """The scene as a case, at the first guess of its solution."""
-        arrays = {_BODIES + name: values for name, values in _packed(self).items()}
+        """Return the scene as a case, at the first guess of its solution.
+
+        Parameters
+        ----------
+        seed : int
+            The seed of the case.
+
+        Returns
+        -------
+        Case
+            The case holds the whole scene; `scene_of` gives it back.
+        """
+        arrays = {_BODIES + name: values for name, values in _pack(self).items()}
         z = self.positions(self.start)
         return Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
 
-    def _every(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
-        own = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
+    def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
+        """Return every body with its unknowns; those of a body out of reach are solved for here."""
+        unknowns = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
         pairs = []
         for index, body in enumerate(self.bodies):
             condensed = condense(body)
-            if index not in own:
-                own[index] = _alone(condensed, factor)
-            pairs.append((condensed, own[index]))
+            if index not in unknowns:
+                unknowns[index] = _solve_alone(condensed, factor)
+            pairs.append((condensed, unknowns[index]))
         return pairs
 
 
 def has_bodies(case: Case) -> bool:
-    """Whether the case holds a scene."""
+    """Return whether the case holds a scene."""
     return f"{_BODIES}nodes" in case.parameters
 
 
 @lru_cache(maxsize=CACHE_SIZE)
 def scene_of(case: Case) -> Scene:
-    """The scene that `Scene.case` made a case of.
+    """Return the scene of a case that `Scene.case` made.
+
+    Parameters
+    ----------
+    case : Case
+        A case that holds bodies.
+
+    Returns
+    -------
+    Scene
+        The scene; bodies that two cases share are two bodies here.
 
     Raises
     ------
     MisuseError
-        If the case holds none.
+        If the case holds no bodies.
     """
     if not has_bodies(case):
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")
@@ -232,11 +345,12 @@ def scene_of(case: Case) -> Scene:
         name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
     }
     facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
-    bodies, slave, master = _unpacked(packed)
+    bodies, slave, master = _unpack(packed)
     return Scene(bodies, slave, master, case.penalty, facts, case.name)
 
 
-def _reach(body: Body) -> tuple[FloatArray, FloatArray]:
+def _box_in_reach(body: Body) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of the box around the contact boundary, widened by its diagonal."""
     nodes, frame = body.nodes[body.contact_nodes], body.frame
     moves = body.start if not body.rigid else body.imposed[body.contact_nodes].mean(axis=0)
     places = np.vstack([nodes, nodes + frame @ moves])
@@ -245,52 +359,59 @@ def _reach(body: Body) -> tuple[FloatArray, FloatArray]:
     return low - diagonal, high + diagonal
 
 
-def _alone(condensed: CondensedBody, factor: float) -> FloatArray:
-    """The unknowns of a body that touches nothing."""
+def _solve_alone(condensed: CondensedBody, factor: float) -> FloatArray:
+    """Return the unknowns (n,) of a body that touches nothing."""
     if not len(condensed.unknowns):
         return np.zeros(0)
     stiffnesses, modes = linalg.eigh(condensed.stiffness)
     if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
-        found = "not enough to hold a body that can touch nothing"
-        raise MisuseError(f"supports of {condensed.body.name}", found, "supports against every motion")
+        actual = "not enough to hold a body that can touch nothing"
+        raise MisuseError(f"supports of {condensed.body.name}", actual, "supports against every motion")
     alone: FloatArray = modes @ (modes.T @ (factor * condensed.load) / stiffnesses)
     return alone
 
 
-def _packed(scene: Scene) -> dict[str, FloatArray]:
-    """All bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
+def _pack(scene: Scene) -> dict[str, FloatArray]:
+    """Return all bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
     bodies = scene.bodies
-    first = np.cumsum([0, *(len(body.nodes) for body in bodies)]).tolist()
-    cells = [np.pad(body.cells, ((0, 0), (0, 4 - body.cells.shape[1])), constant_values=-1) for body in bodies]
-    cells = [np.where(numbers < 0, -1, numbers + start) for numbers, start in zip(cells, first, strict=False)]
+    counts = [len(body.nodes) for body in bodies]
+    first = np.cumsum([0, *counts[:-1]]).tolist()
+    contact = [body.contact + start for body, start in zip(bodies, first, strict=True)]
+    stacks = {name: np.vstack([getattr(body, name) for body in bodies]) for name in ("nodes", "imposed", "load")}
+    rows = {name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")}
     return {
-        "nodes": np.vstack([body.nodes for body in bodies]),
-        "cells": np.vstack(cells).astype(np.float64),
-        "contact": np.vstack([body.contact + start for body, start in zip(bodies, first, strict=False)]).astype(float),
+        "nodes": stacks["nodes"],
+        "cells": _pack_cells(bodies, first),
+        "contact": np.vstack(contact).astype(np.float64),
         "fixed": np.vstack([body.fixed for body in bodies]).astype(np.float64),
-        "imposed": np.vstack([body.imposed for body in bodies]),
-        "load": np.vstack([body.load for body in bodies]),
-        "count": np.array([len(body.nodes) for body in bodies], dtype=np.float64),
+        "imposed": stacks["imposed"],
+        "load": stacks["load"],
+        "count": np.array(counts, dtype=np.float64),
         "is_slave": np.array([index in scene.slave for index in range(len(bodies))], dtype=np.float64),
-        "young": np.array([body.young for body in bodies]),
-        "poisson": np.array([body.poisson for body in bodies]),
-        "axis": np.array([body.axis for body in bodies]),
-        "start": np.array([body.start for body in bodies]),
+        **rows,
     }
 
 
-def _unpacked(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], tuple[int, ...], tuple[int, ...]]:
+def _pack_cells(bodies: Sequence[Body], first: Sequence[int]) -> FloatArray:
+    """Return the cells of all bodies (n_cells, 4), each body's nodes numbered from its first."""
+    cells = [np.pad(body.cells, ((0, 0), (0, 4 - body.cells.shape[1])), constant_values=-1) for body in bodies]
+    numbers = [np.where(corners < 0, -1, corners + start) for corners, start in zip(cells, first, strict=True)]
+    return np.vstack(numbers).astype(np.float64)
+
+
+def _unpack(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], tuple[int, ...], tuple[int, ...]]:
+    """Return bodies, slave indices and master indices from the arrays that `_pack` made."""
     count = packed["count"].astype(np.int64)
     ends = np.cumsum(count).tolist()
     cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
     bodies = []
     for index, (start, end) in enumerate(zip([0, *ends], ends, strict=False)):
-        own = cells[(cells[:, 0] >= start) & (cells[:, 0] < end)] if len(cells) else cells.reshape(0, 4)
-        own = own[:, :3] if len(own) and (own[:, 3] < 0).all() else own
+        corners = cells[(cells[:, 0] >= start) & (cells[:, 0] < end)] if len(cells) else cells.reshape(0, 4)
+        corners = corners[:, :3] if len(corners) and (corners[:, 3] < 0).all() else corners
         bodies.append(
             Body(
                 nodes=packed["nodes"][start:end],
-                cells=own - start,
+                cells=corners - start,
                 contact=contact[(contact[:, 0] >= start) & (contact[:, 0] < end)] - start,
                 young=float(packed["young"][index]),
                 poisson=float(packed["poisson"][index]),

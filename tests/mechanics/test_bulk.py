@@ -17,7 +17,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import bulk
-from contactverif.mechanics.bulk import body_from_mesh, condense, loose_modes, stiffness
+from contactverif.mechanics.bulk import assemble_stiffness, body_from_mesh, condense, loose_modes
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.scenes.blocks import exact_unknowns, two_blocks
@@ -89,7 +89,7 @@ def size_over_cell(body: Body) -> float:
 
 @every_body
 def test_the_stiffness_is_that_of_skfem(body: Body) -> None:
-    matrix = dense(stiffness(body)[0])
+    matrix = dense(assemble_stiffness(body)[0])
     turn = np.kron(np.eye(len(body.nodes)), body.frame)  # from the body's axes to the global ones
     expected = turn.T @ by_skfem(body) @ turn
     # differences of coordinates lose X/h
@@ -98,7 +98,7 @@ def test_the_stiffness_is_that_of_skfem(body: Body) -> None:
 
 @every_body
 def test_rigid_motions_cost_no_energy(body: Body) -> None:
-    matrix = dense(stiffness(body)[0])
+    matrix = dense(assemble_stiffness(body)[0])
     x, y = (body.nodes @ body.frame).T
     for motion in ((1 + 0 * x, 0 * x), (0 * x, 1 + 0 * x), (-y, x)):
         u = np.column_stack(motion).reshape(-1)
@@ -341,7 +341,7 @@ def edges_at(body: Body) -> list[list[list[float]]]:
 def test_a_body_from_quadrilaterals() -> None:
     body = made(
         supports={"top": "across", "left": "along", "right": "both"},
-        moved={"top": (0.0, -0.25)},
+        displacements={"top": (0.0, -0.25)},
         pressures={"left": 2.0},
         young=3.0,
         poisson=0.25,
@@ -375,8 +375,8 @@ def test_clockwise_cells_are_turned() -> None:
     turned[:, 1] = turned[::-1, 1]
     mixed = skfem.MeshQuad(QUADS.p, turned).with_defaults()
     assert (mixed.t[:, 1] != QUADS.t[:, 1]).any()
-    difference = dense(stiffness(made(mixed))[0]) - dense(stiffness(made())[0])
-    assert np.abs(difference).max() <= 4 * UNIT_ROUNDOFF * stiffness(made())[0].max()
+    difference = dense(assemble_stiffness(made(mixed))[0]) - dense(assemble_stiffness(made())[0])
+    assert np.abs(difference).max() <= 4 * UNIT_ROUNDOFF * assemble_stiffness(made())[0].max()
     assert edges_at(made(mixed)) == edges_at(made())
 
 
@@ -387,7 +387,7 @@ def test_a_body_from_a_mesh_is_the_block_of_the_same_grid() -> None:
     assert np.array_equal(meshed.fixed[order], drawn.fixed)
     assert np.array_equal(meshed.load[order], drawn.load)
     unknowns = (2 * np.array(order)[:, None] + np.arange(2)).reshape(-1)
-    ours, theirs = dense(stiffness(drawn)[0]), dense(stiffness(meshed)[0])[np.ix_(unknowns, unknowns)]
+    ours, theirs = dense(assemble_stiffness(drawn)[0]), dense(assemble_stiffness(meshed)[0])[np.ix_(unknowns, unknowns)]
     assert np.abs(ours - theirs).max() <= 4 * UNIT_ROUNDOFF * ours.max()
 
 
@@ -404,16 +404,22 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "word": ({"supports": {"top": "all"}}, "supports['top']: found 'all'; needed 'along', 'across' or 'both'"),
     "list": ({"supports": ["top"]}, "supports: found a list; needed {boundary: 'along', 'across' or 'both'}"),
-    "moved where not held": (
-        {"moved": {"left": (0, 1)}},
-        "moved['left']: found no supports there; needed a boundary that supports name",
+    "displaced where not held": (
+        {"displacements": {"left": (0, 1)}},
+        "displacements['left']: found no supports there; needed a boundary that supports name",
     ),
-    "moved where free": (
-        {"supports": {"top": "across"}, "moved": {"top": (1, 0)}},
-        "moved['top']: found a displacement of a free component; needed 0 where nothing is fixed",
+    "displaced where free": (
+        {"supports": {"top": "across"}, "displacements": {"top": (1, 0)}},
+        "displacements['top']: found a displacement of a free component; needed 0 where nothing is fixed",
     ),
-    "moved by one": ({"moved": {"top": (1,)}}, "moved['top']: found (1,); needed two numbers, along and across"),
-    "moved by nan": ({"moved": {"top": (np.nan, 0)}}, "mesh: imposed: found NaN or infinity; needed finite numbers"),
+    "displaced by one": (
+        {"displacements": {"top": (1,)}},
+        "displacements['top']: found (1,); needed two numbers, along and across",
+    ),
+    "displaced by nan": (
+        {"displacements": {"top": (np.nan, 0)}},
+        "mesh: imposed: found NaN or infinity; needed finite numbers",
+    ),
     "pressed by nan": ({"pressures": {"top": np.nan}}, "mesh: load: found NaN or infinity; needed finite numbers"),
     "pressed by text": ({"pressures": {"top": "1"}}, "pressures['top']: found '1'; needed a number"),
     "empty contact": (
