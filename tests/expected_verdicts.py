@@ -1,7 +1,8 @@
-"""What theory says of each formulation and each property, and the same as the table in `properties/README.md`.
+"""The verdict that theory expects for each formulation and property; the table in `properties/README.md` shows it.
 
-`python tests/expected_verdicts.py` writes the table anew; `test_verdicts.py` holds it against what is found, and
-against the file.
+`python tests/expected_verdicts.py` writes the table anew. `test_verdicts.py` compares it with what the harness finds,
+and with the file. Rule for the next editor: change an entry only with a reason from theory, never because a run
+differs.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ PATCHES = frozenset({FLAT, DEAD_ZONE}) | SOLVED
 INEXACT = frozenset({TANGENT, "newton.order", "newton.history"})
 PRINTED = frozenset({FORCE, MOMENT, DEAD_ZONE})
 
-# What each does not do; everything else that it is asked it does.
+# The properties that each formulation fails. It passes all others that apply.
 FAILS: Mapping[str, frozenset[str]] = {
     "nts": PATCHES,
     "nts-ar": PATCHES,
@@ -51,48 +52,53 @@ FAILS: Mapping[str, frozenset[str]] = {
     "chen-hisada": frozenset({DEAD_ZONE}),
 }
 
-# What makes no sense to ask: springs at nodes have no area, springs that act twice no total; springs no multipliers.
+# Formulations that a property cannot judge: nodal springs have no area, and springs that act twice have no total.
 WITHOUT_AREA = ("nts", "nts-lm", "two-pass/nts", "two-pass/nts-ar", "two-pass/nts-lm")
 WITH_MULTIPLIERS = ("nts-lm", "vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm", "mortar-lm", "mortar-dual-lm")
-NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # multipliers: Newton has nothing to converge to
+NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # With redundant multipliers Newton has no limit.
+NEEDS_MULTIPLIERS = frozenset({RANK, COMPLEMENTARITY})
+NEEDS_SOLUTION = frozenset({"newton.order", "newton.history", COMPLEMENTARITY})
 
 MARKS = {Verdict.PASS: "✓", Verdict.FAIL: "✗", Verdict.NOT_APPLICABLE: "·"}
 
 
-def expected(name: str, property_id: str) -> Verdict:
-    """The verdict on a formulation."""
-    if property_id == RESULTANT and name in WITHOUT_AREA:
-        return Verdict.NOT_APPLICABLE
-    if property_id == RANK and name not in WITH_MULTIPLIERS:
-        return Verdict.NOT_APPLICABLE
-    if property_id == COMPLEMENTARITY and name not in WITH_MULTIPLIERS:
-        return Verdict.NOT_APPLICABLE
-    if (property_id.startswith("newton.") or property_id == COMPLEMENTARITY) and name in NOT_UNIQUE:
+def applies(name: str, property_id: str) -> bool:
+    """Return whether the property makes sense for the formulation."""
+    if property_id in NEEDS_MULTIPLIERS and name not in WITH_MULTIPLIERS:
+        return False
+    if property_id in NEEDS_SOLUTION and name in NOT_UNIQUE:
+        return False
+    return not (property_id == RESULTANT and name in WITHOUT_AREA)
+
+
+def expected_verdict(name: str, property_id: str) -> Verdict:
+    """Return the verdict that theory expects."""
+    if not applies(name, property_id):
         return Verdict.NOT_APPLICABLE
     return Verdict.FAIL if property_id in FAILS[name] else Verdict.PASS
 
 
 def matrix() -> str:
-    """The table in Markdown: a row for each formulation, a column for each property."""
+    """Return the table in Markdown: a row for each formulation, a column for each property."""
     ids = property_ids()
     heads = [property_id.replace(".", ".<br>") for property_id in ids]
     lines = [f"| | {' | '.join(heads)} |", f"|---|{':-:|' * len(ids)}"]
     for name in FAILS:
-        marks = [MARKS[expected(name, property_id)] for property_id in ids]
+        marks = [MARKS[expected_verdict(name, property_id)] for property_id in ids]
         lines.append(f"| `{name}` | {' | '.join(marks)} |")
     return "\n".join(lines)
 
 
-def written() -> str:
-    """What stands in the file."""
+def table_in_readme() -> str:
+    """Return the table that the file holds."""
     return README.read_text().partition(BEGIN)[2].partition(END)[0].strip()
 
 
-def rewrite() -> None:
-    """Puts the table into the file."""
+def write_table() -> None:
+    """Write the table into the file."""
     before, _, rest = README.read_text().partition(BEGIN)
     README.write_text(f"{before}{BEGIN}\n{matrix()}\n{END}{rest.partition(END)[2]}")
 
 
 if __name__ == "__main__":
-    rewrite()
+    write_table()

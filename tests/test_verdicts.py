@@ -1,9 +1,11 @@
-"""What the issue wants to see: what each formulation does, and that a promise which is not true is found out."""
+"""The verdicts on all formulations that we ship, and broken promises of formulations that claim something else.
+
+`expected_verdicts.py` holds the verdicts that theory expects.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -20,52 +22,41 @@ from expected_verdicts import (
     RANK,
     RESULTANT,
     TANGENT,
-    expected,
+    expected_verdict,
     matrix,
-    written,
+    table_in_readme,
 )
 from expected_verdicts import FLAT as PATCH
+from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, Property, Verdict
+from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
 from contactverif.oracle import projection_cases
-from contactverif.run.registry import load_formulation, load_properties, property_ids, standalone_names
+from contactverif.run.registry import load_properties, property_ids, standalone_names
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case
 
 SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verify --all --profile ci` asks.
 
 
-def the_property(property_id: str) -> Property:
-    (found,) = load_properties([property_id])
-    assert isinstance(found, Property)
-    return found
-
-
-def the_formulation(name: str) -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject), found
-    return found
-
-
 @cache
-def answers(property_id: str) -> Mapping[str, Row]:
-    """What each formulation does on the same 100 random cases; where something failed, the smallest mesh too."""
-    found = run([the_formulation(name) for name in FAILS], [the_property(property_id)], examples=100, seed=SEED)
-    assert found.passed
-    return {row.formulation: row for row in found.rows}
+def judge_all(property_id: str) -> Mapping[str, Row]:
+    """Return the row of each formulation over the same 100 random cases, with the smallest mesh of those that fail."""
+    result = run([load_subject(name) for name in FAILS], [load_property(property_id)], examples=100, seed=SEED)
+    assert result.passed
+    return {row.formulation: row for row in result.rows}
 
 
-def asked(name: str, property_id: str) -> Row:
-    return answers(property_id)[name]
+def row_of(name: str, property_id: str) -> Row:
+    return judge_all(property_id)[name]
 
 
-def measured(outcome: Outcome | None) -> Measurement:
+def measurement_of(outcome: Outcome | None) -> Measurement:
     assert outcome is not None
     assert outcome.measurement is not None, outcome.reason
     return outcome.measurement
@@ -76,11 +67,11 @@ def test_every_formulation_is_in_the_table() -> None:
 
 
 @pytest.mark.parametrize(
-    "property_id", [pytest.param(one, marks=pytest.mark.xdist_group(one)) for one in property_ids()]
+    "property_id", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in property_ids()]
 )
 @pytest.mark.parametrize("name", FAILS)
 def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> None:
-    row, verdict = asked(name, property_id), expected(name, property_id)
+    row, verdict = row_of(name, property_id), expected_verdict(name, property_id)
     assert row.verdict is verdict, row.reason
     assert not row.unexpected
     if verdict is not Verdict.NOT_APPLICABLE:
@@ -90,105 +81,87 @@ def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> No
 
 
 def test_the_table_in_the_readme_is_what_is_expected() -> None:
-    """And so what is found: `python tests/expected_verdicts.py` writes it."""
-    assert written() == matrix()
+    """`python tests/expected_verdicts.py` writes it."""
+    assert table_in_readme() == matrix()
 
 
 @pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-g", "vts-me"])
 def test_the_patch_test_fails_on_a_mesh_of_very_few_segments(name: str) -> None:
-    row = asked(name, PATCH)
+    row = row_of(name, PATCH)
     assert row.shrunk is not None
     assert row.shrunk.verdict is Verdict.FAIL
     interface = row.shrunk.case.interface
     assert len(interface.slave) + len(interface.master) <= 3
-    values, tolerances = measured(row.shrunk).values, measured(row.shrunk).tolerances
+    values, tolerances = measurement_of(row.shrunk).values, measurement_of(row.shrunk).tolerances
     (quantity,) = values
     assert values[quantity] > 1000 * tolerances[quantity]  # a clear failure, not one by a hair
 
 
 def test_vts_me_fails_where_one_area_of_competence_covers_two_master_segments() -> None:
-    shrunk = asked("vts-me", PATCH).shrunk
+    shrunk = row_of("vts-me", PATCH).shrunk
     assert shrunk is not None
-    found = projection_cases(shrunk.case.interface, shrunk.case.z)
-    assert found["first"] >= 1
-    assert found["last"] >= 1
-    assert found["intermediate"] == 0
+    counts = projection_cases(shrunk.case.interface, shrunk.case.z)
+    assert counts["first"] >= 1
+    assert counts["last"] >= 1
+    assert counts["intermediate"] == 0
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic", "vts-ppt-balanced"])
 def test_vts_ppt_passes_the_patch_test_at_roundoff(name: str) -> None:
-    row = asked(name, PATCH)
+    row = row_of(name, PATCH)
     for outcome in row.outcomes:
-        found = measured(outcome)
-        (quantity,) = found.values
-        assert found.values[quantity] < found.tolerances[quantity]
+        measurement = measurement_of(outcome)
+        (quantity,) = measurement.values
+        assert measurement.values[quantity] < measurement.tolerances[quantity]
         penetration = outcome.case.parameter("penetration")
-        assert found.values[quantity] < 2.0**-53 * (8 * outcome.case.largest_coordinate / penetration + 400)
+        assert measurement.values[quantity] < 2.0**-53 * (8 * outcome.case.largest_coordinate / penetration + 400)
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic"])
 def test_the_printed_vts_ppt_loses_one_minus_the_cosine_of_the_tilt(name: str) -> None:
     case = named_case("tilted")
-    found = the_property(FORCE).measure(case, the_formulation(name))
-    (defect,) = found.values.values()
-    (tolerance,) = found.tolerances.values()
+    measurement = load_property(FORCE).measure(case, load_subject(name))
+    (defect,) = measurement.values.values()
+    (tolerance,) = measurement.tolerances.values()
     slave = 1 - case.parameter("cosine")
     forces = printed_forces(name)
     # The slave's forces point along the master's normal, so that Σ|R| over entries is |ΣR| of the slave.
     assert np.linalg.norm(forces[:2].sum(axis=0)) == pytest.approx(np.abs(forces[:2]).sum(), rel=1e-12)
     assert defect == pytest.approx(slave, abs=1e-12)
     assert defect > 1e6 * tolerance
-    assert asked(name, FORCE).witness is not None
-    assert asked(name, FORCE).verdict is Verdict.FAIL
+    assert row_of(name, FORCE).witness is not None
+    assert row_of(name, FORCE).verdict is Verdict.FAIL
 
 
 def printed_forces(name: str) -> Any:
     case = named_case("tilted")
-    formulation = the_formulation(name).for_case(case)
+    formulation = load_subject(name).for_case(case)
     return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).reshape(-1, 2)
 
 
 def test_the_balanced_vts_ppt_is_cleared_on_the_tilted_case() -> None:
     for property_id in (FORCE, MOMENT):
-        outcome = judge_case(the_property(property_id), named_case("tilted"), the_formulation("vts-ppt-balanced"))
+        outcome = judge_case(load_property(property_id), named_case("tilted"), load_subject("vts-ppt-balanced"))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 def test_random_tilts_find_the_printed_vts_ppt_out_without_the_witness() -> None:
-    failed = [outcome for outcome in asked("vts-ppt", FORCE).outcomes if outcome.verdict is Verdict.FAIL]
+    failed = [outcome for outcome in row_of("vts-ppt", FORCE).outcomes if outcome.verdict is Verdict.FAIL]
     assert len(failed) > 10
-    assert asked("vts-ppt", FORCE).shrunk is not None
+    assert row_of("vts-ppt", FORCE).shrunk is not None
 
 
 def test_the_tangent_of_the_basic_vts_ppt_is_found_out() -> None:
-    row = asked("vts-ppt-basic", TANGENT)
+    row = row_of("vts-ppt-basic", TANGENT)
     assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 10
     assert row.shrunk is not None
-    found = measured(row.shrunk)
+    measurement = measurement_of(row.shrunk)
     quantity = "error against a central difference"
-    assert found.values[quantity] > 1000 * found.tolerances[quantity]
+    assert measurement.values[quantity] > 1000 * measurement.tolerances[quantity]
     assert row.witness is not None
     assert row.witness.verdict is Verdict.FAIL
-    exact = measured(judge_case(the_property(TANGENT), named_case("offset-c"), the_formulation("vts-ppt")))
+    exact = measurement_of(judge_case(load_property(TANGENT), named_case("offset-c"), load_subject("vts-ppt")))
     assert exact.values[quantity] <= exact.tolerances[quantity]
-
-
-class Claims:
-    """A formulation with other promises."""
-
-    def __init__(self, inner: Any, traits: Traits) -> None:
-        self._inner, self.traits = inner, traits
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._inner, name)
-
-
-def claiming(make: Callable[..., Any], **promises: Any) -> Subject:
-    def claimed(*, penalty: float) -> Claims:
-        inner = make(penalty=penalty)
-        return Claims(inner, replace(inner.traits, **promises))
-
-    return Subject("boaster", claimed)
 
 
 @pytest.mark.parametrize(
@@ -229,39 +202,40 @@ def claiming(make: Callable[..., Any], **promises: Any) -> Subject:
 def test_a_promise_that_is_not_true_is_found_out(
     make: Callable[..., Any], property_id: str, promises: dict[str, Any], unexpected: str
 ) -> None:
-    found = run([claiming(make, **promises)], [the_property(property_id)], examples=30, seed=SEED)
-    assert found.rows[0].unexpected == unexpected
-    assert not found.passed
+    result = run([with_promises(make, **promises)], [load_property(property_id)], examples=30, seed=SEED)
+    assert result.rows[0].unexpected == unexpected
+    assert not result.passed
 
 
 def test_a_promise_that_is_true_is_kept() -> None:
-    found = run([claiming(contactverif_nts.vts_ppt)], load_properties(), examples=10, seed=SEED)
-    assert found.passed
+    result = run([with_promises(contactverif_nts.vts_ppt)], load_properties(), examples=10, seed=SEED)
+    assert result.passed
 
 
 def test_what_promises_nothing_is_never_accused() -> None:
     promises = ("passes_flat_patch", "covers_overhang", "tangent", "conserves_force", "conserves_moment")
     nothing = dict.fromkeys(promises)
-    found = run(
-        [claiming(contactverif_nts.vts_ppt_basic, witnesses={}, **nothing)], load_properties(), examples=30, seed=SEED
+    result = run(
+        [with_promises(contactverif_nts.vts_ppt_basic, witnesses={}, **nothing)],
+        load_properties(),
+        examples=30,
+        seed=SEED,
     )
-    verdicts = {row.question.id: row.verdict for row in found.rows}
+    verdicts = {row.question.id: row.verdict for row in result.rows}
     assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == {
         FORCE,
         MOMENT,
         DEAD_ZONE,
     } | INEXACT
-    assert found.passed
+    assert result.passed
 
 
 def test_a_cut_that_begins_exactly_here_is_a_kink_and_no_broken_pairing() -> None:
     """Found by 20,000 examples: slave and master begin in one place, so the least move cuts an area or does not."""
     interface = Interface.from_chains([[0, 0], [128, 0]], [[112, 0], [0, 0]])
     z = interface.nodes - [0, 0.25] * np.array([[1], [1], [0], [0]])
-    balanced = load_formulation("vts-ppt-balanced")
-    (question,) = load_properties(["tangent.directional"])
-    assert isinstance(balanced, Subject)
-    assert isinstance(question, Property)
+    balanced = load_subject("vts-ppt-balanced")
+    question = load_property("tangent.directional")
     formulation, case = balanced.with_penalty(1.0), Case(interface, z.ravel())
     nudged = z.ravel() + 1e-9 * np.array([1, 0] + 6 * [0])
     assert formulation.pair(interface, nudged) != formulation.pair(interface, z.ravel() - (nudged - z.ravel()))
@@ -285,9 +259,9 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return np.zeros((z.size, z.size))
 
-    found = run([Subject("nothing", lambda *, penalty: Nothing())], load_properties(), profile="ci", examples=20)
-    assert not found.passed
-    judged = {row.question.id: row.verdict for row in found.rows}
+    result = run([Subject("nothing", lambda *, penalty: Nothing())], load_properties(), profile="ci", examples=20)
+    assert not result.passed
+    judged = {row.question.id: row.verdict for row in result.rows}
     assert {judged.pop(name) for name in (*PATCHES, "unilateral")} == {Verdict.FAIL}
     assert {judged.pop(name) for name in (RESULTANT, RANK, COMPLEMENTARITY)} == {Verdict.NOT_APPLICABLE}
     assert set(judged.values()) == {Verdict.NOT_JUDGED}
@@ -295,6 +269,6 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_node_lost_at_a_free_end_by_roundoff_is_undecided(seed: int) -> None:
-    without_tau = load_formulation("nts-ar:tau=0")
-    found = run([without_tau], load_properties(["patch.flat.resultant"]), examples=300, seed=seed)
-    assert found.rows[0].verdict is Verdict.PASS, found.rows[0].reason
+    without_tau = load_subject("nts-ar:tau=0")
+    result = run([without_tau], load_properties(["patch.flat.resultant"]), examples=300, seed=seed)
+    assert result.rows[0].verdict is Verdict.PASS, result.rows[0].reason

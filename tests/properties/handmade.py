@@ -47,9 +47,9 @@ def subject(plugin: Callable[..., Any], **options: Any) -> Subject:
     """A formulation on trial: `plugin(**options)` with the penalty as an attribute."""
 
     def make(*, penalty: float) -> Any:
-        made = plugin(**options)
-        made.penalty = penalty
-        return made
+        formulation = plugin(**options)
+        formulation.penalty = penalty
+        return formulation
 
     return Subject("handmade", make)
 

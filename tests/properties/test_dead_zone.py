@@ -1,13 +1,13 @@
-"""The dead zone: what is exact where the slave overhangs, who passes, and which contact points count."""
+"""The dead zone: exact forces where the slave overhangs, who passes, and which contact points count."""
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from subjects import Changed, load_subject, with_promises
 
 import contactverif_mortar
 import contactverif_nts
@@ -17,7 +17,6 @@ from contactverif.contract.property import Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
 from contactverif.scenes.catalogue import BLOCKS, load_scene_case, make_scene
@@ -35,18 +34,11 @@ WRONG = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-pp
 DRAWING = BLOCKS["dead-zone"]
 
 
-@cache
-def the(name: str) -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject), found
-    return found
-
-
 # --- what is exact ----------------------------------------------------------------------------------------------
 
 
 def test_the_exact_forces_by_hand() -> None:
-    """p × what lies over the master, from −3.3 to 3.3, of the shape functions of −6, −4.4, −2.1, −0.3, 1.9, 4, 6."""
+    """Each force is p times the integral of a shape function of −6, −4.4, −2.1, −0.3, 1.9, 4, 6 from −3.3 to 3.3."""
     case = load_scene_case("dead-zone:pressure=1")
     left, right = (2.3**2 - 1.1**2) / (2 * 2.3), (2.1**2 - 0.7**2) / (2 * 2.1)  # of the two segments that end nearby
     slave = [0, 1.2 - left, left + 0.9, 0.9 + 1.1, 1.1 + right, 1.4 - right, 0]
@@ -86,30 +78,30 @@ def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes(name: str) -> None:
-    assert measure_once(load_scene_case("dead-zone"), the(name)).values["stress error"] <= 1e-14
+    assert measure_once(load_scene_case("dead-zone"), load_subject(name)).values["stress error"] <= 1e-14
     for text in ("dead-zone", "dead-zone:degrees=17.3,refine=2", "dead-zone:ratio=1e3,poisson=0.45"):
-        outcome = judge_case(DEAD_ZONE, load_scene_case(text), the(name))
+        outcome = judge_case(DEAD_ZONE, load_scene_case(text), load_subject(name))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes_where_the_master_ends_at_a_slave_node_as_roundoff_will_have_it(name: str) -> None:
     case = load_scene_case("dead-zone:degrees=33,refine=3")  # the right end
-    outcome = judge_case(DEAD_ZONE, case, the(name))
+    outcome = judge_case(DEAD_ZONE, case, load_subject(name))
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_who_fails(name: str) -> None:
-    found = measure_once(load_scene_case("dead-zone"), the(name))
-    assert found.values["stress error"] > 0.02
+    measurement = measure_once(load_scene_case("dead-zone"), load_subject(name))
+    assert measurement.values["stress error"] > 0.02
     assert {"stress error", "slave force error", "master force error"} <= {
-        quantity for quantity, value in found.values.items() if value > found.tolerances[quantity]
+        quantity for quantity, value in measurement.values.items() if value > measurement.tolerances[quantity]
     }
 
 
 def test_the_numbers_of_the_design() -> None:
-    """Where no heights were said: blocks half as high as wide, one cell high, ε̂ = 30 E/h."""
+    """The design gives no heights. These blocks are half as high as wide and one cell high, with ε̂ = 30 E/h."""
     x, master_x = (
         start + np.concatenate([[0], np.cumsum(lengths)])
         for start, lengths in ((DRAWING.slave_from, DRAWING.slave), (DRAWING.master_from, DRAWING.master))
@@ -120,7 +112,9 @@ def test_the_numbers_of_the_design() -> None:
         penalty=30 * 1e4 / 2,
         pressure=100,
     )
-    errors = {name: measure_once(scene.case(), the(name)).values["stress error"] for name in (*RIGHT[:2], *WRONG)}
+    errors = {
+        name: measure_once(scene.case(), load_subject(name)).values["stress error"] for name in (*RIGHT[:2], *WRONG)
+    }
     assert max(errors[name] for name in RIGHT[:2]) <= 1e-13
     assert errors["nts-ar"] == pytest.approx(0.22, rel=0.1)
     assert errors["vts-me"] == pytest.approx(8e-2, rel=0.05)
@@ -129,21 +123,11 @@ def test_the_numbers_of_the_design() -> None:
 
 @pytest.mark.parametrize("name", ["vts-ppt-balanced", "sts"])
 def test_who_is_right_is_not_accused(name: str) -> None:
-    (row,) = run([the(name)], [DEAD_ZONE], examples=200, seed=5).rows
+    (row,) = run([load_subject(name)], [DEAD_ZONE], examples=200, seed=5).rows
     assert (row.verdict, row.judged, row.unexpected) == (Verdict.PASS, 200, ""), row.reason
 
 
 # --- promises ---------------------------------------------------------------------------------------------------
-
-
-class Claims:
-    """A formulation with other promises."""
-
-    def __init__(self, inner: Any, **promises: Any) -> None:
-        self._inner, self.traits = inner, replace(inner.traits, **promises)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._inner, name)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +147,7 @@ class Claims:
     ],
 )
 def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: str) -> None:
-    subject = Subject("claims", lambda *, penalty: Claims(make(penalty=penalty), **promises))
+    subject = with_promises(make, **promises)
     (row,) = run([subject], [DEAD_ZONE], examples=20, seed=2).rows
     assert row.unexpected == unexpected
     if subject.traits.covers_overhang is False and not unexpected:
@@ -172,10 +156,10 @@ def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: s
 
 
 def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
-    found = run([the("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, PATCH_VARIANTS], scene=load_scene_case("dead-zone"))
-    assert [row.verdict for row in found.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
-    assert found.passed
-    (row,) = run([the("sts")], [DEAD_ZONE], scene=load_scene_case("c")).rows
+    result = run([load_subject("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, PATCH_VARIANTS], scene=load_scene_case("dead-zone"))
+    assert [row.verdict for row in result.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
+    assert result.passed
+    (row,) = run([load_subject("sts")], [DEAD_ZONE], scene=load_scene_case("c")).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert dead_zone_cases(make_scene("c").case()) is None
 
@@ -183,24 +167,22 @@ def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> 
 # --- what is measured -------------------------------------------------------------------------------------------
 
 
-def told(points: ContactPoints, **more: Any) -> ContactPoints:
-    """The points, and the first of them once more, changed."""
+def add_point(points: ContactPoints, **more: Any) -> ContactPoints:
+    """Return the points, and the first of them once more with other values."""
     first = {field.name: getattr(points, field.name)[:1] for field in fields(points)} | {
         name: np.array([value]) for name, value in more.items()
     }
     return ContactPoints(**{name: np.concatenate([getattr(points, name), values]) for name, values in first.items()})
 
 
-def telling(**more: Any) -> Subject:
-    """Segment to segment that tells of one more point."""
+def with_another_point(**more: Any) -> Subject:
+    """Return segment-to-segment that reports one more contact point."""
 
     def make(*, penalty: float) -> Any:
         inner = contactverif_mortar.sts(penalty=penalty)
-        told_more = Claims(inner)
-        told_more.contact_points = lambda *given: told(inner.contact_points(*given), **more)  # type: ignore[attr-defined]
-        return told_more
+        return Changed(inner, contact_points=lambda *state: add_point(inner.contact_points(*state), **more))
 
-    return Subject("telling", make)
+    return Subject("with another point", make)
 
 
 @pytest.mark.parametrize(
@@ -218,8 +200,8 @@ def telling(**more: Any) -> Subject:
     ],
 )
 def test_which_points_count(more: dict[str, Any], wrong: set[str]) -> None:
-    found = measure_once(load_scene_case("dead-zone"), telling(**more))
-    assert {name for name, value in found.values.items() if value > found.tolerances[name]} == wrong
+    measurement = measure_once(load_scene_case("dead-zone"), with_another_point(**more))
+    assert {name for name, value in measurement.values.items() if value > measurement.tolerances[name]} == wrong
 
 
 def test_what_overhangs_may_bend() -> None:
@@ -242,8 +224,8 @@ def test_what_overhangs_may_bend() -> None:
 
 def test_a_part_of_the_slave_bears_the_rounding_of_all() -> None:
     case = load_scene_case("dead-zone")
-    plain, found = (measure(case, the("sts")) for measure in (measure_once, DEAD_ZONE.measure))
-    assert found.values == plain.values
+    plain, measurement = (measure(case, load_subject("sts")) for measure in (measure_once, DEAD_ZONE.measure))
+    assert measurement.values == plain.values
     for name, tolerance in plain.tolerances.items():
-        assert found.tolerances[name] == pytest.approx(tolerance * 12 / 6.6, rel=1e-14)
-    assert judge(DEAD_ZONE, found)[0] is Verdict.PASS
+        assert measurement.tolerances[name] == pytest.approx(tolerance * 12 / 6.6, rel=1e-14)
+    assert judge(DEAD_ZONE, measurement)[0] is Verdict.PASS

@@ -47,15 +47,15 @@ class Springs(Handmade):
 @pytest.mark.parametrize("penalty", ["nodal", "distributed"])
 def test_a_penalty_that_scales_with_its_unit_changes_no_digit(penalty: str) -> None:
     for seed in SEEDS:
-        found = measure_scaling(case(seed=seed), subject(Springs, penalty=penalty))
-        assert found.values == {FORCES.name: 0.0, TANGENT.name: 0.0}
+        measurement = measure_scaling(case(seed=seed), subject(Springs, penalty=penalty))
+        assert measurement.values == {FORCES.name: 0.0, TANGENT.name: 0.0}
 
 
-@pytest.mark.parametrize(("promised", "kept"), [("nodal", "distributed"), ("distributed", "nodal")])
-def test_the_other_kind_of_penalty_does_not(promised: Any, kept: Any) -> None:
+@pytest.mark.parametrize(("promised", "actual"), [("nodal", "distributed"), ("distributed", "nodal")])
+def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
     class Boasts(Springs):
         def area(self, z: Any) -> float:
-            return float(np.hypot(*self.stretch(z))) if kept == "distributed" else 1.0
+            return float(np.hypot(*self.stretch(z))) if actual == "distributed" else 1.0
 
     verdicts = [judge_case(SCALING, case(seed=seed), subject(Boasts, penalty=promised)).verdict for seed in SEEDS]
     assert verdicts.count(Verdict.FAIL) >= 20
@@ -66,9 +66,9 @@ def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
     assert SCALING.applicable(Traits(penalty="nodal")) == ""
     assert SCALING.applicable(Traits(penalty="nodal", enforcement="multiplier")) == ""
     assert "barrier" in SCALING.applicable(Traits(penalty="nodal", enforcement="barrier"))
-    found = run([subject(Springs)], [SCALING], examples=3, seed=1)
-    assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
-    assert found.passed
+    result = run([subject(Springs)], [SCALING], examples=3, seed=1)
+    assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
+    assert result.passed
 
 
 def test_an_absolute_tolerance_is_found() -> None:
@@ -171,6 +171,6 @@ def over_a_node_with(offset: float, seed: int) -> Any:
 
 
 def test_the_same_case_is_always_turned_the_same_way() -> None:
-    who = subject(Springs)
-    assert measure_objectivity(case(seed=5), who) == measure_objectivity(case(seed=5), who)
-    assert measure_objectivity(case(seed=5), who).values != measure_objectivity(case(seed=6), who).values
+    springs = subject(Springs)
+    assert measure_objectivity(case(seed=5), springs) == measure_objectivity(case(seed=5), springs)
+    assert measure_objectivity(case(seed=5), springs).values != measure_objectivity(case(seed=6), springs).values

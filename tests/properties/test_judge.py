@@ -1,4 +1,4 @@
-"""What all judges have in common: they share no code with what they judge, and forces that are wrong are seen."""
+"""All judges share no code with the judged, and see wrong forces."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
         "print(sorted(name for name in sys.modules if name.startswith(('contactverif_nts', 'contactverif.geometry',\n"
         "    'numba'))))\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert process.stdout == "[]\n"
 
 
 class Exact(Handmade):
@@ -83,13 +83,13 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
     """A barrier is not defined there, and would be accused of its NaN. Multipliers are asked everything."""
     for question in load_properties():
         assert isinstance(question, Property)
-        said = {
+        reasons = {
             enforcement: question.applicable(Traits(penalty="distributed", area="current", enforcement=enforcement))
             for enforcement in ("penalty", "multiplier", "barrier")
         }
-        assert "barrier" in said["barrier"]
-        assert not said["multiplier"]
-        assert bool(said["penalty"]) is (question.id in ("multipliers.rank", "complementarity"))
+        assert "barrier" in reasons["barrier"]
+        assert not reasons["multiplier"]
+        assert bool(reasons["penalty"]) is (question.id in ("multipliers.rank", "complementarity"))
 
 
 class Pair(Handmade):

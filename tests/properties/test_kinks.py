@@ -1,4 +1,4 @@
-"""What the harness takes for a kink: computed from positions where contact points are named, else from differences."""
+"""Kinks: computed from positions where the plugin reports contact points, and else from differences."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Pointed(Handmade):
 
 
 class Wide(Pointed):
-    """The same with an area of competence of half a segment."""
+    """One contact point with an area of competence of half a segment."""
 
     half_area = 0.5
 
@@ -41,8 +41,8 @@ class Springs(Handmade):
         return forces
 
 
-def kink(plugin: Any, where: Case, reach: float = REACH) -> str:
-    return find_kink(where, subject(plugin).for_case(where), None, reach, np.ones(where.z.size))
+def kink(plugin: Any, state: Case, reach: float = REACH) -> str:
+    return find_kink(state, subject(plugin).for_case(state), None, reach, np.ones(state.z.size))
 
 
 def test_a_point_over_a_master_node_is_at_a_kink() -> None:
@@ -75,11 +75,11 @@ def test_the_end_of_an_area_over_a_master_node_is_a_kink() -> None:
 def test_a_lie_about_the_contact_point_moves_the_kink_with_it() -> None:
     """Only the plugin knows where its points are. One that puts them at kinks is undecided, and so never judged."""
 
-    class Elsewhere(Handmade):
+    class OverANode(Handmade):
         def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
             return self.points(c=-2 * 6 / 7)  # over the node of the master
 
-    assert kink(Elsewhere, case())
+    assert kink(OverANode, case())
 
 
 def test_without_contact_points_one_sided_differences_tell() -> None:
@@ -94,9 +94,9 @@ def test_nothing_in_contact_is_no_kink() -> None:
 
 
 def test_a_jump_is_seen_from_both_sides() -> None:
-    where = over_a_node(0.0)
-    directions = np.ones((1, where.z.size))
-    assert measure_jump(where, subject(Springs).for_case(where), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
+    state = over_a_node(0.0)
+    directions = np.ones((1, state.z.size))
+    assert measure_jump(state, subject(Springs).for_case(state), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
     beside = over_a_node(1 / 7)
     assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[0] < 1e-5
     assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[1] == 0
@@ -107,10 +107,9 @@ def test_a_jump_of_the_tangent_counts_too() -> None:
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return np.eye(z.size) * (1.0 if z[0] + z[2] > 0 else 3.0)
 
-    where = over_a_node(0.0)
-    assert measure_jump(where, subject(Stiff).for_case(where), REACH, np.ones((1, where.z.size)))[1] == pytest.approx(
-        2.0
-    )
+    state = over_a_node(0.0)
+    directions = np.ones((1, state.z.size))
+    assert measure_jump(state, subject(Stiff).for_case(state), REACH, directions)[1] == pytest.approx(2.0)
 
 
 def test_sparse_and_dense_tangents_are_the_same() -> None:

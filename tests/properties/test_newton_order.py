@@ -1,14 +1,14 @@
-"""Newton's order: what the slope is taken from, and what a scene tells of a tangent."""
+"""The order of Newton's method: fits of known laws, and what scenes show about a tangent."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from math import inf, isnan
 from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 import contactverif_nts
 from contactverif.contract.arrays import FloatArray
@@ -17,7 +17,6 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import End, System, solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import load_scene_case
@@ -25,13 +24,6 @@ from contactverif_properties.newton_history import NEWTON_HISTORY, SERIES, measu
 from contactverif_properties.newton_order import DISTANCES, NEWTON_ORDER, fit_order, measure_order, spectral_radius
 
 DISTANT = np.array(DISTANCES)
-
-
-@cache
-def the(name: str) -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject), found
-    return found
 
 
 @pytest.mark.parametrize(
@@ -46,16 +38,16 @@ def the(name: str) -> Subject:
     ],
 )
 def test_the_slope_of_a_known_law(after: FloatArray, slope: float, rate: float | None) -> None:
-    found, found_rate = fit_order(DISTANT, after, 1e-14)
-    assert found == (slope if slope == inf else pytest.approx(slope, abs=0.1 if slope == 1.0 else 0.02))
+    order, fitted_rate = fit_order(DISTANT, after, 1e-14)
+    assert order == (slope if slope == inf else pytest.approx(slope, abs=0.1 if slope == 1.0 else 0.02))
     if rate is not None:
-        assert found_rate == pytest.approx(rate)
+        assert fitted_rate == pytest.approx(rate)
 
 
 def test_a_slope_that_still_rises_decides_nothing() -> None:
     after = np.abs(DISTANT**2 - 30 * DISTANT**3)  # two contributions of opposite sign
-    told = [fit_order(DISTANT, after, floor)[0] for floor in (1e-5, 3e-6, 1e-6)]
-    assert all(isnan(slope) or slope >= 1.9 for slope in told), told
+    orders = [fit_order(DISTANT, after, floor)[0] for floor in (1e-5, 3e-6, 1e-6)]
+    assert all(isnan(slope) or slope >= 1.9 for slope in orders), orders
 
 
 def test_too_few_distances_decide_nothing() -> None:
@@ -75,8 +67,8 @@ def test_noise_at_short_distances_is_not_taken_for_a_law() -> None:
 def test_the_rate_of_the_basic_version_is_the_spectral_radius(scene: str, low: float, high: float) -> None:
     """Fig. 30: 0.12 to 0.14 at ε̂/E = 1, and 0.03 at 0.1."""
     case = load_scene_case(scene)
-    trace = solve(scene_of(case), the("vts-ppt-basic").for_case(case))
-    system = System(scene_of(case), the("vts-ppt-basic").for_case(case))
+    trace = solve(scene_of(case), load_subject("vts-ppt-basic").for_case(case))
+    system = System(scene_of(case), load_subject("vts-ppt-basic").for_case(case))
     radius = spectral_radius(system, trace.solution, system.pair(trace.solution))
     assert low - 1e-3 < radius < high
     tail = trace.residuals[4:-1]
@@ -85,15 +77,15 @@ def test_the_rate_of_the_basic_version_is_the_spectral_radius(scene: str, low: f
 
 def test_the_exact_tangent_leaves_no_radius() -> None:
     case = load_scene_case("c-prime:penalty=1e4,sides=free,ratio=0.5,lowered=0")
-    trace = solve(scene_of(case), the("vts-ppt").for_case(case))
-    system = System(scene_of(case), the("vts-ppt").for_case(case))
+    trace = solve(scene_of(case), load_subject("vts-ppt").for_case(case))
+    system = System(scene_of(case), load_subject("vts-ppt").for_case(case))
     assert trace.end is End.CONVERGED
     assert spectral_radius(system, trace.solution, system.pair(trace.solution)) < 1e-7
 
 
 def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
     case = load_scene_case("example-1bis")
-    exact, basic = (measure_order(case, the(name)) for name in ("vts-ppt", "vts-ppt-basic"))
+    exact, basic = (measure_order(case, load_subject(name)) for name in ("vts-ppt", "vts-ppt-basic"))
     assert exact.values["order of one Newton step"] >= 1.9
     assert basic.values["order of one Newton step"] == pytest.approx(1.0, abs=0.1)
     # in the largest norm a rate may exceed the radius, which is that of many steps
@@ -102,26 +94,26 @@ def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
 
 def test_a_solution_that_is_not_found_is_undecided() -> None:
     case = load_scene_case("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
-    outcome = judge_case(NEWTON_ORDER, case, the("vts-me"))
+    outcome = judge_case(NEWTON_ORDER, case, load_subject("vts-me"))
     assert outcome.verdict is Verdict.UNDECIDED
     assert "2-cycle" in outcome.reason
-    assert judge_case(NEWTON_HISTORY, case, the("vts-me")).verdict is Verdict.UNDECIDED
+    assert judge_case(NEWTON_HISTORY, case, load_subject("vts-me")).verdict is Verdict.UNDECIDED
 
 
 def test_the_whole_trajectory_is_kept() -> None:
     case = load_scene_case("example-1bis:pressure=100,lowered=0")
-    found = measure_history(case, the("vts-ppt-basic"))
-    trace = solve(scene_of(case), the("vts-ppt-basic").for_case(case))
-    assert found.series.keys() == SERIES.keys()
-    assert np.array_equal(found.series["residual"], trace.residuals)
-    assert np.array_equal(found.series["energy norm"], trace.energies, equal_nan=True)
-    assert found.values["final iterations"] > found.tolerances["final iterations"]
+    measurement = measure_history(case, load_subject("vts-ppt-basic"))
+    trace = solve(scene_of(case), load_subject("vts-ppt-basic").for_case(case))
+    assert measurement.series.keys() == SERIES.keys()
+    assert np.array_equal(measurement.series["residual"], trace.residuals)
+    assert np.array_equal(measurement.series["energy norm"], trace.energies, equal_nan=True)
+    assert measurement.values["final iterations"] > measurement.tolerances["final iterations"]
 
 
 def test_a_piecewise_linear_problem_is_finite() -> None:
-    found = measure_history(load_scene_case("c-prime"), the("vts-ppt"))
-    assert found.details["finite"] == 1
-    assert found.values["final iterations"] <= 1
+    measurement = measure_history(load_scene_case("c-prime"), load_subject("vts-ppt"))
+    assert measurement.details["finite"] == 1
+    assert measurement.values["final iterations"] <= 1
 
 
 def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
@@ -131,7 +123,7 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
         inner = contactverif_nts.vts_ppt(penalty=penalty)
 
         class Unpaired:
-            traits = replace(the("vts-ppt").traits, batched=False, takes_complex=False)
+            traits = replace(load_subject("vts-ppt").traits, batched=False, takes_complex=False)
 
             def residual(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
                 return inner.residual(interface, inner.pair(interface, z), z)

@@ -1,13 +1,13 @@
-"""The patch test solved: what is exact, what is measured, and that neither a lock nor a bad tangent misleads it."""
+"""The patch test solved: exact numbers, and formulations that lock or have a wrong tangent do not mislead it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from subjects import Changed, load_subject
 
 import contactverif_nts
 from contactverif.contract.case import Case
@@ -16,7 +16,6 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.run.registry import load_formulation
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import pressure_of, two_blocks
 from contactverif.scenes.catalogue import load_scene_case
@@ -25,13 +24,6 @@ from contactverif.strategies.solids import variant_cases
 from contactverif_properties.flat_solve import FLAT_SOLVE, SLOPE, measure_two_penalties
 from contactverif_properties.patch_variants import PATCH_VARIANTS
 from contactverif_properties.shared.solved_patch import measure_at_penalty
-
-
-@cache
-def the(name: str) -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject), found
-    return found
 
 
 def textbook() -> Case:
@@ -53,32 +45,21 @@ def test_the_pressure_is_that_of_springs_in_series() -> None:
 def test_the_recovered_stress_is_that_pressure(name: str) -> None:
     case = textbook()
     scene = scene_of(case)
-    stresses = scene.stresses(solve(scene, the(name).for_case(case)).solution)
+    stresses = scene.stresses(solve(scene, load_subject(name).for_case(case)).solution)
     for body in stresses:
         assert np.abs(-body[..., 1] - 0.017369727047).max() <= 1e-12
 
 
 def test_nts_on_a1_passes_as_the_penalty_grows_because_it_locks() -> None:
-    found = measure_two_penalties(load_scene_case("a1"), the("nts"))
-    assert found.details[SLOPE] == pytest.approx(-1, abs=0.05)
-    assert judge(FLAT_SOLVE, found)[0] is Verdict.FAIL
+    measurement = measure_two_penalties(load_scene_case("a1"), load_subject("nts"))
+    assert measurement.details[SLOPE] == pytest.approx(-1, abs=0.05)
+    assert judge(FLAT_SOLVE, measurement)[0] is Verdict.FAIL
 
 
 def test_nts_ar_on_c_fails_at_any_penalty() -> None:
-    found = measure_two_penalties(load_scene_case("c-prime"), the("nts-ar"))
-    assert found.details[SLOPE] > -0.5
-    assert found.values["stress error, high penalty"] > 1e-2
-
-
-class Turned:
-    """A formulation in which one verb is something else."""
-
-    def __init__(self, inner: Any, **verbs: Any) -> None:
-        self.inner = inner
-        self.__dict__ |= verbs
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.inner, name)
+    measurement = measure_two_penalties(load_scene_case("c-prime"), load_subject("nts-ar"))
+    assert measurement.details[SLOPE] > -0.5
+    assert measurement.values["stress error, high penalty"] > 1e-2
 
 
 @pytest.mark.parametrize("wrong", ["nothing", "transposed"])
@@ -89,7 +70,7 @@ def test_a_wrong_tangent_is_no_reason_to_accuse_a_right_residual(wrong: str) -> 
         def tangent(interface: Any, pairing: Any, z: Any) -> Any:
             return 0 * np.eye(z.size) if wrong == "nothing" else inner.tangent(interface, pairing, z).T
 
-        return Turned(inner, tangent=tangent)
+        return Changed(inner, tangent=tangent)
 
     for scene in ("c-prime:lowered=0,degrees=17.3", "example-1bis"):
         outcome = judge_case(FLAT_SOLVE, load_scene_case(scene), Subject(wrong, make))
@@ -101,12 +82,12 @@ def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
 
     def make(*, penalty: float) -> Any:
         inner = contactverif_nts.vts_me(penalty=penalty)
-        return Turned(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
+        return Changed(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
 
-    lost = Subject("lost", make)
-    found = measure_at_penalty(load_scene_case("c-prime"), lost, load_scene_case("c-prime").penalty)
-    assert judge(PATCH_VARIANTS, found)[0] is Verdict.FAIL
-    assert found.values["master force error"] > 1e6 * found.tolerances["master force error"]
+    aimless = Subject("aimless", make)
+    measurement = measure_at_penalty(load_scene_case("c-prime"), aimless, load_scene_case("c-prime").penalty)
+    assert judge(PATCH_VARIANTS, measurement)[0] is Verdict.FAIL
+    assert measurement.values["master force error"] > 1e6 * measurement.tolerances["master force error"]
 
 
 @pytest.mark.parametrize("scene", ["a2-graded", "b:degrees=45", "example-1bis", "c-prime:ratio=1e-3", "c:ratio=1e6"])
@@ -114,21 +95,21 @@ def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
     def make(*, penalty: float) -> Any:
         inner = contactverif_nts.vts_ppt(penalty=penalty)
 
-        def contact_points(*given: Any) -> Any:
-            points = inner.contact_points(*given)
+        def contact_points(*state: Any) -> Any:
+            points = inner.contact_points(*state)
             return replace(points, pressure=points.pressure * (1 + 1e-3))
 
-        return Turned(inner, contact_points=contact_points)
+        return Changed(inner, contact_points=contact_points)
 
-    found = measure_two_penalties(load_scene_case(scene), Subject("boaster", make))
-    wrong = {name for name, value in found.values.items() if value > found.tolerances[name]}
+    measurement = measure_two_penalties(load_scene_case(scene), Subject("boaster", make))
+    wrong = {name for name, value in measurement.values.items() if value > measurement.tolerances[name]}
     assert wrong == {"pressure error", "pressure error, high penalty"}
 
 
 def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
     assert variant_cases(load_scene_case("c:sides=free")) is None
-    found = run([the("vts-ppt")], [FLAT_SOLVE], scene=load_scene_case("c:sides=free"))
-    assert found.rows[0].verdict is Verdict.NOT_APPLICABLE
+    result = run([load_subject("vts-ppt")], [FLAT_SOLVE], scene=load_scene_case("c:sides=free"))
+    assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
 
 
 def test_every_variant_is_drawn() -> None:
@@ -136,17 +117,17 @@ def test_every_variant_is_drawn() -> None:
 
     strategy = variant_cases()
     assert strategy is not None
-    drawn = draw_cases(strategy, seed="1", examples=60).cases
-    seen = {int(case.parameter("variant")) for case in drawn}
-    assert seen == set(range(len(NAMES_OF_VARIANTS)))
-    assert any(scene_of(case).bodies[1].rigid for case in drawn)
+    cases = draw_cases(strategy, seed="1", examples=60).cases
+    variants = {int(case.parameter("variant")) for case in cases}
+    assert variants == set(range(len(NAMES_OF_VARIANTS)))
+    assert any(scene_of(case).bodies[1].rigid for case in cases)
 
 
 @pytest.mark.parametrize("question", [FLAT_SOLVE, PATCH_VARIANTS])
 def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
-    (row,) = run([the("vts-me")], [question], scene=load_scene_case("b")).rows
+    (row,) = run([load_subject("vts-me")], [question], scene=load_scene_case("b")).rows
     assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)
-    (row,) = run([the("vts-me")], [question], scene=load_scene_case("c")).rows
+    (row,) = run([load_subject("vts-me")], [question], scene=load_scene_case("c")).rows
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
 
 
@@ -162,6 +143,6 @@ def test_a_scaled_scene_is_judged_the_same() -> None:
             penalty=10 * modulus / length,
             approach=0.1 * length,
         )
-        found = measure_at_penalty(scene.case(), the("nts-ar"), scene.penalty)
-        values.append([*found.values.values(), *found.tolerances.values()])
+        measurement = measure_at_penalty(scene.case(), load_subject("nts-ar"), scene.penalty)
+        values.append([*measurement.values.values(), *measurement.tolerances.values()])
     assert values[0] == pytest.approx(values[1], rel=1e-9)

@@ -1,4 +1,4 @@
-"""Which dependence on something else than the question is told, and by which quantity."""
+"""The property `purity`: which quantity shows which dependence on something else than the question."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class Pure(Handmade):
         return np.diag(2 * z)
 
 
-def measured(plugin: Any, **traits: Any) -> Measurement:
+def measure(plugin: Any, **traits: Any) -> Measurement:
     return measure_purity(case(seed=3), subject(plugin, **traits))
 
 
-def told(plugin: Any, **traits: Any) -> set[str]:
-    """The names of the quantities that are not zero."""
-    return {name for name, value in measured(plugin, **traits).values.items() if value > 0}
+def nonzero_quantities(plugin: Any, **traits: Any) -> set[str]:
+    """Return the names of the quantities that are not zero."""
+    return {name for name, value in measure(plugin, **traits).values.items() if value > 0}
 
 
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_function_is_pure(batched: bool) -> None:
-    found = measured(Pure, batched=batched)
-    assert found.values == {REPEATED.name: 0, REORDERED.name: 0, BATCHED.name: 0}
-    assert not found.broken
+    measurement = measure(Pure, batched=batched)
+    assert measurement.values == {REPEATED.name: 0, REORDERED.name: 0, BATCHED.name: 0}
+    assert not measurement.broken
     assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
 
 
@@ -51,7 +51,7 @@ def test_what_counts_its_calls_is_told_when_asked_again() -> None:
             self.calls += 1
             return z * (1 + self.calls * 2.0**-50)
 
-    assert REPEATED.name in told(Counts)
+    assert REPEATED.name in nonzero_quantities(Counts)
 
 
 def test_what_a_tangent_leaves_behind_is_told_by_the_order() -> None:
@@ -65,12 +65,12 @@ def test_what_a_tangent_leaves_behind_is_told_by_the_order() -> None:
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return z + self.after
 
-    assert told(Trace) == {REORDERED.name}
+    assert nonzero_quantities(Trace) == {REORDERED.name}
     z = case().z
-    assert measured(Trace).values[REORDERED.name] == 2 * z.size  # each entry of both states
+    assert measure(Trace).values[REORDERED.name] == 2 * z.size  # each entry of both states
 
 
-def test_what_a_state_leaves_behind_for_the_next_is_told() -> None:
+def test_what_a_state_leaves_behind_for_the_next_is_nonzero_quantities() -> None:
     class Remembers(Pure):
         first: Any = None
 
@@ -78,16 +78,16 @@ def test_what_a_state_leaves_behind_for_the_next_is_told() -> None:
             self.first = z if self.first is None else self.first
             return self.first + 0 * z
 
-    assert REORDERED.name in told(Remembers)
+    assert REORDERED.name in nonzero_quantities(Remembers)
 
 
-def test_a_batch_that_is_no_loop_is_told() -> None:
+def test_a_batch_that_is_no_loop_is_nonzero_quantities() -> None:
     class First(Pure):
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return z if z.ndim == 1 else 0 * z + z[0]
 
-    assert told(First, batched=True) == {BATCHED.name}
-    assert told(First, batched=False) == set()
+    assert nonzero_quantities(First, batched=True) == {BATCHED.name}
+    assert nonzero_quantities(First, batched=False) == set()
 
 
 def test_a_batch_may_sum_in_another_order() -> None:
@@ -95,18 +95,18 @@ def test_a_batch_may_sum_in_another_order() -> None:
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return z if z.ndim == 1 else z * (1 + 2.0**-52)
 
-    assert told(Roundoff, batched=True) == {BATCHED.name}
+    assert nonzero_quantities(Roundoff, batched=True) == {BATCHED.name}
     assert judge_case(PURITY, case(), subject(Roundoff, batched=True)).verdict is Verdict.PASS
 
 
-class Kept(Pure):
+class Stuck(Pure):
     """The pairing of the first state, for ever."""
 
-    kept: Any = None
+    first: Any = None
 
     def pair(self, interface: Any, z: Any) -> Any:
-        self.kept = {"first": (z[1::2] > z[1:].mean())} if self.kept is None else self.kept
-        return self.kept
+        self.first = {"first": (z[1::2] > z[1:].mean())} if self.first is None else self.first
+        return self.first
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         return 0 * z
@@ -130,19 +130,19 @@ class Moves(Pure):
 
 
 @pytest.mark.parametrize(
-    ("plugin", "said"),
+    ("plugin", "message"),
     [
-        (Kept, "the pairing of a state depends on the state before it"),
+        (Stuck, "the pairing of a state depends on the state before it"),
         (Restless, "the pairing of a state differs in a repeated call"),
         (Moves, "the interface was changed"),
     ],
 )
-def test_a_breach_that_no_number_tells_is_said_in_words(plugin: Any, said: str) -> None:
-    if plugin is Kept:  # a seed for which the two states pair differently
-        found = [measure_purity(case(seed=seed), subject(plugin)).broken for seed in range(40)]
-        assert said in found
+def test_a_breach_that_no_number_tells_is_said_in_words(plugin: Any, message: str) -> None:
+    if plugin is Stuck:  # a seed for which the two states pair differently
+        messages = [measure_purity(case(seed=seed), subject(plugin)).broken for seed in range(40)]
+        assert message in messages
         return
-    assert said in measured(plugin).broken
+    assert message in measure(plugin).broken
     assert judge_case(PURITY, case(), subject(plugin)).verdict is Verdict.FAIL
 
 

@@ -18,7 +18,7 @@ def test_forces_of_the_slave_are_summed_entry_by_entry() -> None:
 
 
 def test_the_mean_penetration_is_the_uniform_one_that_the_same_forces_need() -> None:
-    """ε̂ = 4 and L = 1, so that a penetration of 1/8 pushes each of two nodes with 1/4."""
+    """Here ε̂ = 4 and L = 1, so that a penetration of 1/8 pushes each of two nodes with 1/4."""
     forces = np.zeros((5, 2))
     forces[:2, 1] = 1 / 4
     assert roundoff.mean_penetration(case(), forces) == 1 / 8

@@ -58,7 +58,7 @@ def test_what_is_below_the_floor_decides_nothing() -> None:
 
 
 def test_the_slope_finds_a_large_error_and_misses_a_small_one() -> None:
-    """Which is why the central difference is asked too."""
+    """So the central difference is asked too."""
     wrong = STEPS[:, None]
     assert taylor_slope(wrong + STEPS[:, None] ** 2, STEPS, floor=1e-12) < SLOPE
     assert taylor_slope(1e-3 * wrong + STEPS[:, None] ** 2, STEPS, floor=1e-12) > SLOPE
@@ -166,7 +166,7 @@ class Restless(Smooth):
 
 
 def test_a_pairing_that_changes_at_every_call_is_no_excuse() -> None:
-    """Where the tangent is wrong. Where it is right, this is for `purity` to say: differences need no pairing twice."""
+    """A wrong tangent fails. A right one passes, and `purity` judges the pairing: differences need no pairing twice."""
     assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(1.0))).verdict is Verdict.FAIL
     assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(0.0))).verdict is Verdict.PASS
 

@@ -1,4 +1,4 @@
-"""No force across an open gap, none of a multiplier that pulls; and contact begins where surfaces penetrate."""
+"""The property `unilateral`: no force across an open gap, and some where the surfaces penetrate."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case
 from contactverif_mortar import mortar, mortar_lm
@@ -48,16 +49,15 @@ def test_springs_that_push_and_never_pull() -> None:
     depth = case.parameter("penetration")
     assert verdict(case, at=1.01 * depth)[0] is Verdict.FAIL
     assert verdict(case, at=0.99 * depth)[0] is Verdict.PASS
-    found, reason = verdict(case, closed=False)
-    assert found is Verdict.FAIL
+    outcome, reason = verdict(case, closed=False)
+    assert outcome is Verdict.FAIL
     assert "nothing begins" in reason
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm", "sts"])
 @pytest.mark.parametrize("case", ["a1", "b", "c"])
 def test_who_is_right_passes(name: str, case: str) -> None:
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
+    subject = load_subject(name)
     outcome = judge_case(UNILATERAL, named_case(case), subject)
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
@@ -65,11 +65,10 @@ def test_who_is_right_passes(name: str, case: str) -> None:
 
 def test_nodes_that_face_free_ends_exactly_are_undecided() -> None:
     """Both nodes of a segment on one of its own length: without τ roundoff decides whether they are over it."""
-    without_tau = load_formulation("nts:tau=0")
-    assert isinstance(without_tau, Subject)
-    found = run([without_tau], [UNILATERAL], examples=300, seed=0)
-    assert found.rows[0].verdict is Verdict.PASS, found.rows[0].reason
-    assert any(outcome.verdict is Verdict.UNDECIDED for outcome in found.rows[0].outcomes)
+    without_tau = load_subject("nts:tau=0")
+    result = run([without_tau], [UNILATERAL], examples=300, seed=0)
+    assert result.rows[0].verdict is Verdict.PASS, result.rows[0].reason
+    assert any(outcome.verdict is Verdict.UNDECIDED for outcome in result.rows[0].outcomes)
 
 
 class Augmented:
@@ -91,8 +90,8 @@ class Augmented:
 def test_springs_beside_multipliers_are_not_accused() -> None:
     """A unit multiplier is lost in roundoff beside them; one of their size is not."""
     questions = load_properties(["patch.flat.*", "unilateral"])
-    found = run([Subject("augmented", Augmented)], questions, examples=60, seed=0)
-    assert {row.question.id: row.verdict for row in found.rows} == dict.fromkeys(
+    result = run([Subject("augmented", Augmented)], questions, examples=60, seed=0)
+    assert {row.question.id: row.verdict for row in result.rows} == dict.fromkeys(
         ["patch.flat.resultant", "patch.flat.solve", "patch.flat.transmission", "unilateral"], Verdict.PASS
     )
 
@@ -108,5 +107,5 @@ class Ungated(Augmented):
 
 
 def test_multipliers_that_are_not_gated_are_not_accused() -> None:
-    found = run([Subject("ungated", Ungated)], load_properties(["complementarity", "unilateral"]), examples=60, seed=0)
-    assert [row.verdict for row in found.rows] == [Verdict.PASS, Verdict.PASS], [row.reason for row in found.rows]
+    result = run([Subject("ungated", Ungated)], load_properties(["complementarity", "unilateral"]), examples=60, seed=0)
+    assert [row.verdict for row in result.rows] == [Verdict.PASS, Verdict.PASS], [row.reason for row in result.rows]

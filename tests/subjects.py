@@ -1,0 +1,49 @@
+"""Formulations and properties by name for tests, and formulations whose promises or verbs a test changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from contactverif.contract.property import Property
+from contactverif.contract.subject import Subject
+from contactverif.run.registry import load_formulation, load_properties
+
+
+@cache
+def load_subject(name: str) -> Subject:
+    """Return the installed formulation of that name, options included; fail if it cannot be loaded."""
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject), subject
+    return subject
+
+
+@cache
+def load_property(property_id: str) -> Property:
+    """Return the installed property of that id; fail if it cannot be loaded."""
+    (question,) = load_properties([property_id])
+    assert isinstance(question, Property), question
+    return question
+
+
+class Changed:
+    """A formulation in which some attributes are replaced, such as `tangent` or `traits`; the others are its own."""
+
+    def __init__(self, inner: Any, **attributes: Any) -> None:
+        self.inner = inner
+        self.__dict__ |= attributes
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+
+def with_promises(make: Callable[..., Any], **promises: Any) -> Subject:
+    """Return a formulation that promises something else: `make` is its factory, `promises` are traits."""
+
+    def make_boaster(*, penalty: float) -> Changed:
+        inner = make(penalty=penalty)
+        return Changed(inner, traits=replace(inner.traits, **promises))
+
+    return Subject("boaster", make_boaster)
