@@ -18,7 +18,7 @@ import contactverif_nts
 
 PACKAGE = "contactverif_nts"
 # In the order in which they import each other.
-MODULES = ("state", "eq6", "options", "walk", "box3", "points", "ppt", "multipliers")
+MODULES = ("eq6", "options", "walk", "box3", "points", "ppt", "multipliers")
 
 _numbers = itertools.count()
 
