@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from dataclasses import fields
 from itertools import combinations
@@ -55,6 +56,7 @@ def property_page(question: Property) -> str:
     text = [
         f"# {question.id}\n",
         sentence(plain(question.summary)) + "\n",
+        *_answers(question),
         "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
         "## Measured numbers\n",
     ]
@@ -70,6 +72,18 @@ def property_page(question: Property) -> str:
         f"- On the command line: `contactverif verify NAME -p {question.id}`\n",
     ]
     return "\n".join(text)
+
+
+def _answers(question: Property) -> list[str]:
+    """Return the paragraphs about question, reason, judgement and undecided cases that begin a property's file."""
+    text = inspect.getdoc(inspect.getmodule(question.measure)) or ""
+    if "**Question.**" not in text:
+        return []
+    answers = []
+    for paragraph in text.split("\n\n")[1:]:
+        title, body = re.fullmatch(r"(?:\*\*([^*]+)\.\*\* )?(.*)", paragraph, re.DOTALL).groups()  # type: ignore[union-attr]
+        answers.append((f"**{title}.** " if title else "") + plain(body) + "\n")
+    return answers
 
 
 def _quantities(question: Property) -> list[str]:

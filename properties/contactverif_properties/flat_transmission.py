@@ -3,8 +3,8 @@
 **Question.** Two flat surfaces with different meshes penetrate each other by the same depth everywhere. Are the nodal
 forces the consistent forces of the pressure ε̂ |g|, on the slave and on the master?
 
-**Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure that is
-not there onto the bodies, and finer meshes do not help: refined solutions converge to a wrong stress.
+**Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure onto the
+bodies that is not there. Finer meshes do not help, because the error is made anew at every node.
 
 **How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces.
 The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap is

@@ -3,9 +3,9 @@
 **Question.** A Newton step starts at a small distance from the solution of a random scene, with the pairing of the
 solution. How fast does the distance after the step fall with the distance before it?
 
-**Why it matters.** A tangent with a forgotten term still converges, but slowly: an analysis then takes ten times as
-many iterations, and smaller load steps. One step near the solution shows the order; the residuals of a whole solution
-often hide it.
+**Why it matters.** A tangent with a forgotten term may still converge, but slowly: an analysis then takes more
+iterations and smaller load steps. One step near the solution shows the order; the residuals of a whole solution often
+hide it.
 
 **How it is judged.** Steps start at distances of 3e-2 to 1e-5 ℓ in two random directions. The measured number is the
 slope of log |u1 − u*| over log |u0 − u*| at the three nearest distances where |u1 − u*| is above 1e3 u cond; the
