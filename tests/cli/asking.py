@@ -1,4 +1,4 @@
-"""Asks the command line in the test's own process."""
+"""The command line, called in the process of the test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactverif.cli import app as cli
 
 
 class Answer(NamedTuple):
-    """What the command left: its exit status, and what it wrote."""
+    """The exit status of a command, and its output."""
 
     status: int
     out: str
@@ -24,20 +24,20 @@ Ask = Callable[..., Answer]
 
 
 def asking(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    """The command `contactverif`, with 140 columns unless told otherwise."""
+    """Return a function that runs `contactverif`, with 140 columns if the test does not say how many."""
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.delenv("FORCE_COLOR", raising=False)
 
-    def asked(*arguments: str | Path, columns: int | None = None) -> Answer:
+    def run_command(*arguments: str | Path, columns: int | None = None) -> Answer:
         if columns is None:
             monkeypatch.delenv("COLUMNS", raising=False)
         else:
             monkeypatch.setenv("COLUMNS", str(columns))
         monkeypatch.setattr(sys, "argv", ["contactverif", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
+        with pytest.raises(SystemExit) as exit_info:
             cli.main()
         out, err = capsys.readouterr()
-        assert isinstance(exit_.value.code, int)
-        return Answer(exit_.value.code, out, err)
+        assert isinstance(exit_info.value.code, int)
+        return Answer(exit_info.value.code, out, err)
 
-    return asked
+    return run_command

@@ -9,7 +9,7 @@ from contactverif.run.registry import load_properties
 
 
 def run_with(case: Case, formulation: str, property_id: str = "patch.flat.transmission") -> Run:
-    """As if the formulation had failed an installed property on the case."""
+    """Return a run in which the formulation failed an installed property on the case."""
     (question,) = load_properties([property_id])
     assert isinstance(question, Property)
     failed = Outcome(case, Verdict.FAIL, "made by hand")

@@ -37,8 +37,8 @@ def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def environment(**more: str) -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
-    return {**kept, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **more}
+    unchanged = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
+    return {**unchanged, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **more}
 
 
 def command(*arguments: str | Path) -> list[str]:
@@ -47,7 +47,7 @@ def command(*arguments: str | Path) -> list[str]:
 
 def rows(out: str) -> dict[tuple[str, str], list[str]]:
     """{(formulation, property): the other words of the row} of a table of verdicts."""
-    found: dict[tuple[str, str], list[str]] = {}
+    cells: dict[tuple[str, str], list[str]] = {}
     table = out.split("\n\n")[1]
     formulation = ""
     for line in table.splitlines()[1:]:
@@ -55,13 +55,13 @@ def rows(out: str) -> dict[tuple[str, str], list[str]]:
             formulation = line.strip()
         else:
             property_id, *words = line.split()
-            found[formulation, property_id] = words
-    return found
+            cells[formulation, property_id] = words
+    return cells
 
 
 @pytest.fixture(scope="module")
 def nts_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A report of NTS failing the patch test."""
+    """Return a report in which NTS fails the patch test."""
     path = tmp_path_factory.mktemp("reports") / "nts.nc"
     arguments = ["verify", "nts", "-p", "patch.flat.transmission", "--seed", "1", "--examples", "20", "--out", path]
     subprocess.run(command(*arguments), env=environment(), capture_output=True, check=True)
@@ -125,20 +125,22 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("arguments", "said"), MISTAKES, ids=[" ".join(map(str, one))[:60] for one, _ in MISTAKES])
+@pytest.mark.parametrize(
+    ("arguments", "message"), MISTAKES, ids=[" ".join(map(str, arguments))[:60] for arguments, _ in MISTAKES]
+)
 def test_a_mistake_is_one_line_and_nothing_is_judged(
-    ask: Ask, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], said: str
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], message: str
 ) -> None:
     judged: list[Any] = []
     monkeypatch.setattr(runner, "judge_case", lambda *anything: judged.append(anything))
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
     assert not judged
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--case", "nts.patch.flat"], rf"--case: found 'nts.patch.flat'; needed an id like {CASE}"),
         (["--case", CASE, "--formulation", "vts-pt"], "formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
@@ -146,51 +148,51 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
         (["--case", CASE, "--out", "no/such/a.png"], "--out: found .* is no folder; needed a folder that exists"),
     ],
 )  # fmt: skip
-def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: Sequence[str], said: str) -> None:
+def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: Sequence[str], message: str) -> None:
     answer = ask("replay", nts_report, *options)
     assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
 
 
 def test_a_mistake_in_a_process_of_its_own_has_no_traceback() -> None:
     for arguments in (["verify", "nope"], ["verify", "nts", "--out", "/no/such/folder/r.nc"], ["replay", "no.nc"]):
-        done = subprocess.run(command(*arguments), env=environment(), capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert done.stderr.startswith("contactverif: ")
-        assert done.stderr.count("\n") == 1
+        finished = subprocess.run(command(*arguments), env=environment(), capture_output=True, text=True, check=False)
+        assert (finished.returncode, finished.stdout) == (2, "")
+        assert finished.stderr.startswith("contactverif: ")
+        assert finished.stderr.count("\n") == 1
 
 
 def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask, tmp_path: Path) -> None:
-    """Of the base only lines are left, the wrong way round; that is what --flip is for."""
+    """Without cells nobody knows on which side the base lies; --flip says that it is the other one."""
     mesh = meshio.read(PUNCH)
     number = int(mesh.field_data["base"][0])
-    kept = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
-    tags = [mesh.cell_data["gmsh:physical"][index] for index in kept]
+    numbers = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
+    tags = [mesh.cell_data["gmsh:physical"][index] for index in numbers]
     blocks = []
-    for index, tag in zip(kept, tags, strict=True):
+    for index, tag in zip(numbers, tags, strict=True):
         block = mesh.cells[index]
         turned = (block.type == "line") & (tag == number)
         blocks.append((block.type, block.data[:, ::-1] if turned.all() else block.data))
-    found = {}
-    for name, chosen in (
-        ("as.msh", [(mesh.cells[i].type, mesh.cells[i].data) for i in kept]),
+    answers = {}
+    for name, cell_blocks in (
+        ("as.msh", [(mesh.cells[i].type, mesh.cells[i].data) for i in numbers]),
         ("turned.msh", blocks),
     ):
         data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
         meshio.write(
             tmp_path / name,
-            meshio.Mesh(mesh.points, chosen, cell_data=data, field_data=mesh.field_data),
+            meshio.Mesh(mesh.points, cell_blocks, cell_data=data, field_data=mesh.field_data),
             file_format="gmsh22",
             binary=False,
         )
         options = ("--mesh", tmp_path / name, *ON_PUNCH[2:], "-p", "balance.force", "--examples", "2", "--seed", "1")
         for flip in ((), ("--flip",)):
-            found[name, flip] = ask("verify", "nts", *options, *flip)
-    statuses = sorted(answer.status for answer in found.values())
+            answers[name, flip] = ask("verify", "nts", *options, *flip)
+    statuses = sorted(answer.status for answer in answers.values())
     assert statuses == [0, 0, 2, 2]
     for name in ("as.msh", "turned.msh"):
-        assert {found[name, ()].status, found[name, ("--flip",)].status} == {0, 2}
-    for answer in found.values():
+        assert {answers[name, ()].status, answers[name, ("--flip",)].status} == {0, 2}
+    for answer in answers.values():
         if answer.status == 2:
             assert re.fullmatch(
                 r"contactverif: --mesh: found mean normals .* do not oppose each other; .*\n", answer.err
@@ -206,11 +208,11 @@ def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask,
 class Broken:
     """Breaks every promise that it makes."""
 
-    def __init__(self, what: str) -> None:
-        self.what = what
+    def __init__(self, fault: str) -> None:
+        self.fault = fault
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        if self.what == "raises":
+        if self.fault == "raises":
             raise KeyError("[/bold] is no markup")
         return z * float("nan")
 
@@ -238,11 +240,11 @@ def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
         ),
     ]
 
-    def installed(*, group: str) -> list[EntryPoint]:
+    def list_entry_points(*, group: str) -> list[EntryPoint]:
         return [*entry_points(group=group), *(more if group == registry.FORMULATIONS else [])]
 
     monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
-    monkeypatch.setattr(registry, "entry_points", installed)
+    monkeypatch.setattr(registry, "entry_points", list_entry_points)
 
 
 @pytest.mark.usefixtures("strangers")
@@ -299,7 +301,9 @@ def test_verify_says_what_was_asked_and_how_it_came_out(ask: Ask) -> None:
     assert answer.status == 0
     assert not answer.err
     assert answer.out.startswith("profile dev: 7 random cases for each property, seed 1\n")
-    assert set(rows(answer.out)) == {("vts-ppt-balanced", one) for one in ("balance.force", "balance.moment", "purity")}
+    assert set(rows(answer.out)) == {
+        ("vts-ppt-balanced", property_id) for property_id in ("balance.force", "balance.moment", "purity")
+    }
     assert answer.out.endswith("\nEvery promise is kept and every property was judged.\n")
     promise, verdict, judged, worst, sign, tolerance = rows(answer.out)["vts-ppt-balanced", "balance.force"]
     assert (promise, verdict, judged, sign) == ("passes", "pass", "7/7", "≤")
@@ -336,7 +340,7 @@ def test_all_is_every_installed_formulation(ask: Ask) -> None:
 def test_a_mesh_of_the_user_is_judged(ask: Ask) -> None:
     answer = ask("verify", "vts-ppt-balanced", *ON_PUNCH, "--examples", "5", "--seed", "1")
     assert answer.status == 0, answer.out
-    assert {one for _, one in rows(answer.out)} == set(registry.property_ids())
+    assert {property_id for _, property_id in rows(answer.out)} == set(registry.property_ids())
     verdicts = {words[1] for words in rows(answer.out).values()}
     assert "pass" in verdicts
     assert verdicts <= {"pass", "not"}  # applicable
@@ -392,7 +396,7 @@ def test_the_bar_is_for_a_terminal_and_leaves_a_pipe_alone() -> None:
     """Standard error is a terminal, standard output a pipe: the bar is there, and the table has no trace of it."""
     arguments = command("verify", "nts", "-p", "purity", "--examples", "40", "--seed", "1")
     ours, theirs = pty.openpty()
-    seen = bytearray()
+    shown_bytes = bytearray()
     try:
         variables = environment(TERM="xterm")
         with subprocess.Popen(arguments, env=variables, stdout=subprocess.PIPE, stderr=theirs, text=True) as running:
@@ -404,13 +408,13 @@ def test_the_bar_is_for_a_terminal_and_leaves_a_pipe_alone() -> None:
                     break
                 if not piece:
                     break
-                seen += piece
+                shown_bytes += piece
             assert running.stdout is not None
             out = running.stdout.read()
     finally:
         os.close(ours)
     alone = subprocess.run(arguments, env=environment(), capture_output=True, text=True, check=True)
-    assert b"nts  purity" in seen
+    assert b"nts  purity" in shown_bytes
     assert out == alone.stdout
     assert "\x1b" not in out
     assert "\r" not in out
@@ -468,7 +472,7 @@ def test_the_same_seed_gives_the_same_report(tmp_path: Path) -> None:
         variables = environment(PYTHONHASHSEED=hashes)
         subprocess.run(command(*arguments), cwd=folder, env=variables, capture_output=True, check=True)
     assert same_data(reports["a"], reports["b"]) == []
-    assert any("/patch" in one for one in same_data(reports["a"], reports["c"]))
+    assert any("/patch" in difference for difference in same_data(reports["a"], reports["c"]))
     assert case_ids(reports["a"])
 
 
@@ -488,7 +492,7 @@ def make(*, penalty):
 
 @pytest.fixture
 def slow_plugin(tmp_path: Path) -> Path:
-    """A folder for PYTHONPATH with a formulation `slow`, which says in a file that it is being judged."""
+    """Return a folder for PYTHONPATH with a formulation `slow`, which makes a file when it is judged."""
     folder = tmp_path / "plugins"
     about = folder / "slow-1.0.dist-info"
     about.mkdir(parents=True)
@@ -521,7 +525,7 @@ def running(slow_plugin: Path, tmp_path: Path, nts_report: Path) -> Iterator[sub
 
 
 def left_behind(process: subprocess.Popen[str], folder: Path, report: Path) -> None:
-    """The report is the one that was there, and there is no other file."""
+    """Check that the older report is still there, and no other file."""
     assert (folder / "r.nc").read_bytes() == report.read_bytes()
     assert sorted(path.name for path in folder.iterdir()) == ["judging", "r.nc"]
 

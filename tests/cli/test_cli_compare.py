@@ -32,33 +32,33 @@ def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     return partial(asking(monkeypatch, capsys), "compare")
 
 
-def found(names: Sequence[str], *globs: str, examples: int = 12, seed: int = 1) -> Run:
+def run_properties(names: Sequence[str], *globs: str, examples: int = 12, seed: int = 1) -> Run:
     subjects = [load_formulation(name) for name in names]
     return run(subjects, load_properties(globs or ["patch.flat.transmission"]), examples=examples, seed=seed)
 
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Reports: `old`, `same`; `worse`, where VTS-PPT does what VTS-ME does; `other` (seed), `nts`, `purity`."""
+    """Return a folder of reports: `old`, `same`, `worse` (as bad as VTS-ME), `other` (other seed), `nts`, `purity`."""
     folder = tmp_path_factory.mktemp("reports")
-    old, other = found(["vts-ppt"]), found(["vts-ppt"], seed=2)
-    (promised,), (worse,) = old.rows, found(["vts-me"]).rows
+    old, other = run_properties(["vts-ppt"]), run_properties(["vts-ppt"], seed=2)
+    (promised,), (worse,) = old.rows, run_properties(["vts-me"]).rows
     row = replace(worse, formulation=promised.formulation, promise=promised.promise)
-    made = {
+    runs = {
         "old": old,
         "same": old,
         "worse": replace(old, rows=(row,)),
         "other": other,
-        "nts": found(["nts"]),
-        "purity": found(["vts-ppt"], "purity", examples=2),
+        "nts": run_properties(["nts"]),
+        "purity": run_properties(["vts-ppt"], "purity", examples=2),
     }
-    for name, one in made.items():
-        write(one, folder / f"{name}.nc")
+    for name, result in runs.items():
+        write(result, folder / f"{name}.nc")
     return folder
 
 
 class Page(HTMLParser):
-    """What a page holds: its text, its ids, and what it would fetch from elsewhere."""
+    """The text of a page, its ids, and the addresses from which it would load something."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -98,11 +98,11 @@ def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
     assert answer.out.rstrip().endswith("Every promise of vts-me is kept.")
 
 
-def test_all_that_is_asked_for_is_written(ask: Ask, tmp_path: Path) -> None:
+def test_every_file_that_is_named_is_written(ask: Ask, tmp_path: Path) -> None:
     report, html, pictures = tmp_path / "r.nc", tmp_path / "r.html", tmp_path / "new" / "pictures"
     answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--out", report, "--out", html, "--pictures", pictures)
     assert answer.status == 0
-    write(found(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
+    write(run_properties(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
     assert same_data(report, tmp_path / "v.nc") == []  # as verify writes it
     assert sorted(path.name for path in pictures.iterdir()) == [
         f"{name}.{id_}.png" for name in ("vts-me", "vts-ppt") for id_ in ("balance.force", "patch.flat.transmission")
@@ -120,7 +120,7 @@ def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not
 ) -> None:
     """VTS-PPT under trial says that it fails `balance.force`; a harness where nothing fails breaks that."""
     judge = runner.judge_case
-    monkeypatch.setattr(runner, "judge_case", lambda *one: replace(judge(*one), verdict=Verdict.PASS, reason=""))
+    monkeypatch.setattr(runner, "judge_case", lambda *result: replace(judge(*result), verdict=Verdict.PASS, reason=""))
     options = ("--examples", "3", "--seed", "1", "-p", "balance.force")
     answer = ask("vts-ppt", "--against", "vts-me", *options)
     assert answer.status == 1
@@ -154,9 +154,9 @@ def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: P
     answer = ask(reports / "old.nc", reports / "worse.nc", "--out", html)
     assert answer.status == 1
     assert "pass → fail" in answer.out
-    told = " ".join(answer.out.split())  # it is long, and wrapped
+    words = " ".join(answer.out.split())  # it is long, and wrapped
     assert re.search(
-        r" 1 regression vts-ppt, patch.flat.transmission: pass → fail .*; error grew, in tolerances, on", told
+        r" 1 regression vts-ppt, patch.flat.transmission: pass → fail .*; error grew, in tolerances, on", words
     )
     replay = re.search(r"contactverif replay (\S+) --case vts-ppt.patch.flat.transmission", answer.out)
     assert replay
@@ -172,8 +172,8 @@ def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
     tables = ask(reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
     assert "…" not in tables
     assert re.search(r"better +equal +worse +time", tables)
-    asked = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
-    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *asked, columns=80).out.partition("\npatch.flat.")[0]
+    options = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
+    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *options, columns=80).out.partition("\npatch.flat.")[0]
     assert "…" not in tables
     assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)
     assert re.search(r"converged +median +most +fewer +same +more +order *\n", tables)
@@ -228,22 +228,22 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("arguments", "said"), MISTAKES, ids=[" ".join(one)[-60:] for one, _ in MISTAKES])
+@pytest.mark.parametrize(("arguments", "message"), MISTAKES, ids=[" ".join(result)[-60:] for result, _ in MISTAKES])
 def test_a_mistake_is_one_line_and_nothing_is_judged(
-    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: Sequence[str], said: str
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: Sequence[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     judged: list[Any] = []
     monkeypatch.setattr(runner, "judge_case", lambda *anything: judged.append(anything))
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
     assert not judged
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
-    ("new", "options", "said"),
+    ("new", "options", "message"),
     [
         ("nts.nc", [], r"NEW.nc: found no formulation that OLD.nc has too \(vts-ppt and nts\); needed two reports .*"),
         ("purity.nc", [], r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
@@ -259,7 +259,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
     ],
 )
 def test_a_mistake_in_a_report_is_one_line(
-    ask: Ask, reports: Path, new: str, options: Sequence[str], said: str
+    ask: Ask, reports: Path, new: str, options: Sequence[str], message: str
 ) -> None:
     if not (reports / new).exists():
         shutil.copy(reports / "old.nc", reports / new)
@@ -272,4 +272,4 @@ def test_a_mistake_in_a_report_is_one_line(
                 data["summary"].renameVariable("row_verdict", "gone")
     answer = ask(reports / "old.nc", reports / new, *options)
     assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err

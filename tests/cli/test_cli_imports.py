@@ -1,4 +1,4 @@
-"""How the command line starts: what it imports, its version, `python -m contactverif`, and completion in a shell.
+"""The start of the command line: its imports, its version, `python -m contactverif`, and completion in a shell.
 
 Modules are counted and not seconds, so that a busy machine changes nothing.
 """
@@ -39,8 +39,8 @@ FOR_SOLVING = (
 
 def run_python(*arguments: str, **variables: str) -> str:
     """Return what a Python process prints."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
-    environment = {**kept, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **variables}
+    unchanged = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
+    environment = {**unchanged, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **variables}
     finished = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=True)
     return finished.stdout
 

@@ -16,17 +16,17 @@ def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.fixture
 def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
-    """A report of NTS, which fails the patch test as it says, and what `verify` printed."""
+    """Return a report of NTS, which fails the patch test as it states, and the output of `verify`."""
     path = tmp_path / "nts.nc"
-    asked = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3")
-    return path, ask("verify", "nts", "vts-ppt", *asked, "--out", path)
+    options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3")
+    return path, ask("verify", "nts", "vts-ppt", *options, "--out", path)
 
 
 def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
     path, verified = run
-    shown = ask("report", path)
-    assert (shown.status, shown.err) == (0, "")
-    *table, summary = shown.out.splitlines()
+    answer = ask("report", path)
+    assert (answer.status, answer.err) == (0, "")
+    *table, summary = answer.out.splitlines()
     assert len(table) > 8
     assert verified.out.splitlines()[: len(table)] == table
     assert verified.out.splitlines()[-1] == summary

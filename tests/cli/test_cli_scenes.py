@@ -40,7 +40,7 @@ def ends(out: str) -> dict[str, list[str]]:
 
 @pytest.fixture
 def scene_report(tmp_path: Path) -> Path:
-    """A report whose counterexample is the scene c′."""
+    """Return a report whose counterexample is the scene c′."""
     path = tmp_path / "scene.nc"
     write(run_with(load_scene("c-prime").case(), "vts-me"), path)
     return path
@@ -111,9 +111,9 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("arguments", "said"), MISTAKES, ids=[" ".join(one) for one, _ in MISTAKES])
+@pytest.mark.parametrize(("arguments", "message"), MISTAKES, ids=[" ".join(arguments) for arguments, _ in MISTAKES])
 def test_a_mistake_is_one_line_and_nothing_is_solved(
-    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], said: str
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], message: str
 ) -> None:
     def never(*anything: Any, **more: Any) -> Any:
         raise AssertionError("solved or judged")
@@ -124,7 +124,7 @@ def test_a_mistake_is_one_line_and_nothing_is_solved(
     monkeypatch.setattr(runner, "judge_case", never)
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {said}\n", answer.err), answer.err
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
@@ -150,9 +150,9 @@ def test_fig_30_of_the_paper(ask: Ask, tmp_path: Path, suffix: str, begins: byte
 def test_draw_shows_the_error_of_the_stress_where_it_is_known(ask: Ask) -> None:
     answer = ask("draw", "--scene", "c", "-f", "nts", "-f", "vts-ppt")
     assert answer.status == 0
-    found = ends(answer.out)
-    assert float(found["nts"][-1]) > 0.01
-    assert float(found["vts-ppt"][-1]) < 1e-9
+    rows = ends(answer.out)
+    assert float(rows["nts"][-1]) > 0.01
+    assert float(rows["vts-ppt"][-1]) < 1e-9
     assert "●─2─●─2─●───4───●───4───●" in answer.out  # no file was asked for
 
 
@@ -207,13 +207,13 @@ def test_a_stored_interface_is_drawn_as_replay_does(ask: Ask, tmp_path: Path) ->
     ask("replay", report, "--case", case_id, "--out", files["replay"])
     assert files["draw"].read_bytes() == files["replay"].read_bytes()
     assert "●─2─●─2─●───4───●───4───●" in ask("draw", report, "--case", case_id).out
-    for options, said in (
+    for options, message in (
         (["--out", tmp_path / "a.vtu"], r"--out: found .*a.vtu for a case without bodies; needed a .png or .svg file"),
         (["-f", "nts", "-f", "vts-g"], r"--formulation: found 2 of them; needed one, .*"),
     ):
         answer = ask("draw", report, "--case", case_id, *options)
         assert (answer.status, answer.out) == (2, "")
-        assert re.fullmatch(f"contactverif: {said}\n", answer.err)
+        assert re.fullmatch(f"contactverif: {message}\n", answer.err)
 
 
 # ---------------------------------------------------------------------------------------------------------------------

@@ -53,10 +53,10 @@ def test_a_scene_comes_back_to_the_last_bit(name: str, tmp_path: Path) -> None:
         assert values.shape == after[key].shape
         assert values.tobytes() == after[key].tobytes() or values.dtype.kind == "U"
     assert has_bodies(again)
-    for one, other in zip(scene_of(case).bodies, scene_of(again).bodies, strict=True):
+    for first, second in zip(scene_of(case).bodies, scene_of(again).bodies, strict=True):
         for key in ("nodes", "cells", "contact", "fixed", "imposed", "load", "axis", "start"):
-            assert getattr(one, key).tobytes() == getattr(other, key).tobytes(), key
-        assert (one.young, one.poisson, one.rigid) == (other.young, other.poisson, other.rigid)
+            assert getattr(first, key).tobytes() == getattr(second, key).tobytes(), key
+        assert (first.young, first.poisson, first.rigid) == (second.young, second.poisson, second.rigid)
 
 
 def test_what_comes_back_is_solved_to_the_same_bits(tmp_path: Path) -> None:
@@ -64,9 +64,9 @@ def test_what_comes_back_is_solved_to_the_same_bits(tmp_path: Path) -> None:
     write(run_with(case, "vts-ppt"), tmp_path / "a.nc")
     again = read_case(tmp_path / "a.nc", ID).case
     subject = load_formulation("vts-ppt")
-    (one,), (other,) = (solve_scene(each, [subject]).solutions for each in (case, again))
-    assert one.z.tobytes() == other.z.tobytes()
-    assert one.residuals.tobytes() == other.residuals.tobytes()
+    (first,), (second,) = (solve_scene(each, [subject]).solutions for each in (case, again))
+    assert first.z.tobytes() == second.z.tobytes()
+    assert first.residuals.tobytes() == second.residuals.tobytes()
 
 
 @pytest.mark.parametrize("name", ["c", "odd"])

@@ -1,4 +1,4 @@
-"""Where output goes may be full, closed or know no Greek, and whoever watches may press Ctrl-C: no traceback for it."""
+"""Output that cannot be written, a closed pipe, a terminal without Greek, Ctrl-C: none of them is a traceback."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from contactverif.cli.progress import Bar
 MAIN = [sys.executable, "-c", "from contactverif.cli import main; main()"]
 
 
-def asked(*arguments: str, **how: object) -> subprocess.CompletedProcess[str]:
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "timeout": 120} | how
+def run_command(*arguments: str, **settings: object) -> subprocess.CompletedProcess[str]:
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "timeout": 120} | settings
     return subprocess.run([*MAIN, *arguments], check=False, **options)  # type: ignore[call-overload, no-any-return]
 
 
 def test_a_terminal_without_greek_is_shown_question_marks() -> None:
-    answer = asked("scenes", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    answer = run_command("scenes", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (answer.returncode, answer.stderr) == (0, "")
     assert "?" in answer.stdout
     assert answer.stdout.isascii()
@@ -30,7 +30,7 @@ def test_a_terminal_without_greek_is_shown_question_marks() -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
 def test_a_full_disk_is_one_line() -> None:
     with open("/dev/full", "w") as full:
-        answer = asked("list", stdout=full)
+        answer = run_command("list", stdout=full)
     assert answer.returncode == 2
     assert answer.stderr == "contactverif: the output cannot be written: No space left on device\n"
 
@@ -39,14 +39,14 @@ def test_who_has_seen_enough_may_close_the_pipe() -> None:
     read, write = os.pipe()
     os.close(read)
     try:
-        answer = asked("list", stdout=write)
+        answer = run_command("list", stdout=write)
     finally:
         os.close(write)
     assert (answer.returncode, answer.stderr) == (128 + signal.SIGPIPE, "")
 
 
 def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
-    """As in a callback of the garbage collector, where nothing can be raised."""
+    """A callback of the garbage collector drops the exception of the first Ctrl-C."""
     before = signal.getsignal(signal.SIGINT)
     with Bar() as bar:
         bar.update("one", 0, 3)
@@ -58,12 +58,12 @@ def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
 
 
 def test_two_references_are_one_too_many() -> None:
-    answer = asked("compare", "nts", "--against", "vts-ppt", "--against", "vts-me")
+    answer = run_command("compare", "nts", "--against", "vts-ppt", "--against", "vts-me")
     assert answer.returncode == 2
     assert answer.stderr == "contactverif: --against: found 2: vts-ppt, vts-me; needed one\n"
 
 
 def test_a_folder_without_a_name_is_none() -> None:
-    answer = asked("paper", "--out", "")
+    answer = run_command("paper", "--out", "")
     assert answer.returncode == 2
     assert answer.stderr == "contactverif: --out: found ''; needed the name of a folder\n"

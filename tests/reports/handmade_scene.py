@@ -37,7 +37,7 @@ def bodies(*, wide: float = 0.0, angle: float = 0.0, rigid_master: bool = False)
     return upper, lower
 
 
-def solved(
+def make_solved_scene(
     *,
     penetration: float = 0.01,
     wide: float = 0.0,
@@ -46,7 +46,7 @@ def solved(
     names: tuple[str, ...] = ("one", "two"),
     ends: tuple[str, ...] = ("converged", "2-cycle"),
 ) -> SolvedScene:
-    """A uniform pressure: the slave has moved towards the master by the penetration, and nothing else has."""
+    """Return a scene under uniform pressure: the slave has moved towards the master by the penetration."""
     pair = bodies(wide=wide, angle=angle, rigid_master=rigid_master)
     first = len(pair[0].contact_nodes)
     numbers = (np.arange(first), np.arange(first, first + len(pair[1].contact_nodes)))

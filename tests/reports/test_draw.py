@@ -15,7 +15,7 @@ from contactverif_reports.draw import as_text, draw_case
 from contactverif_reports.draw.lengths import format_number
 
 
-def kinked() -> Case:
+def make_kinked_case() -> Case:
     interface = Interface.from_chains([[0, 0], [1.5, 0.5], [3, 1], [5, -0.5]], [[5, -0.5], [3, 1], [0, 0]])
     moved = interface.nodes.copy()
     moved[:4, 1] -= 0.01
@@ -37,7 +37,7 @@ def many(n: int = 60) -> Case:
     return flat([1.0 + i % 3 for i in range(n)], [2.0 + i % 2 for i in range(n - 15)])
 
 
-def shifted(case: Case, by: float) -> Case:
+def shift(case: Case, by: float) -> Case:
     return Case(case.interface.at(case.interface.nodes + by), case.z + by)
 
 
@@ -53,9 +53,9 @@ CASES = {
     "touching": flat([2, 2], [4], penetration=0.0),
     "open": flat([2, 2], [4], penetration=-0.5),
     "overhang": flat([3, 2, 2], [2, 2.5]),
-    "offset": shifted(flat([2, 2], [4]), 1e8),
+    "offset": shift(flat([2, 2], [4]), 1e8),
     "many": many(),
-    "kinked": kinked(),
+    "kinked": make_kinked_case(),
     "ring": ring(),
     "fine ring": ring(60, 41),
     "awkward": awkward(),
@@ -186,5 +186,5 @@ def test_matplotlib_is_imported_late() -> None:
         "import sys, contactverif_reports.draw, contactverif_reports.netcdf.read, contactverif_reports.netcdf.write;"
         "print({'matplotlib', 'xarray', 'netCDF4'} & {*sys.modules})"
     )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert found == "set()\n"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert modules == "set()\n"

@@ -34,7 +34,7 @@ def test_silhouettes_are_to_scale(width: int) -> None:
     assert len(disk) == pytest.approx(2 * len(foundation), abs=2)
     assert len(set(foundation)) == 1
     assert max(disk) == pytest.approx(foundation[0], abs=1)
-    area = 20 * 10 / sum(foundation)  # of a character
+    area = 20 * 10 / sum(foundation)  # The height of a character over its width
     assert sum(disk) * area == pytest.approx(np.pi * 100, rel=0.1)
     assert lines[0].strip() == "↓"
     assert lines[-2:] == [

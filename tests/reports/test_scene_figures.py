@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from handmade_scene import solved
+from handmade_scene import make_solved_scene
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
@@ -22,32 +22,34 @@ from contactverif_reports.draw.scene_meshes import Magnification, colour_scale, 
 from contactverif_reports.draw.solved_scene import SolvedScene
 
 
-def changed(found: SolvedScene, index: int = 0, **what: Any) -> SolvedScene:
+def change(scene: SolvedScene, index: int = 0, **values: Any) -> SolvedScene:
     """With one solution changed."""
-    solutions = list(found.solutions)
-    solutions[index] = replace(solutions[index], **what)
-    return replace(found, solutions=tuple(solutions))
+    solutions = list(scene.solutions)
+    solutions[index] = replace(solutions[index], **values)
+    return replace(scene, solutions=tuple(solutions))
 
 
 SCENES = {
-    "two": solved(),
-    "one": solved(names=("only",), ends=("converged",)),
-    "turned": solved(angle=0.5, wide=1.0),
-    "upright": solved(angle=np.pi / 2),
-    "rigid": solved(rigid_master=True),
-    "open": solved(penetration=-0.3),
-    "touching": solved(penetration=0.0),
-    "deep": solved(penetration=1.0),
-    "unknown pressure": changed(changed(solved(), pressure=np.nan), 1, pressure=np.nan),
-    "no forces": changed(solved(), forces=np.full((7, 2), np.nan), points=None),
-    "exactly zero": changed(solved(), residuals=np.array([1.0, 0.5, 0.0]), energies=np.array([1.0, 0.0, np.nan])),
-    "at once": changed(
-        solved(), residuals=np.zeros(1), energies=np.full(1, np.nan), floors=np.zeros(1), factors=np.ones(1)
+    "two": make_solved_scene(),
+    "one": make_solved_scene(names=("only",), ends=("converged",)),
+    "turned": make_solved_scene(angle=0.5, wide=1.0),
+    "upright": make_solved_scene(angle=np.pi / 2),
+    "rigid": make_solved_scene(rigid_master=True),
+    "open": make_solved_scene(penetration=-0.3),
+    "touching": make_solved_scene(penetration=0.0),
+    "deep": make_solved_scene(penetration=1.0),
+    "unknown pressure": change(change(make_solved_scene(), pressure=np.nan), 1, pressure=np.nan),
+    "no forces": change(make_solved_scene(), forces=np.full((7, 2), np.nan), points=None),
+    "exactly zero": change(
+        make_solved_scene(), residuals=np.array([1.0, 0.5, 0.0]), energies=np.array([1.0, 0.0, np.nan])
     ),
-    "load steps": changed(
-        solved(names=("only",), ends=("converged",)), factors=np.array([0.5, 0.5, 1.0])
+    "at once": change(
+        make_solved_scene(), residuals=np.zeros(1), energies=np.full(1, np.nan), floors=np.zeros(1), factors=np.ones(1)
     ),
-    "many": solved(names=tuple(f"$m_{n}\\alpha$" for n in range(8)), ends=("converged",) * 8),
+    "load steps": change(
+        make_solved_scene(names=("only",), ends=("converged",)), factors=np.array([0.5, 0.5, 1.0])
+    ),
+    "many": make_solved_scene(names=tuple(f"$m_{n}\\alpha$" for n in range(8)), ends=("converged",) * 8),
 }  # fmt: skip
 
 
@@ -63,7 +65,7 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
     draw_scene(SCENES["two"], tmp_path / "a.svg", title="a scene")
     draw_scene(SCENES["two"], tmp_path / "b.svg", title="a scene")
     words = (tmp_path / "a.svg").read_text()
-    for said in (
+    for phrase in (
         "a scene",
         "penalty 1e4; slave E 1, ν 0, master E 1, ν 0",
         "displacements × 40, penetration × 40",
@@ -76,7 +78,7 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
         "largest residual",
         "roundoff of the residual",
     ):
-        assert said in words, said
+        assert phrase in words, phrase
     assert (tmp_path / "b.svg").read_text() == words
 
 
@@ -88,48 +90,56 @@ def test_what_is_not_known_is_not_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["two", "turned", "upright", "rigid", "open"])
 def test_gaps_are_drawn_magnified_by_what_is_said(name: str) -> None:
     """The nodes of the slave as drawn, against the master as drawn."""
-    found = SCENES[name]
+    scene = SCENES[name]
     large = Magnification(3.0, 7.0)
     axes = Figure().add_subplot()
-    draw_bodies(axes, found, found.solutions[0], large, colour_scale(found))
-    faces = next(one for one in axes.collections if isinstance(one, PolyCollection) and one.get_array() is not None)
-    index = 0 if found.bodies[1].rigid else 1  # the master is drawn first
-    bodies = [one for one in axes.collections if isinstance(one, PolyCollection) and one.get_array() is not None]
+    draw_bodies(axes, scene, scene.solutions[0], large, colour_scale(scene))
+    faces = next(
+        collection
+        for collection in axes.collections
+        if isinstance(collection, PolyCollection) and collection.get_array() is not None
+    )
+    index = 0 if scene.bodies[1].rigid else 1  # the master is drawn first
+    bodies = [
+        collection
+        for collection in axes.collections
+        if isinstance(collection, PolyCollection) and collection.get_array() is not None
+    ]
     slave = bodies[-1]
     assert faces is bodies[0]
     assert len(bodies) == index + 1
-    drawn = np.array([path.vertices[:4] for path in slave.get_paths()])  # (n_cells, 4, 2)
-    cells, nodes = found.bodies[0].cells, found.bodies[0].contact_nodes
-    places = np.array([drawn[cells == node][0] for node in nodes])
-    reference = found.case.interface.nodes  # the master has not moved
-    gaps = Gaps.from_case(Case(found.case.interface, np.vstack([places, reference[len(places) :]]).ravel())).gap
-    right = Gaps.from_case(Case(found.case.interface, found.solutions[0].z)).gap
+    corners = np.array([path.vertices[:4] for path in slave.get_paths()])  # (n_cells, 4, 2)
+    cells, nodes = scene.bodies[0].cells, scene.bodies[0].contact_nodes
+    places = np.array([corners[cells == node][0] for node in nodes])
+    reference = scene.case.interface.nodes  # the master has not moved
+    gaps = Gaps.from_case(Case(scene.case.interface, np.vstack([places, reference[len(places) :]]).ravel())).gap
+    right = Gaps.from_case(Case(scene.case.interface, scene.solutions[0].z)).gap
     np.testing.assert_allclose(gaps, 7.0 * right, atol=1e-12)
-    lengths = np.linalg.norm(drawn - np.roll(drawn, 1, axis=1), axis=-1)
-    whole = found.bodies[0].nodes[cells]
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+    whole = scene.bodies[0].nodes[cells]
     np.testing.assert_allclose(lengths, np.linalg.norm(whole - np.roll(whole, 1, axis=1), axis=-1), atol=1e-12)
 
 
 def test_one_magnification_for_all_that_stayed_near() -> None:
-    found = solved(names=("a", "b", "far"), ends=("converged", "2-cycle", "diverged"))
-    deeper = solved(penetration=0.02, names=("b",), ends=("2-cycle",)).solutions[0]
-    found = replace(found, solutions=(found.solutions[0], deeper, found.solutions[2]))
-    away = found.solutions[0].z + 1e5
-    far = changed(found, 2, displacements=tuple(u + 1e5 for u in found.solutions[0].displacements), z=away)
+    scene = make_solved_scene(names=("a", "b", "far"), ends=("converged", "2-cycle", "diverged"))
+    deeper = make_solved_scene(penetration=0.02, names=("b",), ends=("2-cycle",)).solutions[0]
+    scene = replace(scene, solutions=(scene.solutions[0], deeper, scene.solutions[2]))
+    away = scene.solutions[0].z + 1e5
+    far = change(scene, 2, displacements=tuple(u + 1e5 for u in scene.solutions[0].displacements), z=away)
     large = magnifications(far)
     assert large["a"] == large["b"] == Magnification(20.0, 20.0)
     assert large["far"].move < 1e-5
-    assert magnifications(solved(penetration=0.0))["one"] == Magnification(1.0, 1.0)
+    assert magnifications(make_solved_scene(penetration=0.0))["one"] == Magnification(1.0, 1.0)
 
 
 def test_a_difference_of_roundoff_is_drawn_in_one_colour() -> None:
-    found = SCENES["two"]
-    stresses = found.solutions[0].stresses
-    low, high = colour_scale(changed(found, stresses=(stresses[0] * (1 + 1e-12), stresses[1]))).get_clim()
+    scene = SCENES["two"]
+    stresses = scene.solutions[0].stresses
+    low, high = colour_scale(change(scene, stresses=(stresses[0] * (1 + 1e-12), stresses[1]))).get_clim()
     assert (low, high) == (pytest.approx(90.0), pytest.approx(110.0))
-    low, high = colour_scale(changed(found, stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
+    low, high = colour_scale(change(scene, stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
     assert (low, high) == (pytest.approx(50.0), pytest.approx(150.0))  # the exact pressure, 100, in the middle
-    low, high = colour_scale(changed(SCENES["unknown pressure"], stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
+    low, high = colour_scale(change(SCENES["unknown pressure"], stresses=(stresses[0] * 1.5, stresses[1]))).get_clim()
     assert (low, high) == (pytest.approx(100.0), pytest.approx(150.0))
 
 

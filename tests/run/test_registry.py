@@ -84,19 +84,19 @@ FORMULATIONS: dict[str, Any] = {
 
 
 class Entry:
-    """As much of an entry point as the registry looks at; remembers whether it was loaded."""
+    """The part of an entry point that the registry reads, with a count of how often it was loaded."""
 
     dist = None
 
-    def __init__(self, name: str, what: Any, value: str = "") -> None:
-        self.name, self.what, self.value = name, what, value or f"fake:{name}"
+    def __init__(self, name: str, target: Any, value: str = "") -> None:
+        self.name, self.target, self.value = name, target, value or f"fake:{name}"
         self.loads = 0
 
     def load(self) -> Any:
         self.loads += 1
-        if isinstance(self.what, BaseException):
-            raise self.what
-        return self.what
+        if isinstance(self.target, BaseException):
+            raise self.target
+        return self.target
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def entries(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Entry]]:
     return installed
 
 
-def loaded(text: str) -> Any:
+def load(text: str) -> Any:
     subject = load_formulation(text)
     assert isinstance(subject, Subject)
     assert subject.name == text
@@ -121,7 +121,7 @@ def loaded(text: str) -> Any:
 def test_names_are_sorted_and_nothing_is_loaded(entries: dict[str, list[Entry]]) -> None:
     assert registry.formulation_names() == tuple(sorted(FORMULATIONS))
     assert registry.property_ids() == ("balance.force", "patch.flat.solve", "patch.flat.transmission")
-    loaded("nts")
+    load("nts")
     assert {entry.name for entry in entries[registry.FORMULATIONS] if entry.loads} == {"nts"}
 
 
@@ -135,18 +135,18 @@ def test_names_are_sorted_and_nothing_is_loaded(entries: dict[str, list[Entry]])
 )
 @pytest.mark.usefixtures("entries")
 def test_options_are_read(text: str, options: dict[str, Any]) -> None:
-    assert loaded(text).options == {"penalty": 3.0, **options}
+    assert load(text).options == {"penalty": 3.0, **options}
 
 
 @pytest.mark.usefixtures("entries")
 def test_values_are_whole_numbers_numbers_truth_or_words() -> None:
-    options = loaded("any:a=1,b=1e-3,c=true,d=-2,e=word").options
+    options = load("any:a=1,b=1e-3,c=true,d=-2,e=word").options
     assert options == {"a": 1, "b": 1e-3, "c": True, "d": -2, "e": "word"}
     assert isinstance(options["a"], int)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "messages"),
     [
         ("vts-pt", ["formulation: found 'vts-pt'", "nearest: vts-ppt"]),
         ("zzz", ["found 'zzz'", "one of any, empty", "vts-ppt"]),
@@ -177,19 +177,19 @@ def test_values_are_whole_numbers_numbers_truth_or_words() -> None:
     ],
 )
 @pytest.mark.usefixtures("entries")
-def test_what_the_caller_wrote_wrong_is_said(text: str, told: list[str]) -> None:
+def test_what_the_caller_wrote_wrong_is_said(text: str, messages: list[str]) -> None:
     with pytest.raises(MisuseError) as error:
         load_formulation(text)
-    for part in told:
+    for part in messages:
         assert part in str(error.value)
 
 
 @pytest.mark.usefixtures("entries")
 def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
-    plugin = loaded("twice:mode=sum/vts-me:n=4")
+    plugin = load("twice:mode=sum/vts-me:n=4")
     assert plugin.options["mode"] == "sum"
     assert plugin.options["inner"].options == {"penalty": 3.0, "n": 4, "factor": 1.0, "area": "current", "on": True}
-    assert loaded("twice/twice/nts").options["inner"].options["inner"].options == {"penalty": 3.0}
+    assert load("twice/twice/nts").options["inner"].options["inner"].options == {"penalty": 3.0}
 
 
 @pytest.mark.parametrize(
@@ -204,10 +204,10 @@ def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
 )
 @pytest.mark.usefixtures("entries")
 def test_what_the_plugin_does_wrong_is_a_row(text: str, reason: str) -> None:
-    found = load_formulation(text)
-    assert isinstance(found, NotLoaded)
-    assert found.formulation == text
-    assert reason in found.reason
+    formulation = load_formulation(text)
+    assert isinstance(formulation, NotLoaded)
+    assert formulation.formulation == text
+    assert reason in formulation.reason
 
 
 @pytest.mark.parametrize("error", [ImportError("no module named x"), SystemExit(3), AttributeError("make")])
@@ -215,31 +215,33 @@ def test_a_module_that_does_not_import_is_a_row(entries: dict[str, list[Entry]],
     entries[registry.FORMULATIONS].append(Entry("broken", error))
     entries[registry.PROPERTIES].append(Entry("broken", error))
     reason = f"{type(error).__name__}: {error}"
-    for found in (load_formulation("broken"), *load_properties(["broken"])):
-        assert isinstance(found, NotLoaded)
-        assert (found.formulation, found.reason) == ("broken", reason)
+    for item in (load_formulation("broken"), *load_properties(["broken"])):
+        assert isinstance(item, NotLoaded)
+        assert (item.formulation, item.reason) == ("broken", reason)
 
 
 def test_a_name_that_two_distributions_want_is_a_row(entries: dict[str, list[Entry]]) -> None:
     entries[registry.FORMULATIONS].append(Entry("nts", plain, "other:nts"))
-    found = load_formulation("nts")
-    assert isinstance(found, NotLoaded)
-    assert found.reason == "registered 2 times: fake:nts, other:nts"
+    formulation = load_formulation("nts")
+    assert isinstance(formulation, NotLoaded)
+    assert formulation.reason == "registered 2 times: fake:nts, other:nts"
 
 
 def test_a_distribution_that_is_on_the_path_twice_is_no_trouble(entries: dict[str, list[Entry]]) -> None:
     entries[registry.FORMULATIONS].append(Entry("nts", plain))
-    loaded("nts")
+    load("nts")
 
 
 @pytest.mark.usefixtures("entries")
 def test_all_are_loaded_for_a_list() -> None:
-    found = load_formulations()
-    names = [item.formulation if isinstance(item, NotLoaded) else item.name for item in found]
+    formulations = load_formulations()
+    names = [item.formulation if isinstance(item, NotLoaded) else item.name for item in formulations]
     assert names == sorted(FORMULATIONS)
-    rows = {item.formulation for item in found if isinstance(item, NotLoaded)}
+    rows = {item.formulation for item in formulations if isinstance(item, NotLoaded)}
     assert rows == {"raising", "empty", "number", "needing"}
-    assert [item for item in found if isinstance(item, registry.Wrapper)] == [registry.Wrapper("twice", "Two of it")]
+    assert [item for item in formulations if isinstance(item, registry.Wrapper)] == [
+        registry.Wrapper("twice", "Two of it")
+    ]
 
 
 @pytest.mark.usefixtures("entries")
@@ -256,7 +258,7 @@ def test_a_wrapper_does_not_stand_alone() -> None:
     ],
 )
 def test_properties_match_patterns(entries: dict[str, list[Entry]], globs: list[str], ids: list[str]) -> None:
-    assert [found.id for found in load_properties(globs) if isinstance(found, Property)] == ids
+    assert [item.id for item in load_properties(globs) if isinstance(item, Property)] == ids
     assert sum(entry.loads for entry in entries[registry.PROPERTIES]) == len(ids)
 
 
@@ -266,16 +268,16 @@ def test_a_pattern_that_matches_nothing_is_said() -> None:
         load_properties(["patch.*", "balance.forces"])
 
 
-@pytest.mark.parametrize(("what", "told"), [(question("other"), "the property 'other'"), (7, "a int")])
-def test_a_property_goes_by_its_id(entries: dict[str, list[Entry]], what: Any, told: str) -> None:
-    entries[registry.PROPERTIES] = [Entry("mine", what)]
-    [found] = load_properties()
-    assert isinstance(found, NotLoaded)
-    assert f"gives {told}; needed a contactverif.contract.property.Property with the id mine" in found.reason
+@pytest.mark.parametrize(("target", "description"), [(question("other"), "the property 'other'"), (7, "a int")])
+def test_a_property_goes_by_its_id(entries: dict[str, list[Entry]], target: Any, description: str) -> None:
+    entries[registry.PROPERTIES] = [Entry("mine", target)]
+    [loaded] = load_properties()
+    assert isinstance(loaded, NotLoaded)
+    assert f"gives {description}; needed a contactverif.contract.property.Property with the id mine" in loaded.reason
 
 
 def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not a fake: through importlib.metadata, from a module that exists only here."""
+    """Load a real entry point of importlib.metadata, from a module that exists only here."""
     from importlib.metadata import EntryPoint, EntryPoints
 
     module = types.ModuleType("a_strangers_plugin")
@@ -288,23 +290,23 @@ def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
         ]
     )
     monkeypatch.setattr(registry, "entry_points", lambda *, group: real.select(group=group))
-    loaded("stranger")
-    found = load_formulation("misspelt")
-    assert isinstance(found, NotLoaded)
-    assert "AttributeError" in found.reason
+    load("stranger")
+    formulation = load_formulation("misspelt")
+    assert isinstance(formulation, NotLoaded)
+    assert "AttributeError" in formulation.reason
 
 
 @pytest.mark.parametrize(
-    ("traits", "said"),
+    ("traits", "message"),
     [
         ({"tangent": "exactly"}, "Traits.tangent: found 'exactly'; needed one of 'exact', 'approximate', None"),
         ({"witnesses": ["a1"]}, "Traits.witnesses: found a list; needed {property id: name of a case}"),
     ],
 )
-def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], said: str) -> None:
+def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], message: str) -> None:
     def make(*, penalty: float) -> Any:
         return Traits(**traits)
 
-    found = subject_of("misspelt", make)
-    assert isinstance(found, NotLoaded)
-    assert found.reason == said
+    formulation = subject_of("misspelt", make)
+    assert isinstance(formulation, NotLoaded)
+    assert formulation.reason == message

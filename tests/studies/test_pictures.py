@@ -1,4 +1,4 @@
-"""What is handed over to be drawn is what was solved; what a plugin does wrong is a line, not a traceback."""
+"""A solved scene has the arrays of the solution; a mistake of a plugin is a line of text and no traceback."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from contactverif.studies.solved_scenes import solve_scene
 FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
 
 
-def installed(name: str) -> Subject:
+def load(name: str) -> Subject:
     subject = load_formulation(name)
     assert isinstance(subject, Subject)
     return subject
@@ -72,73 +72,73 @@ def to_infinity(*, penalty: float) -> Any:
 @pytest.mark.parametrize("text", ["c", "b:degrees=30", "a2-graded", "example-1", "example-1bis:degrees=90,refine=2"])
 def test_a_formulation_that_is_right_shows_the_exact_pressure_everywhere(text: str) -> None:
     scene = load_scene(text)
-    found = solve_scene(scene.case(), [installed("vts-ppt")])
-    (one,) = found.solutions
-    assert not found.failures
-    assert one.pressure == scene.case().parameter("pressure")
-    pressures = found.node_pressures(one)
+    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    (solution,) = solved.solutions
+    assert not solved.failures
+    assert solution.pressure == scene.case().parameter("pressure")
+    pressures = solved.node_pressures(solution)
     assert np.isfinite(pressures).sum() >= len(scene.interface.slave) + 3
-    np.testing.assert_allclose(pressures[np.isfinite(pressures)], one.pressure, rtol=1e-9)
-    assert one.points is not None
-    np.testing.assert_allclose(one.points.pressure, one.pressure, rtol=1e-9)
-    assert one.stress_error < 1e-9
-    for body, stresses in zip(scene.bodies, one.stresses, strict=True):
+    np.testing.assert_allclose(pressures[np.isfinite(pressures)], solution.pressure, rtol=1e-9)
+    assert solution.points is not None
+    np.testing.assert_allclose(solution.points.pressure, solution.pressure, rtol=1e-9)
+    assert solution.stress_error < 1e-9
+    for body, stresses in zip(scene.bodies, solution.stresses, strict=True):
         normal = body.frame[:, 1]
         tensors = stresses[:, [0, 2, 2, 1]].reshape(-1, 2, 2)
-        np.testing.assert_allclose(tensors @ normal, np.tile(-one.pressure * normal, (len(tensors), 1)), atol=1e-6)
+        np.testing.assert_allclose(tensors @ normal, np.tile(-solution.pressure * normal, (len(tensors), 1)), atol=1e-6)
 
 
 def test_under_an_imposed_approach_multipliers_carry_more_than_a_penalty() -> None:
     """Each is held against its own exact pressure: a penalty gives way."""
     names = ["sts", "mortar", "mortar-lm", "two-pass/nts-lm"]
     (case, *_) = draw_cases(block_cases(), seed="pictures", examples=3).cases[1:]
-    found = solve_scene(case, [installed(name) for name in names])
-    assert [one.formulation for one in found.solutions] == names
-    assert max(one.stress_error for one in found.solutions) < 1e-9
-    soft, rigid = found.pressures
+    solved = solve_scene(case, [load(name) for name in names])
+    assert [solution.formulation for solution in solved.solutions] == names
+    assert max(solution.stress_error for solution in solved.solutions) < 1e-9
+    soft, rigid = solved.pressures
     assert soft < rigid
-    assert [one.pressure for one in found.solutions] == [soft, soft, rigid, rigid]
+    assert [solution.pressure for solution in solved.solutions] == [soft, soft, rigid, rigid]
 
 
 @pytest.mark.parametrize("name", ["nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm"])
 def test_forces_of_multipliers_that_no_case_holds_are_not_drawn(name: str) -> None:
-    assert forces_on(named_case("c"), installed(name)) is None
-    assert forces_on(named_case("c"), installed("nts")) is not None
+    assert forces_on(named_case("c"), load(name)) is None
+    assert forces_on(named_case("c"), load("nts")) is not None
 
 
 def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
-    found = solve_scene(load_scene("c").case(), [installed("nts"), installed("vts-ppt")])
-    wrong, right = found.solutions
+    solved = solve_scene(load_scene("c").case(), [load("nts"), load("vts-ppt")])
+    wrong, right = solved.solutions
     assert wrong.points is None  # a nodal method has forces, not pressures
-    assert np.ptp(found.node_pressures(wrong)) > 1
+    assert np.ptp(solved.node_pressures(wrong)) > 1
     assert wrong.stress_error > 0.01 > right.stress_error
 
 
 def test_it_is_the_trace_that_is_drawn() -> None:
     scene = load_scene(FIG_30)
     names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
-    found = solve_scene(scene.case(), [installed(name) for name in names])
-    assert [one.formulation for one in found.solutions] == names
-    assert np.isnan(found.solutions[0].pressure)
-    for one in found.solutions:
-        trace = solve(scene, installed(one.formulation).for_case(scene.case()))
-        assert (one.end, one.n_iterations, one.converged) == ("converged", trace.n_iterations, True)
-        np.testing.assert_array_equal(one.residuals, trace.residuals)
-        np.testing.assert_array_equal(one.energies, trace.energies)
-        np.testing.assert_array_equal(one.z, trace.z)
-        np.testing.assert_array_equal(one.displacements[1], scene.displacements(trace.solution)[1])
-        assert np.isnan(one.stress_error)
-        np.testing.assert_allclose(one.forces[: scene.interface.n_slave_nodes, 1].sum(), 1200, rtol=1e-9)
-    iterations = [one.n_iterations for one in found.solutions]
+    solved = solve_scene(scene.case(), [load(name) for name in names])
+    assert [solution.formulation for solution in solved.solutions] == names
+    assert np.isnan(solved.solutions[0].pressure)
+    for solution in solved.solutions:
+        trace = solve(scene, load(solution.formulation).for_case(scene.case()))
+        assert (solution.end, solution.n_iterations, solution.converged) == ("converged", trace.n_iterations, True)
+        np.testing.assert_array_equal(solution.residuals, trace.residuals)
+        np.testing.assert_array_equal(solution.energies, trace.energies)
+        np.testing.assert_array_equal(solution.z, trace.z)
+        np.testing.assert_array_equal(solution.displacements[1], scene.displacements(trace.solution)[1])
+        assert np.isnan(solution.stress_error)
+        np.testing.assert_allclose(solution.forces[: scene.interface.n_slave_nodes, 1].sum(), 1200, rtol=1e-9)
+    iterations = [solution.n_iterations for solution in solved.solutions]
     assert iterations[1] > 2 * max(iterations[0], iterations[2])  # an approximate tangent, as Fig. 30 has it
 
 
 def test_the_interface_knows_whose_its_nodes_are() -> None:
     scene = load_scene("c:refine=2,degrees=20")
-    found = solve_scene(scene.case(), [installed("vts-ppt")])
-    for body, on, moved in zip(found.bodies, found.on_interface, found.solutions[0].displacements, strict=True):
-        np.testing.assert_array_equal(found.case.interface.nodes[on], body.nodes[body.contact_nodes])
-        at = found.solutions[0].z.reshape(-1, 2)[on]
+    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    for body, on, moved in zip(solved.bodies, solved.on_interface, solved.solutions[0].displacements, strict=True):
+        np.testing.assert_array_equal(solved.case.interface.nodes[on], body.nodes[body.contact_nodes])
+        at = solved.solutions[0].z.reshape(-1, 2)[on]
         np.testing.assert_allclose(at, (body.nodes + moved)[body.contact_nodes], atol=1e-12)
 
 
@@ -148,9 +148,9 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
         Rectangle([100, 101], [0, 1], young=1e4), Rectangle([100, 101], [-1, 0], young=1e4), approach=0.0, penalty=1e4
     ).bodies[1]
     scene = Scene((*near.bodies, far), (0,), (1, 2), near.penalty, near.facts, "c and another")
-    found = solve_scene(scene.case(), [installed("vts-ppt")])
-    assert found.sides == ["slave", "master", ""]
-    assert found.solutions[0].stress_error < 1e-9
+    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    assert solved.sides == ["slave", "master", ""]
+    assert solved.solutions[0].stress_error < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -161,20 +161,20 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
     ],
 )
 def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., Any], end: str, remark: str) -> None:
-    (one,) = solve_scene(load_scene("c").case(), [Subject("mine", make)]).solutions
-    assert end in one.end
-    assert one.converged == (not end)
-    assert one.remark.startswith(remark)
-    assert bool(one.advice) == bool(end)
-    assert np.isfinite(one.z).all()
-    assert all(np.isfinite(u).all() for u in one.displacements)
+    (solution,) = solve_scene(load_scene("c").case(), [Subject("mine", make)]).solutions
+    assert end in solution.end
+    assert solution.converged == (not end)
+    assert solution.remark.startswith(remark)
+    assert bool(solution.advice) == bool(end)
+    assert np.isfinite(solution.z).all()
+    assert all(np.isfinite(u).all() for u in solution.displacements)
 
 
 def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
     bad = Subject("raising", raising)
-    found = solve_scene(load_scene("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), installed("vts-ppt")])
-    assert [one.formulation for one in found.solutions] == ["vts-ppt"]
-    assert found.failures == {
+    solved = solve_scene(load_scene("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), load("vts-ppt")])
+    assert [solution.formulation for solution in solved.solutions] == ["vts-ppt"]
+    assert solved.failures == {
         "raising": "residual: RuntimeError: no licence\nleft",
         "absent": "not loaded: ModuleNotFoundError",
     }
@@ -183,4 +183,4 @@ def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
 def test_an_interface_alone_cannot_be_solved() -> None:
     case = load_scene("c").case()
     with pytest.raises(MisuseError, match="an interface without bodies"):
-        solve_scene(Case(case.interface, case.z), [installed("vts-ppt")])
+        solve_scene(Case(case.interface, case.z), [load("vts-ppt")])

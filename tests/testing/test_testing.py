@@ -71,7 +71,7 @@ registry.entry_points = lambda *, group: INSTALLED[group]
 
 @pytest.fixture
 def author(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
-    """A folder with the fakes above; what they replace is put back afterwards."""
+    """Return a folder with the fakes above; the real entry points come back after the test."""
     monkeypatch.setattr(registry, "entry_points", entry_points)
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
     pytester.makeconftest(CONFTEST)
@@ -160,7 +160,7 @@ def test_what_becomes_of_a_row(author: pytest.Pytester, arguments: str, outcome:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ("'goood'", "formulation: found 'goood'*nearest: good"),
         ("'good:n=1'", "option of 'good:n=1': found 'n'*it has none"),
@@ -173,12 +173,12 @@ def test_what_becomes_of_a_row(author: pytest.Pytester, arguments: str, outcome:
     ],
 )
 def test_what_is_written_wrong_is_an_error_of_the_collection(
-    author: pytest.Pytester, arguments: str, told: str
+    author: pytest.Pytester, arguments: str, message: str
 ) -> None:
     author.makepyfile(test_it=a_test(arguments))
     result = author.runpytest()
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines([f"*{told}*"])
+    result.stdout.fnmatch_lines([f"*{message}*"])
 
 
 @pytest.mark.parametrize(
