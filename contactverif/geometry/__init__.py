@@ -1,1 +1,1 @@
-"""Compiled geometry that plugins may use. The judge never imports it: it shares no code with what it judges."""
+"""Compiled geometry that plugins may use. The properties never import it: the judge shares no code with the judged."""

@@ -1,4 +1,4 @@
-"""The one place that knows the compiler: a typed `numba.njit`, so that kernels stay honest under mypy --strict.
+"""The one place that knows the compiler: a typed `numba.njit`, so that mypy --strict still checks the kernels.
 
 Kernels are compiled at their first call and cached beside their source. `uncompiled` gives the Python function back,
 for coverage and for tests that change a line of it.
@@ -15,10 +15,10 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
 def compiled(function: Kernel) -> Kernel:
-    """The function, compiled for the types of each call; division by zero gives infinity or NaN, as in numpy."""
+    """Compile a function for the types of each call; division by zero gives infinity or NaN, as in numpy."""
     return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
 
 
 def uncompiled(function: Kernel) -> Kernel:
-    """The Python function behind a compiled one; itself where it is not compiled."""
+    """Return the Python function behind a compiled one, or the function itself if it is not compiled."""
     return cast(Kernel, getattr(function, "py_func", function))

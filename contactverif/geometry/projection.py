@@ -1,7 +1,10 @@
-"""Geometry that plugins may use: frames of segments, the nearest segment to a point, neighbours along a chain.
+"""Compiled geometry that plugins may use: frames of segments, the nearest segment to a point, segments in a strip.
 
-Compiled. Vectors are pairs of scalars, real or complex, so that a complex step passes through. The harness's own
-answers (`contactverif.oracle`) share nothing with this file.
+A vector is a pair of scalars, real or complex, so that a complex step passes through. A surface is searched by a tree
+of boxes (`search_tree`) at a cost of O(log n) for each point.
+
+Rule for the next editor: the harness judges plugins by `contactverif.oracle`, which shares no code with this file, and
+so must it stay.
 """
 
 from __future__ import annotations
@@ -15,36 +18,36 @@ from contactverif.geometry.compiled import compiled
 Vector = tuple[float, float]
 Tree = tuple[IntArray, FloatArray]
 
-_LEAF = 4  # segments in a leaf of the tree
+_LEAF = 4  # The number of segments in a leaf of the tree.
 
 
 @compiled
 def node(x: FloatArray, number: int) -> Vector:
-    """Position of a node, from x (n_nodes, 2)."""
+    """Return the position of a node, from x (n_nodes, 2)."""
     return x[number, 0], x[number, 1]
 
 
 @compiled
 def minus(a: Vector, b: Vector) -> Vector:
-    """a − b."""
+    """Return a − b."""
     return a[0] - b[0], a[1] - b[1]
 
 
 @compiled
 def dot(a: Vector, b: Vector) -> float:
-    """a · b, without conjugation."""
+    """Return a · b, without conjugation."""
     return a[0] * b[0] + a[1] * b[1]
 
 
 @compiled
 def between(a: Vector, b: Vector, c: float) -> Vector:
-    """The point at c on the segment a b: a at −1, b at +1."""
+    """Return the point at c on the segment a b: a at −1, b at +1."""
     return (1 - c) / 2 * a[0] + (1 + c) / 2 * b[0], (1 - c) / 2 * a[1] + (1 + c) / 2 * b[1]
 
 
 @compiled
 def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
-    """Length, tangent and normal of a segment; the normal points out of the body, which lies on the left."""
+    """Return length, tangent and normal of a segment; the normal points out of the body, which lies on the left."""
     d = minus(x2, x1)
     length = np.sqrt(dot(d, d))
     t = (d[0] / length, d[1] / length)
@@ -53,9 +56,13 @@ def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
 
 @compiled
 def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
-    """Boxes (n_boxes, 4: low x, low y, high x, high y) of a binary tree over the segments in a padded chain order.
+    """Return the boxes of a binary tree over the segments in a padded chain order.
 
-    Box 1 holds all, box i is halved into 2i and 2i+1; the lower half of the list are leaves of `_LEAF` segments.
+    Returns
+    -------
+    FloatArray, shape (n_boxes, 4)
+        Low x, low y, high x, high y of each box. Box 1 holds all segments, and box i is halved into 2i and 2i + 1. The
+        second half of the list are the leaves, of `_LEAF` segments each.
     """
     n_leaves = 1
     while n_leaves * _LEAF < len(order):
@@ -81,7 +88,7 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
 
 @compiled
 def _distance_to_box(p: Vector, box: FloatArray) -> float:
-    """Squared distance, a little less than exact, so that no tie is lost to roundoff."""
+    """Return the squared distance to a box, a little less than exact, so that no tie is lost to roundoff."""
     dx = max(box[0] - p[0], 0.0, p[0] - box[2])
     dy = max(box[1] - p[1], 0.0, p[1] - box[3])
     return float((dx * dx + dy * dy) * (1 - 16 * UNIT_ROUNDOFF))
@@ -89,7 +96,7 @@ def _distance_to_box(p: Vector, box: FloatArray) -> float:
 
 @compiled
 def distance_to_segment(p: Vector, x1: Vector, x2: Vector) -> tuple[float, float]:
-    """Squared distance to the closed segment, and the length by which the foot lies past its end.
+    """Return the squared distance to the closed segment, and the length by which the foot lies past its end.
 
     Where the foot lies at or past an end, the distance is that to the end node itself, so that the two segments at a
     vertex tie exactly.
@@ -108,13 +115,25 @@ def distance_to_segment(p: Vector, x1: Vector, x2: Vector) -> tuple[float, float
 
 @compiled
 def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArray, boxes: FloatArray) -> int:
-    """The nearest closed segment to p; of equally near ones that whose end the foot passes least, then the lowest.
+    """Return the nearest closed segment to p.
 
-    Costs O(log n) for a chain of n segments: boxes farther than what is already found are not opened.
+    Of equally near segments it is the one whose end the foot passes least, then the one with the lowest number. The
+    search costs O(log n) for a chain of n segments: it opens no box that is farther than the nearest segment so far.
+
+    Parameters
+    ----------
+    p : Vector
+        The point.
+    x : FloatArray, shape (n_nodes, 2)
+        Positions.
+    segments : IntArray, shape (n_segments, 2)
+        Nodes of the segments.
+    order, boxes : IntArray or FloatArray
+        The tree of `search_tree` at these positions.
     """
     n_leaves = len(boxes) // 2
     best, best_distance, best_past = -1, np.inf, np.inf
-    waiting = np.empty(64, dtype=np.int64)  # boxes still to open: one for each level of the tree at most
+    waiting = np.empty(64, dtype=np.int64)  # the boxes still to open, at most one for each level of the tree
     waiting[0] = 1
     n_waiting = 1
     while n_waiting > 0:
@@ -136,25 +155,30 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
             if segment < 0:  # padding
                 continue
             distance, past = distance_to_segment(p, node(x, segments[segment, 0]), node(x, segments[segment, 1]))
-            nearer = distance < best_distance or (
-                distance == best_distance and (past < best_past or (past == best_past and segment < best))
-            )
-            if nearer:
+            if _is_nearer(distance, past, segment, best_distance, best_past, best):
                 best, best_distance, best_past = segment, distance, past
     return best
+
+
+@compiled
+def _is_nearer(distance: float, past: float, segment: int, best_distance: float, best_past: float, best: int) -> bool:
+    """Return whether a segment comes before the best one so far, by distance, then by `past`, then by number."""
+    if distance != best_distance:
+        return distance < best_distance
+    return past < best_past or (past == best_past and segment < best)
 
 
 @compiled
 def segments_in_strip(
     a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, order: IntArray, boxes: FloatArray
 ) -> list[int]:
-    """Segments that may meet the strip between the line through a along n_a and that through b along n_b.
+    """Return the segments that may meet the strip between the line through a along n_a and that through b along n_b.
 
-    The strip lies on the left of the first line and on the right of the second as one looks along the segment a b's
-    normals, and ends at a distance `reach` from that segment. All that meet it are found, and others whose leaf of the
-    tree does; a caller looks closer. O(log n) for each that is found.
+    Seen along the normals, the strip lies on the left of the first line and on the right of the second. It ends at a
+    distance `reach` from the segment a b. The result holds all segments that meet the strip, and others whose leaf of
+    the tree does, so a caller looks closer. The cost is O(log n) for each segment of the result.
     """
-    found = [0 for _ in range(0)]
+    members = [0 for _ in range(0)]
     n_leaves = len(boxes) // 2
     waiting = np.empty(64, dtype=np.int64)
     waiting[0] = 1
@@ -171,13 +195,13 @@ def segments_in_strip(
         start = (box - n_leaves) * _LEAF
         for place in range(start, min(start + _LEAF, len(order))):
             if order[place] >= 0:  # no padding
-                found.append(order[place])
-    return found
+                members.append(order[place])
+    return members
 
 
 @compiled
 def _box_in_strip(a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, box: FloatArray) -> bool:
-    """Whether a box may meet the strip; in doubt, by some roundings of the coordinates, it does."""
+    """Return whether a box may meet the strip; a doubt of some roundings of the coordinates counts as yes."""
     size = max(abs(a[0]), abs(a[1]), abs(b[0]), abs(b[1]), reach)
     if not np.isinf(box[0]):  # the box of padding is empty
         size = max(size, abs(box[0]), abs(box[1]), abs(box[2]), abs(box[3]))
@@ -195,15 +219,15 @@ def _box_in_strip(a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, 
 
 
 def search_tree(surface: Surface, x: FloatArray) -> Tree:
-    """What `nearest_segment` needs to search a surface at the positions x (n_nodes, 2): O(n)."""
+    """Return the tree by which `nearest_segment` searches a surface at x (n_nodes, 2); it costs O(n) to make."""
     order = _padded(surface)
     return order, _box_tree(x, surface.segments, order)
 
 
 def _padded(surface: Surface) -> IntArray:
-    """The chain order with −1 between chains, so that each chain has a subtree of its own.
+    """Return the chain order with −1 between chains, so that each chain has a subtree of its own.
 
-    So a chain far away costs a search a look at its box: the subtree of the near one is what it would be alone.
+    So a chain far away costs a search one look at its box, and the subtree of the near chain is what it would be alone.
     """
     order = surface.chain_order
     begins = np.flatnonzero(surface.neighbours[order[:-1], 1] != order[1:]) + 1
@@ -222,7 +246,7 @@ def _padded(surface: Surface) -> IntArray:
 
 @compiled
 def foot_on_surface(p: Vector, x1: Vector, x2: Vector, free_first: bool, free_second: bool, tolerance: float) -> bool:
-    """Whether the foot of p is on the surface: past a free end of the segment by at most `tolerance` × its length."""
+    """Return whether the foot of p is on the surface, past a free end by at most `tolerance` × the segment's length."""
     length, t, _ = frame(x1, x2)
     s = dot(minus(p, x1), t)
     before = free_first and s < -tolerance * length

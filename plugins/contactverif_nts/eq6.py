@@ -1,231 +1,210 @@
-"""One virtual slave node V against one master segment 1 → 2: pairing, residual (Eq. 6) and tangent (Appendix A).
+"""The kernels of Eq. 6: one point V of a slave segment A B against one master segment 1 → 2.
 
     x_V = (1−c)/2 x_A + (1+c)/2 x_B        F = penalty × g × area
     R_A = (1−c)/2 F n    R_B = (1+c)/2 F n    R_1 = −(1−ξ) F n    R_2 = −ξ F n
 
-Compiled, float64 and complex128. Area: that of the slave segment that carries the point, times a weight, plus the same
-for the other slave segment at a slave node (NTS-AR); or 1 (NTS).
+The area of a point is its weight × the length of the slave segment that carries it, plus the same for the other slave
+segment at a slave node (NTS-AR), or 1 (NTS).
 
-With multipliers λ, one for each point: F = −λ × area, and a row for each point, −area × g where it is active, area × λ
-where it is not. That area is measured in the reference configuration, so that the row never vanishes. Arrays of
-multipliers without columns mean a penalty.
+With multipliers λ, one for each point, F = −λ × area. Each point then has a constraint row: −area × g where it is
+active, area × λ where it is not. The area of that second row is measured in the reference configuration, so that the
+row never vanishes. Arrays of multipliers without columns mean a penalty.
 
-Source: Zavarise & De Lorenzis (2009), Eq. 6, A1–A12.
+Rules for the next editor:
+
+1. `pair` makes all decisions and returns integers and booleans. `residual` and `tangent` decide nothing.
+2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
+3. A kernel gets the fields of `Surfaces`, `Points` and `Options` as plain tuples and unpacks them in its first lines.
+   numba reads a plain tuple in half the time of a named one, and an array that is read through a tuple inside a loop
+   costs two atomic operations each time. Named tuples of numbers, such as `Contact`, are free.
+
+Source: Zavarise & De Lorenzis (2009), Eq. 6, Eqs. A1–A12.
 """
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compiled
-from contactverif.geometry.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
+from contactverif.geometry.projection import (
+    Tree,
+    Vector,
+    between,
+    dot,
+    foot_on_surface,
+    frame,
+    minus,
+    nearest_segment,
+    node,
+)
 
-NODAL, CURRENT, REFERENCE = 0, 1, 2  # where the area of a point comes from
+NODAL, CURRENT, REFERENCE = 0, 1, 2  # The area of a point: 1, or lengths in one of two configurations.
+AREAS = {"current": CURRENT, "reference": REFERENCE}  # The words of the option `area`.
 
-N_LOCAL = 6  # A, B, 1, 2, and the two nodes of the other slave segment
-ENTRIES = 4 * N_LOCAL * 4  # of one point in the tangent: rows of four nodes
+A, B, ONE, TWO, OTHER_A, OTHER_B = range(6)  # Local nodes; the last two belong to the other slave segment.
+N_LOCAL = 6
+ENTRIES = 4 * 2 * N_LOCAL * 2  # The entries of one point in the tangent: rows of A, B, 1 and 2.
+
+Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+
+
+class Surfaces(NamedTuple):
+    """The arrays of an interface that the kernels read, in this order."""
+
+    reference: FloatArray  # (n_nodes, 2), positions in the reference configuration
+    slave: IntArray  # (n_slave_segments, 2), nodes
+    master: IntArray  # (n_master_segments, 2), nodes
+    neighbours: IntArray  # (n_master_segments, 2), the previous and the next master segment, −1 at a free end
+
+
+class Points(NamedTuple):
+    """The pairing of points, each array of shape (n_points,), in this order."""
+
+    segment: IntArray  # the slave segment that carries the point
+    other: IntArray  # the other slave segment at a slave node, −1 if there is none
+    slot: IntArray  # which entry of `Options.c` and `Options.weight` is that of the point
+    master: IntArray  # the nearest master segment
+    active: BoolArray  # the point is in contact
+
+
+class Options(NamedTuple):
+    """The numbers that make a method of this family, in this order."""
+
+    c: FloatArray  # (n_slots,), places on a slave segment in [−1, 1]
+    weight: FloatArray  # (n_slots,), shares of the length of a slave segment
+    area_from: int  # NODAL, CURRENT or REFERENCE
+    penalty: float
+
+
+class Contact(NamedTuple):
+    """One point V at one state: its nodes, its place, and what it sees of its master segment."""
+
+    a: int
+    b: int
+    node_1: int
+    node_2: int
+    c: float
+    l_12: float
+    t: Vector
+    normal: Vector
+    g: float
+    xi: float
 
 
 @compiled
 def pair(
     x: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    master_neighbours: IntArray,
-    order: IntArray,
-    boxes: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    tree: Tree,
     segment: IntArray,
     slot: IntArray,
     c: FloatArray,
-    free_end: float,
-    multipliers: FloatArray,
+    tau: float,
     penalty: float,
 ) -> tuple[IntArray, BoolArray]:
-    """For each point the nearest master segment, and whether it is active: pressed, and the foot on the surface."""
-    partner = np.empty(len(segment), dtype=np.int64)
+    """Return the nearest master segment of each point, and whether the point is active.
+
+    A point is active where `pressed` says so and its foot is on the surface, past a free end by at most τ.
+    """
+    _, slave, master, neighbours = surfaces
+    order, boxes = tree
+    nearest = np.empty(len(segment), dtype=np.int64)
     active = np.empty(len(segment), dtype=np.bool_)
-    for point in range(len(segment)):
-        x_v = between(node(x, slave[segment[point], 0]), node(x, slave[segment[point], 1]), c[slot[point]])
+    for i in range(len(segment)):
+        x_v = between(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
         m = nearest_segment(x_v, x, master, order, boxes)
-        x1, x2 = node(x, master[m, 0]), node(x, master[m, 1])
-        _, _, n = frame(x1, x2)
-        free = master_neighbours[m]
-        on_surface = foot_on_surface(x_v, x1, x2, free[0] < 0, free[1] < 0, free_end)
-        partner[point] = m
-        active[point] = pressed(dot(minus(x_v, x1), n), multipliers, point, penalty) and on_surface
-    return partner, active
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        _, _, normal = frame(x_1, x_2)
+        on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
+        nearest[i] = m
+        active[i] = pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
+    return nearest, active
 
 
 @compiled
-def pressed(g: float, multipliers: FloatArray, point: int, penalty: float) -> bool:
-    """Whether a point is in contact by its gap: g ≤ 0, and with multipliers λ − c g ≥ 0, with the penalty for c."""
+def pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> bool:
+    """Return whether point i is in contact by its gap: g ≤ 0, or with multipliers λ − c g ≥ 0, the penalty being c."""
     if len(multipliers) == 0:
         return g <= 0
-    return bool(multipliers[point] - penalty * g >= 0)
+    return bool(multipliers[i] - penalty * g >= 0)
 
 
 @compiled
-def residual(
-    x: Array,
-    multipliers: Array,
-    reference: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    segment: IntArray,
-    other: IntArray,
-    slot: IntArray,
-    partner: IntArray,
-    active: BoolArray,
-    c: FloatArray,
-    weight: FloatArray,
-    area_from: int,
-    penalty: float,
-) -> tuple[Array, Array]:
-    """Nodal forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers), at x and multipliers alike."""
+def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields) -> tuple[Array, Array]:
+    """Compute the nodal forces and the constraint rows of Eq. 6 for a batch of states.
+
+    Parameters
+    ----------
+    x : Array, shape (n_states, n_nodes, 2)
+        Positions, real or complex.
+    multipliers : Array, shape (n_states, n_multipliers)
+        Multipliers λ, of the type of x; without columns for a penalty.
+    surfaces, points, options : Fields
+        The fields of `Surfaces`, `Points` and `Options`.
+
+    Returns
+    -------
+    forces : Array, shape (n_states, n_nodes, 2)
+        Internal forces.
+    rows : Array, shape (n_states, n_multipliers)
+        Constraint rows.
+    """
+    reference, slave, master, _ = surfaces
+    segment, other, slot, partner, active = points
+    places, weights, area_from, penalty = options
     forces, rows = np.zeros_like(x), np.zeros_like(multipliers)
-    held = multipliers.shape[1] > 0
+    has_multipliers = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
-        x_now, r = x[state], forces[state]
-        for point in range(len(segment)):
-            w = weight[slot[point]]
-            if not active[point]:
-                if held:
-                    area_0 = 1.0 if area_from == NODAL else w * _length(reference, slave, segment[point], other[point])
-                    rows[state, point] = multipliers[state, point] * area_0
+        now, r = x[state], forces[state]
+        for i in range(len(active)):
+            s, weight = segment[i], weights[slot[i]]
+            if not active[i]:
+                if has_multipliers:
+                    area_0 = 1.0 if area_from == NODAL else weight * _length(reference, slave, s, other[i])
+                    rows[state, i] = multipliers[state, i] * area_0
                 continue
-            a, b = slave[segment[point], 0], slave[segment[point], 1]
-            node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
-            c_v = c[slot[point]]
-
-            x_v = between(node(x_now, a), node(x_now, b), c_v)
-            x1 = node(x_now, node_1)
-            l_12, t, n = frame(x1, node(x_now, node_2))
-            g = dot(minus(x_v, x1), n)
-            xi = dot(minus(x_v, x1), t) / l_12
-
-            area = 1 + 0 * g  # of the type of x
+            v = _contact(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
+            area = 1 + 0 * v.g  # of the type of x
             if area_from == CURRENT:
-                area = w * _length(x_now, slave, segment[point], other[point])
+                area = weight * _length(now, slave, s, other[i])
             elif area_from == REFERENCE:
-                area = area * (w * _length(reference, slave, segment[point], other[point]))
-            f = penalty * g * area
-            if held:
-                f = -multipliers[state, point] * area
-                rows[state, point] = -area * g
-
-            push(r, a, (1 - c_v) / 2 * f, n)
-            push(r, b, (1 + c_v) / 2 * f, n)
-            push(r, node_1, -(1 - xi) * f, n)
-            push(r, node_2, -xi * f, n)
+                area = area * (weight * _length(reference, slave, s, other[i]))
+            f = penalty * v.g * area
+            if has_multipliers:
+                f = -multipliers[state, i] * area
+                rows[state, i] = -area * v.g
+            push(r, v.a, (1 - v.c) / 2 * f, v.normal)
+            push(r, v.b, (1 + v.c) / 2 * f, v.normal)
+            push(r, v.node_1, -(1 - v.xi) * f, v.normal)
+            push(r, v.node_2, -v.xi * f, v.normal)
     return forces, rows
 
 
 @compiled
-def tangent(
-    x: FloatArray,
-    multipliers: FloatArray,
-    reference: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    segment: IntArray,
-    other: IntArray,
-    slot: IntArray,
-    partner: IntArray,
-    active: BoolArray,
-    c: FloatArray,
-    weight: FloatArray,
-    area_from: int,
-    penalty: float,
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rows, columns and values of the tangent at x (n_nodes, 2), multipliers (n,); entries of one place add up."""
-    held = len(multipliers) > 0
-    n_active = np.sum(active)
-    n_entries = ENTRIES * n_active
-    if held:
-        n_entries += (4 + N_LOCAL) * 2 * n_active + len(active) - n_active
-    rows = np.empty(n_entries, dtype=np.int64)
-    columns = np.empty(n_entries, dtype=np.int64)
-    values = np.empty(n_entries)
-    place = 0
-    nodes = np.empty(N_LOCAL, dtype=np.int64)
-    for point in range(len(segment)):
-        own = x.size + point  # row and column of its multiplier
-        w = weight[slot[point]]
-        if not active[point]:
-            if held:
-                rows[place], columns[place] = own, own
-                values[place] = 1.0
-                if area_from != NODAL:
-                    values[place] = w * _length(reference, slave, segment[point], other[point])
-                place += 1
-            continue
-        a, b = slave[segment[point], 0], slave[segment[point], 1]
-        node_1, node_2 = master[partner[point], 0], master[partner[point], 1]
-        c_v = c[slot[point]]
-        nodes[0], nodes[1], nodes[2], nodes[3], nodes[4], nodes[5] = a, b, node_1, node_2, a, b
+def push(forces: Array, number: int, size: float, direction: Vector) -> None:
+    """Add a force of this size along a direction to the force on a node."""
+    forces[number, 0] += size * direction[0]
+    forces[number, 1] += size * direction[1]
 
-        x_v = between(node(x, a), node(x, b), c_v)
-        x1 = node(x, node_1)
-        l_12, t, n = frame(x1, node(x, node_2))
-        g = dot(minus(x_v, x1), n)
-        xi = dot(minus(x_v, x1), t) / l_12
 
-        # Δ of a scalar is a row (n_local, 2): what it gains for each displacement of each local node.
-        d_omega, d_g, d_xi, d_area = np.zeros((4, N_LOCAL, 2))
-        shape = ((1 - c_v) / 2, (1 + c_v) / 2, -(1 - xi), -xi)
-        for i in range(2):
-            d_omega[2, i] = -n[i] / l_12  # ω = n·(Δx2 − Δx1)/l
-            d_omega[3, i] = n[i] / l_12
-            for k in range(4):
-                d_g[k, i] = shape[k] * n[i]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
-                d_xi[k, i] = shape[k] * t[i] / l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
-        d_xi += g * d_omega / l_12
-
-        area = 1.0
-        if area_from == CURRENT:
-            area = w * _length(x, slave, segment[point], other[point])
-            _stretch(d_area, 0, x, a, b, w)  # Δl_AB = t_AB·(Δx_B − Δx_A)
-            if other[point] >= 0:
-                nodes[4], nodes[5] = slave[other[point], 0], slave[other[point], 1]
-                _stretch(d_area, 4, x, nodes[4], nodes[5], w)
-        elif area_from == REFERENCE:
-            area = w * _length(reference, slave, segment[point], other[point])
-
-        f = penalty * g * area
-        d_f = penalty * (area * d_g + g * d_area)
-        if held:
-            f = -multipliers[point] * area
-            d_f = -multipliers[point] * d_area
-            for column in range(N_LOCAL):
-                for i in range(2):
-                    rows[place], columns[place] = own, 2 * nodes[column] + i
-                    values[place] = -(area * d_g[column, i] + g * d_area[column, i])
-                    place += 1
-            for k in range(4):
-                for i in range(2):
-                    rows[place], columns[place] = 2 * nodes[k] + i, own
-                    values[place] = -area * shape[k] * n[i]
-                    place += 1
-        for k in range(4):
-            for i in range(2):
-                for column in range(N_LOCAL):
-                    for j in range(2):
-                        value = shape[k] * (d_f[column, j] * n[i] - f * t[i] * d_omega[column, j])  # Δn = −t ω
-                        if k == 2:
-                            value += d_xi[column, j] * f * n[i]
-                        elif k == 3:
-                            value -= d_xi[column, j] * f * n[i]
-                        rows[place] = 2 * nodes[k] + i
-                        columns[place] = 2 * nodes[column] + j
-                        values[place] = value
-                        place += 1
-    return rows, columns, values
+@compiled
+def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
+    """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
+    x_v = between(node(x, a), node(x, b), c)
+    x_1 = node(x, node_1)
+    l_12, t, normal = frame(x_1, node(x, node_2))
+    g = dot(minus(x_v, x_1), normal)
+    xi = dot(minus(x_v, x_1), t) / l_12
+    return Contact(a, b, node_1, node_2, c, l_12, t, normal, g, xi)
 
 
 @compiled
 def _length(x: Array, slave: IntArray, segment: int, other: int) -> float:
-    """Length of a slave segment, and of the other one at a slave node where there is one."""
+    """Return the length of a slave segment, plus that of the other one at a slave node where there is one."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
     if other >= 0:
         more, _, _ = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
@@ -234,16 +213,156 @@ def _length(x: Array, slave: IntArray, segment: int, other: int) -> float:
 
 
 @compiled
-def _stretch(row: FloatArray, first: int, x: FloatArray, a: int, b: int, weight: float) -> None:
-    """Adds weight × Δl_ab to a row of Δ's; a and b are the local nodes `first` and `first` + 1."""
-    _, t, _ = frame(node(x, a), node(x, b))
-    for i in range(2):
-        row[first, i] -= weight * t[i]
-        row[first + 1, i] += weight * t[i]
+def tangent(
+    x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Compute the derivative of `residual` at one state, as rows, columns and values; entries of one place add up.
+
+    A Δ of a number is an array (n_local, 2): what the number gains for each displacement of each local node.
+
+    Parameters
+    ----------
+    x : FloatArray, shape (n_nodes, 2)
+        Positions.
+    multipliers : FloatArray, shape (n_multipliers,)
+        Multipliers λ, empty for a penalty.
+    surfaces, points, options : Fields
+        The fields of `Surfaces`, `Points` and `Options`.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Eqs. A1–A12.
+    """
+    reference, slave, master, _ = surfaces
+    segment, other, slot, partner, active = points
+    places, weights, area_from, penalty = options
+    has_multipliers = len(multipliers) > 0
+    n_entries = _count_entries(active, has_multipliers)
+    where, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
+    nodes, gains = np.empty(N_LOCAL, dtype=np.int64), np.empty((4, N_LOCAL, 2))
+    d_omega, d_g, d_xi, d_area = gains
+    for i in range(len(active)):
+        s, weight, own = segment[i], weights[slot[i]], x.size + i  # `own`: row and column of the point's multiplier
+        if not active[i]:
+            if has_multipliers:
+                where[0, place], where[1, place] = own, own
+                values[place] = 1.0 if area_from == NODAL else weight * _length(reference, slave, s, other[i])
+                place += 1
+            continue
+        v = _contact(x, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
+        _fill_gains(gains, nodes, v)
+        area = 1.0
+        if area_from == REFERENCE:
+            area = weight * _length(reference, slave, s, other[i])
+        elif area_from == CURRENT:
+            area = weight * _length(x, slave, s, other[i])
+            _add_stretch(d_area, A, x, v.a, v.b, weight)  # Δl_AB = t_AB·(Δx_B − Δx_A)
+            if other[i] >= 0:
+                nodes[OTHER_A], nodes[OTHER_B] = slave[other[i], 0], slave[other[i], 1]
+                _add_stretch(d_area, OTHER_A, x, nodes[OTHER_A], nodes[OTHER_B], weight)
+        if has_multipliers:
+            f, d_f = -multipliers[i] * area, -multipliers[i] * d_area
+            d_row = -(area * d_g + v.g * d_area)
+            place = _add_constraint(where, values, place, own, nodes, v, area, d_row)
+        else:
+            f = penalty * v.g * area
+            d_f = penalty * (area * d_g + v.g * d_area)
+        place = _add_forces(where, values, place, nodes, v, f, d_f, d_omega, d_xi)
+    return where[0], where[1], values
 
 
 @compiled
-def push(forces: Array, number: int, size: float, direction: Vector) -> None:
-    """Adds a force along a direction to that of a node."""
-    forces[number, 0] += size * direction[0]
-    forces[number, 1] += size * direction[1]
+def _count_entries(active: BoolArray, has_multipliers: bool) -> int:
+    """Return how many entries the tangent has."""
+    n_active = np.sum(active)
+    n_entries = ENTRIES * n_active
+    if has_multipliers:
+        n_entries += (4 + N_LOCAL) * 2 * n_active + len(active) - n_active
+    return int(n_entries)
+
+
+@compiled
+def _fill_gains(gains: FloatArray, nodes: IntArray, v: Contact) -> None:
+    """Write Δω, Δg, Δξ and zeros for Δ of the area into `gains` (4, n_local, 2), and the local nodes into `nodes`."""
+    nodes[A], nodes[B], nodes[ONE], nodes[TWO], nodes[OTHER_A], nodes[OTHER_B] = v.a, v.b, v.node_1, v.node_2, v.a, v.b
+    gains[:] = 0.0
+    d_omega, d_g, d_xi = gains[0], gains[1], gains[2]
+    shape = _shapes(v)
+    for j in range(2):
+        d_omega[ONE, j] = -v.normal[j] / v.l_12  # ω = n·(Δx2 − Δx1)/l
+        d_omega[TWO, j] = v.normal[j] / v.l_12
+        for k in range(4):
+            d_g[k, j] = shape[k] * v.normal[j]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
+            d_xi[k, j] = shape[k] * v.t[j] / v.l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
+    d_xi += v.g * d_omega / v.l_12
+
+
+@compiled
+def _shapes(v: Contact) -> tuple[float, float, float, float]:
+    """Return by how much Δx of A, B, 1 and 2 counts in Δx_V − (1−ξ)Δx1 − ξΔx2."""
+    return (1 - v.c) / 2, (1 + v.c) / 2, -(1 - v.xi), -v.xi
+
+
+@compiled
+def _add_stretch(d_area: FloatArray, first: int, x: FloatArray, a: int, b: int, weight: float) -> None:
+    """Add weight × Δl_ab to the Δ of an area; a and b are the local nodes `first` and `first` + 1."""
+    _, t, _ = frame(node(x, a), node(x, b))
+    for j in range(2):
+        d_area[first, j] -= weight * t[j]
+        d_area[first + 1, j] += weight * t[j]
+
+
+@compiled
+def _add_constraint(
+    where: IntArray,
+    values: FloatArray,
+    place: int,
+    own: int,
+    nodes: IntArray,
+    v: Contact,
+    area: float,
+    d_row: FloatArray,
+) -> int:
+    """Enter the row of a multiplier, Δ of −area × g, and its column, the forces −area × n; return the next place."""
+    shape = _shapes(v)
+    for column in range(N_LOCAL):
+        for j in range(2):
+            where[0, place], where[1, place] = own, 2 * nodes[column] + j
+            values[place] = d_row[column, j]
+            place += 1
+    for k in range(4):
+        for j in range(2):
+            where[0, place], where[1, place] = 2 * nodes[k] + j, own
+            values[place] = -area * shape[k] * v.normal[j]
+            place += 1
+    return place
+
+
+@compiled
+def _add_forces(
+    where: IntArray,
+    values: FloatArray,
+    place: int,
+    nodes: IntArray,
+    v: Contact,
+    f: float,
+    d_f: FloatArray,
+    d_omega: FloatArray,
+    d_xi: FloatArray,
+) -> int:
+    """Enter Δ of the forces on A, B, 1 and 2, with Δn = −t ω; return the next place."""
+    shape = _shapes(v)
+    for k in range(4):
+        for i in range(2):
+            for column in range(N_LOCAL):
+                for j in range(2):
+                    value = shape[k] * (d_f[column, j] * v.normal[i] - f * v.t[i] * d_omega[column, j])
+                    if k == ONE:
+                        value += d_xi[column, j] * f * v.normal[i]
+                    elif k == TWO:
+                        value -= d_xi[column, j] * f * v.normal[i]
+                    where[0, place] = 2 * nodes[k] + i
+                    where[1, place] = 2 * nodes[column] + j
+                    values[place] = value
+                    place += 1
+    return place

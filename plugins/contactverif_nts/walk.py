@@ -1,94 +1,113 @@
-"""Which master segments the area of competence of a virtual slave node covers (Boxes 1 and 2).
+"""The pairing of VTS-PPT: which master segments the area of competence of each virtual slave node covers.
 
-P is the end of the area nearer B, Q the end nearer A; s(·) = (· − x1)·t in the frame of V's master segment 1 → 2.
-From V's master segment one walks to the neighbours while s(P) < s(first node) and s(Q) > s(last node), and stops at a
-free end and before a segment seen edge-on or from behind. Decisions only: all that leaves this file is a pairing.
+P is the end of the area nearer to B, Q the end nearer to A; s(·) = (· − x1)·t in the frame of V's master segment 1 → 2.
+The walk goes from V's master segment to the neighbours while s(P) < s(first node) and s(Q) > s(last node). It stops at
+a free end of the master, and before a segment that is seen edge-on or from behind (our choice: the paper is silent).
+
+The paper is silent about free ends, too. The option `free_end` says what happens there:
+
+- TRUNCATE: the master loses the part of the force that lies past its free end; the slave keeps its force.
+- EXTEND: Box 3 is read literally, and the last segment is continued past the free end.
+- COVER (ours): the area of competence is cut to what faces the master, before anything else happens.
+
+Everywhere else Box 3 stands as printed, whatever the option says. This holds also where the foot of V lies past the end
+of an interior segment: the parts of the segments are then neither cut nor limited to [0, 1].
+
+Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
 
 Source: Zavarise & De Lorenzis (2009), Boxes 1 and 2, Fig. 23.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compiled
-from contactverif.geometry.projection import Vector, between, dot, foot_on_surface, frame, minus, nearest_segment, node
-from contactverif_nts.eq6 import pressed
+from contactverif.geometry.projection import (
+    Tree,
+    Vector,
+    between,
+    dot,
+    foot_on_surface,
+    frame,
+    minus,
+    nearest_segment,
+    node,
+)
+from contactverif_nts.eq6 import Fields, pressed
 
-TRUNCATE, EXTEND, COVER = 0, 1, 2  # what becomes of an area of competence that overhangs a free end
+TRUNCATE, EXTEND, COVER = 0, 1, 2  # What happens to an area of competence that overhangs a free end.
+FREE_ENDS = {"truncate": TRUNCATE, "extend": EXTEND, "cover": COVER}  # The words of the option `free_end`.
 NOT_CUT = -1
+
+
+class Areas(NamedTuple):
+    """The pairing of virtual slave nodes, each array of shape (n_points,), in this order."""
+
+    master: IntArray  # V's master segment
+    first: IntArray  # the first master segment under the area, towards P
+    last: IntArray  # the last one, towards Q
+    frame: IntArray  # the master segment in whose frame COVER cuts the area, NOT_CUT if it does not
+    cut_p: IntArray  # the master node that cuts the end P, NOT_CUT if there is none
+    cut_q: IntArray  # the master node that cuts the end Q
+    clip_p: IntArray  # 0 where TRUNCATE lets the first segment carry from its first node on, else NOT_CUT
+    clip_q: IntArray  # 1 where TRUNCATE lets the last segment carry up to its second node, else NOT_CUT
+    active: BoolArray  # V is in contact
+
+
+@compiled
+def middle_of_part(i: int, n: int) -> float:
+    """Return where on its slave segment the virtual slave node i lies, c in [−1, 1]; there are n on each segment."""
+    return -1 + (2 * (i % n) + 1) / n
 
 
 @compiled
 def pair(
     x: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    neighbours: IntArray,
-    order: IntArray,
-    boxes: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    tree: Tree,
     n: int,
     free_end: int,
     tau: float,
-    multipliers: FloatArray,
     penalty: float,
-) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, IntArray, BoolArray]:
-    """For each virtual slave node (n on each slave segment) what its area of competence covers.
+) -> Fields:
+    """Return the fields of `Areas` for the n virtual slave nodes on each slave segment, at x (n_nodes, 2).
 
-    Returns master, first, last: segments; frame: the segment in whose frame the area is cut, −1 if it is not;
-    cut_p, cut_q: the nodes that cut it, −1 none; clip_p, clip_q: 0 or 1 where a part of a segment is cut to its first
-    or second node on the master side only, −1 none; and active.
+    A virtual slave node is active where `pressed` says so, its foot is on the surface and s(P) < s(Q).
     """
+    _, slave, master, neighbours = surfaces
+    order, boxes = tree
     n_points = len(slave) * n
-    partner, first, last = np.full((3, n_points), -1, dtype=np.int64)
-    cutting, cut_p, cut_q = np.full((3, n_points), NOT_CUT, dtype=np.int64)
-    clip_p, clip_q = np.full((2, n_points), NOT_CUT, dtype=np.int64)
+    partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q = np.full((8, n_points), NOT_CUT, dtype=np.int64)
     active = np.zeros(n_points, dtype=np.bool_)
-    for point in range(n_points):
-        x_a, x_b = node(x, slave[point // n, 0]), node(x, slave[point // n, 1])
-        c = -1 + (2 * (point % n) + 1) / n
+    for i in range(n_points):
+        x_a, x_b = node(x, slave[i // n, 0]), node(x, slave[i // n, 1])
+        c = middle_of_part(i, n)
         c_p, c_q = c + 1 / n, c - 1 / n
         m = nearest_segment(between(x_a, x_b, c), x, master, order, boxes)
-
         if free_end == COVER:
-            x1 = node(x, master[m, 0])
-            _, t, _ = frame(x1, node(x, master[m, 1]))
-            half = dot(minus(x_b, x_a), t) / 2  # s gains this for each unit of c
-            if half >= 0:  # P does not come before Q: the slave is seen edge-on or from behind
-                partner[point], first[point], last[point] = m, m, m
-                continue
-            x_p, x_q = between(x_a, x_b, c_p), between(x_a, x_b, c_q)
-            start, stop = _walk(x, x_p, x_q, m, t, master, neighbours)
-            x_mid = between(x_a, x_b, 0.0)
-            x_start, x_stop = node(x, master[start, 0]), node(x, master[stop, 1])
-            if dot(minus(x_p, x_start), t) < 0:
-                cut_p[point] = master[start, 0]
-                c_p = dot(minus(x_start, x_mid), t) / half
-            if dot(minus(x_q, x_stop), t) > 0:
-                cut_q[point] = master[stop, 1]
-                c_q = dot(minus(x_stop, x_mid), t) / half
-            if cut_p[point] != NOT_CUT or cut_q[point] != NOT_CUT:
-                cutting[point] = m
-                if c_p <= c_q:  # nothing is left
-                    partner[point], first[point], last[point] = m, m, m
-                    continue
-                c = (c_p + c_q) / 2
-                m = nearest_segment(between(x_a, x_b, c), x, master, order, boxes)
+            c_p, c_q, cut_p[i], cut_q[i] = _cover(x, master, neighbours, m, x_a, x_b, c_p, c_q)
+            if max(cut_p[i], cut_q[i]) != NOT_CUT:
+                cutting[i] = m
+                if c_p > c_q:
+                    c = (c_p + c_q) / 2
+                    m = nearest_segment(between(x_a, x_b, c), x, master, order, boxes)
 
+        partner[i], first[i], last[i] = m, m, m
         x_v, x_p, x_q = between(x_a, x_b, c), between(x_a, x_b, c_p), between(x_a, x_b, c_q)
-        x1, x2 = node(x, master[m, 0]), node(x, master[m, 1])
-        _, t, n_m = frame(x1, x2)
-        partner[point], first[point], last[point] = m, m, m
-        if dot(minus(x_p, x1), t) >= dot(minus(x_q, x1), t):
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        _, t, normal = frame(x_1, x_2)
+        if c_p <= c_q or dot(minus(x_p, x_1), t) >= dot(minus(x_q, x_1), t):
             continue
-        on_surface = foot_on_surface(x_v, x1, x2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[point] = pressed(dot(minus(x_v, x1), n_m), multipliers, point, penalty) and on_surface
-        start, stop = _walk(x, x_p, x_q, m, t, master, neighbours)
-        first[point], last[point] = start, stop
-        if free_end == TRUNCATE and start != stop:
-            clip_p[point] = _clipped(x_p, node(x, master[start, 0]), node(x, master[start, 1]), t)
-            clip_q[point] = _clipped(x_q, node(x, master[stop, 0]), node(x, master[stop, 1]), t)
+        on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
+        active[i] = pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
+        first[i], last[i] = _walk(x, x_p, x_q, m, t, master, neighbours)
+        if free_end == TRUNCATE and first[i] != last[i]:
+            clip_p[i], clip_q[i] = _truncate(x, x_p, x_q, first[i], last[i], t, master, neighbours)
     return partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active
 
 
@@ -96,31 +115,67 @@ def pair(
 def _walk(
     x: FloatArray, x_p: Vector, x_q: Vector, m: int, t: Vector, master: IntArray, neighbours: IntArray
 ) -> tuple[int, int]:
-    """The first and the last master segment under the area of competence P … Q, in the frame of segment m."""
-    start, stop = m, m
-    while dot(minus(x_p, node(x, master[start, 0])), t) < 0:
-        following = neighbours[start, 0]
+    """Return the first and the last master segment under the area of competence P … Q, in the frame of segment m."""
+    first, last = m, m
+    while dot(minus(x_p, node(x, master[first, 0])), t) < 0:
+        following = neighbours[first, 0]
         if following < 0 or _projected_length(x, master, following, t) <= 0:
             break
-        start = following
-    while dot(minus(x_q, node(x, master[stop, 1])), t) > 0:
-        following = neighbours[stop, 1]
+        first = following
+    while dot(minus(x_q, node(x, master[last, 1])), t) > 0:
+        following = neighbours[last, 1]
         if following < 0 or _projected_length(x, master, following, t) <= 0:
             break
-        stop = following
-    return start, stop
+        last = following
+    return first, last
 
 
 @compiled
 def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) -> float:
+    """Return the length of a master segment along t, negative where the segment runs backwards."""
     return dot(minus(node(x, master[segment, 1]), node(x, master[segment, 0])), t)
 
 
 @compiled
-def _clipped(end: Vector, x_f: Vector, x_m: Vector, t: Vector) -> int:
-    """0 where the end lies before the first node of its segment, 1 where behind the second, else −1."""
-    if dot(minus(end, x_f), t) < 0:
-        return 0
-    if dot(minus(end, x_m), t) > 0:
-        return 1
-    return NOT_CUT
+def _truncate(
+    x: FloatArray, x_p: Vector, x_q: Vector, first: int, last: int, t: Vector, master: IntArray, neighbours: IntArray
+) -> tuple[int, int]:
+    """Return `clip_p` and `clip_q`: where P and Q overhang a free end of the first and the last master segment."""
+    clip_p = clip_q = NOT_CUT
+    if neighbours[first, 0] < 0 and dot(minus(x_p, node(x, master[first, 0])), t) < 0:
+        clip_p = 0
+    if neighbours[last, 1] < 0 and dot(minus(x_q, node(x, master[last, 1])), t) > 0:
+        clip_q = 1
+    return clip_p, clip_q
+
+
+@compiled
+def _cover(
+    x: FloatArray,
+    master: IntArray,
+    neighbours: IntArray,
+    m: int,
+    x_a: Vector,
+    x_b: Vector,
+    c_p: float,
+    c_q: float,
+) -> tuple[float, float, int, int]:
+    """Cut the area of competence [c_q, c_p] to what faces the master, in the frame of master segment m.
+
+    Return c_p, c_q, and the nodes that cut them. Nothing is left where c_p ≤ c_q.
+    """
+    cut_p = cut_q = NOT_CUT
+    _, t, _ = frame(node(x, master[m, 0]), node(x, master[m, 1]))
+    half = dot(minus(x_b, x_a), t) / 2  # s gains this for each unit of c
+    if half >= 0:  # P does not come before Q: the slave is seen edge-on or from behind
+        return c_q, c_q, cut_p, cut_q
+    x_p, x_q, x_mid = between(x_a, x_b, c_p), between(x_a, x_b, c_q), between(x_a, x_b, 0.0)
+    first, last = _walk(x, x_p, x_q, m, t, master, neighbours)
+    x_first, x_last = node(x, master[first, 0]), node(x, master[last, 1])
+    if dot(minus(x_p, x_first), t) < 0:
+        cut_p = master[first, 0]
+        c_p = dot(minus(x_first, x_mid), t) / half
+    if dot(minus(x_q, x_last), t) > 0:
+        cut_q = master[last, 1]
+        c_q = dot(minus(x_last, x_mid), t) / half
+    return c_p, c_q, cut_p, cut_q

@@ -1,6 +1,6 @@
-"""Makes formulations that are wrong on purpose: one line of the shipped plugin's source changed, run uncompiled.
+"""Make formulations that are wrong on purpose: change one line of the shipped plugin's source, and run it uncompiled.
 
-The line must stand in the source, or the mutant says so: a mutant that changes nothing would prove nothing.
+The line must stand in the source; otherwise the mutant raises, because a mutant that changes nothing proves nothing.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import Any
 import contactverif_nts
 
 PACKAGE = "contactverif_nts"
-# In the order in which they import each other.
-MODULES = ("eq6", "options", "walk", "box3", "points", "ppt", "multipliers")
+# The modules of the copy, in the order in which they import each other.
+MODULES = ("eq6", "walk", "box3", "point_contact", "patch_test_passing", "nts_multipliers")
 
 _numbers = itertools.count()
 
@@ -33,7 +33,7 @@ class Mutant:
 
 
 def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0, **options: Any) -> Callable[..., Any]:
-    """The factory of a copy of the plugin in which the nth occurrence of `old` in a module reads `new`."""
+    """Return the factory of a copy of the plugin in which the nth occurrence of `old` in a module reads `new`."""
     sources = {name: inspect.getsource(importlib.import_module(f"{PACKAGE}.{name}")) for name in MODULES}
     parts = sources[module].split(old)
     if len(parts) < nth + 2:
@@ -59,7 +59,7 @@ def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0,
 
 
 class Wrapped:
-    """A formulation (the balanced VTS-PPT) with some verbs replaced: they are looked up in `verbs` first."""
+    """A formulation (by default the balanced VTS-PPT) with some verbs replaced by those of `verbs`."""
 
     def __init__(
         self,
@@ -74,17 +74,17 @@ class Wrapped:
         self.traits = self._inner.traits
 
     def pair(self, interface: Any, z: Any) -> Any:
-        return self._ask("pair", interface, z)
+        return self._answer("pair", interface, z)
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._ask("residual", interface, pairing, z)
+        return self._answer("residual", interface, pairing, z)
 
     def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._ask("tangent", interface, pairing, z)
+        return self._answer("tangent", interface, pairing, z)
 
     def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._ask("contact_points", interface, pairing, z)
+        return self._answer("contact_points", interface, pairing, z)
 
-    def _ask(self, verb: str, *arguments: Any) -> Any:
-        answer = getattr(self._inner, verb)
-        return self._verbs[verb](answer, *arguments) if verb in self._verbs else answer(*arguments)
+    def _answer(self, verb: str, *arguments: Any) -> Any:
+        right = getattr(self._inner, verb)
+        return self._verbs[verb](right, *arguments) if verb in self._verbs else right(*arguments)

@@ -13,8 +13,9 @@ from contactverif import Interface
 from contactverif.contract.interface import Surface
 from contactverif.geometry.projection import search_tree, segments_in_strip
 from contactverif_mortar import mortar, mortar_dual, sts
-from contactverif_mortar.cells import GAP, WEIGHT, C, Cells, Quadrature
-from contactverif_mortar.search import overlap
+from contactverif_mortar.cell_geometry import SlaveView
+from contactverif_mortar.cell_search import overlap
+from contactverif_mortar.integration_cells import GAP, WEIGHT, C, Cells, Quadrature
 
 ONE = Quadrature.gauss(1, current=True)
 
@@ -69,9 +70,8 @@ def test_the_search_finds_what_brute_force_finds() -> None:
         expected = []
         for s, (a, b) in enumerate(interface.slave.segments):
             n = (t[s, 1], -t[s, 0])
-            every = [
-                overlap(tuple(x[a]), tuple(x[b]), n, n, True, *map(tuple, x[m])) for m in interface.master.segments
-            ]
+            view = SlaveView(tuple(x[a]), tuple(x[b]), n, n, straight=True)
+            every = [overlap(view, *map(tuple, x[m])) for m in interface.master.segments]
             expected += [(s, m) for m, (low, high) in enumerate(every) if low < high]
         # On these surfaces no master lies behind another and none is far away.
         assert sorted(zip(cells.slave, cells.master, strict=True)) == expected

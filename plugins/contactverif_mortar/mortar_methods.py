@@ -5,6 +5,8 @@
 | `mortar` | p_j = −ε̂ G_j where G_j ≤ 0 | N |
 | `mortar-dual` | the same | ψ, biorthogonal to N on what is covered |
 | `mortar-lm`, `mortar-dual-lm` | a multiplier λ_j, ∫φ_j g = 0 where active | N, ψ |
+
+Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 """
 
 from __future__ import annotations
@@ -17,11 +19,13 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif_mortar.cells import Cells, Quadrature
-from contactverif_mortar.options import AREAS, NORMALS, check_penalty, chosen
-from contactverif_mortar.reported import at_nodes
-from contactverif_mortar.weighting import Weighting, of_given_pressures, own_lengths
+from contactverif_mortar.cell_contact_points import at_nodes
+from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
+from contactverif_mortar.weighted_gaps import Weighting, at_fixed_pressures, own_lengths
+
+NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
 _SOURCES = {
     False: "Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629",
@@ -31,18 +35,28 @@ _SOURCES = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mortar:
-    """Pressures −ε̂ G_j at slave nodes that are covered and have G_j ≤ 0."""
+    """A mortar formulation by penalty: pressures −ε̂ G_j at slave nodes that are covered and have G_j ≤ 0.
+
+    Attributes
+    ----------
+    traits : Traits
+        The promises.
+    penalty : float
+        Distributed stiffness ε̂.
+    weighting : Weighting
+        The shapes, the normals and the quadrature.
+    """
 
     traits: Traits
     penalty: float
     weighting: Weighting
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """The cells, and which slave nodes are in contact."""
+        """Find the cells, and which slave nodes are in contact."""
         return self.weighting.pairing(interface, np.array(z).reshape(-1, 2), self.penalty, 0.0)
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Forces (..., n_unknowns)."""
+        """Compute the forces (..., n_unknowns)."""
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
         pressure = np.zeros_like(weighted.areas)
@@ -50,18 +64,18 @@ class Mortar:
         return weighted.forces(pressure, interface.n_nodes).reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
-        """The exact derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
+        """Compute the derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         weighted = self.weighting.carrying(interface, pairing, x[None])
         areas = np.where(active, weighted.areas[0], 1.0)
         gaps = np.where(active, weighted.with_gap[0] / areas, 0.0)
         stiffness = np.where(active, self.penalty, 0.0)
         rows = self.weighting.rows(interface, weighted, x)
-        own, influence = of_given_pressures(rows, -stiffness * gaps)
-        return (own - influence @ sparse.diags_array(stiffness) @ rows.of_gaps(gaps, areas)).tocoo()
+        derivative, influence = at_fixed_pressures(rows, -stiffness * gaps)
+        return (derivative - influence @ sparse.diags_array(stiffness) @ rows.weighted_gaps(gaps, areas)).tocoo()
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """The slave nodes: weighted gap and nodal pressure, ∫N_j as weight."""
+        """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
         x, cells, active = np.array(z).reshape(-1, 2), Cells.of(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
         pressure = np.where(active, -self.penalty * gaps, 0.0)
@@ -70,12 +84,16 @@ class Mortar:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MortarMultipliers:
-    """A multiplier λ_j ≥ 0 at each slave node, a pressure. Unknowns are positions and behind them multipliers.
+    """A mortar formulation with a multiplier λ_j ≥ 0, a pressure, at each slave node.
 
     Attributes
     ----------
+    traits : Traits
+        The promises.
     penalty : float
-        C of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
+        Scale c of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
+    weighting : Weighting
+        The shapes, the normals and the quadrature.
     """
 
     traits: Traits
@@ -83,18 +101,18 @@ class MortarMultipliers:
     weighting: Weighting
 
     def n_multipliers(self, interface: Interface) -> int:
-        """One at each slave node."""
+        """Return the number of multipliers: one at each slave node."""
         return interface.n_slave_nodes
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """The cells, and which slave nodes are in contact."""
-        x, multipliers = split_states(interface, z)
-        return self.weighting.pairing(interface, x[0], self.penalty, multipliers[0])
+        """Find the cells, and which slave nodes are in contact."""
+        x, multipliers = split_state(interface, z)
+        return self.weighting.pairing(interface, x, self.penalty, multipliers)
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Forces and behind them constraint rows (..., n_unknowns + n_slave_nodes).
+        """Compute forces and, behind them, constraint rows (..., n_unknowns + n_slave_nodes).
 
-        Rows: −∫φ_j g where active, else λ_j × the node's own length in the reference.
+        A row is −∫φ_j g where the node is active, else λ_j × the node's own length in the reference configuration.
         """
         x, multipliers = split_states(interface, z)
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
@@ -103,18 +121,18 @@ class MortarMultipliers:
         return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
-        """The exact derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]], and lengths where not active."""
+        """Compute the derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]]; lengths if not active."""
         x, multipliers = split_state(interface, z)
         active = pairing["active"]
         rows = self.weighting.rows(interface, self.weighting.carrying(interface, pairing, x[None]), x)
-        own, influence = of_given_pressures(rows, np.where(active, multipliers, 0.0))
-        d_gaps = rows.of_gaps(np.zeros(len(active)), np.ones(len(active)))
-        some = sparse.diags_array(active.astype(np.float64))
+        derivative, influence = at_fixed_pressures(rows, np.where(active, multipliers, 0.0))
+        d_gaps = rows.weighted_gaps(np.zeros(len(active)), np.ones(len(active)))
+        in_contact = sparse.diags_array(active.astype(np.float64))
         idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)))
-        return sparse.block_array([[own, influence @ some], [-(some @ d_gaps), idle]]).tocoo()
+        return sparse.block_array([[derivative, influence @ in_contact], [-(in_contact @ d_gaps), idle]]).tocoo()
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """The slave nodes: weighted gap and multiplier, ∫N_j as weight."""
+        """Return the slave nodes with weighted gap and multiplier, ∫N_j as weight."""
         x, multipliers = split_state(interface, z)
         cells, active = Cells.of(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
@@ -122,74 +140,110 @@ class MortarMultipliers:
 
 
 def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:
-    """Mortar with standard shapes: nodal pressures ε̂⟨−G_j⟩, interpolated linearly.
+    """Mortar with standard shapes: nodal pressures ε̂⟨−G_j⟩ of weighted gaps G_j, interpolated linearly.
+
+    Cells are integrated exactly and forces balance point by point. So force and moment are conserved, the flat patch
+    test is passed, and an overhang is covered. The tangent is exact and unsymmetric: forces are along the slave's
+    normal, the gradient of the gap is not.
 
     Parameters
     ----------
     penalty : float
         Distributed stiffness ε̂ > 0, force per length per length of penetration.
     area : str
-        "current" or "reference", where lengths are measured.
+        "current" or "reference": the configuration in which lengths are measured.
     normals : str
-        "segment" (default), or "averaged" at slave nodes and interpolated in between, which is smoother and
-        fails the patch test on a kinked surface.
+        "segment": each slave segment looks along its own normal. "averaged": normals are averaged at slave nodes and
+        interpolated in between, which is smoother, fails the patch test on a kinked surface, and promises no
+        continuity.
+
+    References
+    ----------
+    Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
     return Mortar(_traits(area, normals, False), check_penalty(penalty), _weighting(area, normals, False))
 
 
 def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:
-    """Mortar with dual shapes: weighted gaps come from linear fits, and a nodal pressure moves no other slave node.
+    """Mortar with dual shapes: a nodal pressure moves no other slave node.
 
-    Parameters are those of `mortar`.
+    Its promises are those of `mortar`. The weighted gap of a node is the value of a linear fit to the gaps around it.
+
+    Parameters
+    ----------
+    penalty, area, normals : float or str
+        As for `mortar`.
+
+    References
+    ----------
+    Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
     return Mortar(_traits(area, normals, True), check_penalty(penalty), _weighting(area, normals, True))
 
 
 def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
-    """Mortar with a Lagrange multiplier at each slave node, standard shapes.
+    """Mortar with a Lagrange multiplier, a pressure, at each slave node, and standard shapes.
+
+    Its promises are those of `mortar`, except that no continuity is promised: at given multipliers forces jump where a
+    node is released. The constraints are independent, so the multipliers are unique.
 
     Parameters
     ----------
     penalty : float
-        c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length; the solution does not depend on it.
+        Scale c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length. No solution depends on it.
     area, normals : str
         As for `mortar`.
+
+    References
+    ----------
+    Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
-    traits = _by_multipliers(_traits(area, normals, False))
+    traits = _with_multipliers(_traits(area, normals, False))
     return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, False))
 
 
 def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
-    """Mortar with a Lagrange multiplier at each slave node, dual shapes.
+    """Mortar with a Lagrange multiplier, a pressure, at each slave node, and dual shapes.
 
-    Parameters are those of `mortar_lm`.
+    Its promises are those of `mortar_lm`.
+
+    Parameters
+    ----------
+    penalty, area, normals : float or str
+        As for `mortar_lm`.
+
+    References
+    ----------
+    Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
-    traits = _by_multipliers(_traits(area, normals, True))
+    traits = _with_multipliers(_traits(area, normals, True))
     return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, True))
 
 
 def _weighting(area: str, normals: str, dual: bool) -> Weighting:
-    averaged = chosen("normals", normals, NORMALS)
-    # Linear shapes times linear gaps are exact with two points; unit normals that turn are not polynomials.
-    return Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, chosen("area", area, AREAS)))
+    """Return the weighting for two options and a kind of shapes."""
+    averaged = choose("normals", normals, NORMALS)
+    # Two points are exact for linear shapes × linear gaps. Unit normals that turn are not polynomials and get a third.
+    return Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, choose("area", area, AREAS)))
 
 
-def _by_multipliers(traits: Traits) -> Traits:
-    """At given multipliers forces jump where a node is let go."""
+def _with_multipliers(traits: Traits) -> Traits:
+    """Return the promises of a penalty method, for multipliers in its place."""
     return replace(traits, enforcement="multiplier", independent_multipliers=True, continuity=None)
 
 
 def _traits(area: str, normals: str, dual: bool) -> Traits:
+    """Return the promises of a penalty method."""
     return Traits(
         passes_flat_patch=True,
         covers_overhang=True,
         tangent="exact",
-        symmetric=False,  # forces are along the slave's normal, the gradient of the gap is not
+        symmetric=False,
         conserves_force=True,
         conserves_moment=True,
-        # averaged directions of a coarse ring turn away from a segment that is still seen, and its cell is gone at once
-        continuity=None if chosen("normals", normals, NORMALS) else "C0",
-        area="current" if chosen("area", area, AREAS) else "reference",
+        # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
+        continuity=None if choose("normals", normals, NORMALS) else "C0",
+        area="current" if choose("area", area, AREAS) else "reference",
         penalty="distributed",
         batched=True,
         takes_complex=True,

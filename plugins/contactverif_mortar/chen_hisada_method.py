@@ -1,10 +1,10 @@
 """Contact after Chen & Hisada: gaps of nodes as in NTS, their pressures interpolated and integrated over cells.
 
-Ours after the one-paragraph description in Zavarise & De Lorenzis (2009), section 1. The gap of a slave node is that
-to its nearest master segment, along the master's normal; pressures are linear along the slave, and
-∫ p n·(δx_s − δx_m) ds is taken over the cells of segment-to-segment, n normal to the slave, with two Gauss points
-(exact). So the patch test on a flat interface is passed; force and moment balance. The gradient of a node's gap has
-nothing to do with where its pressure acts: unsymmetric.
+Zavarise & De Lorenzis (2009), Section 1, describe the method in one paragraph; what is written down here is ours. The
+gap of a slave node is the one to its nearest master segment, along the master's normal. Pressures are linear along the
+slave. ∫ p n·(δx_s − δx_m) ds is taken over the cells of segment-to-segment, n normal to the slave, with two Gauss
+points, which is exact. So the flat patch test is passed, and force and moment balance. The gradient of a node's gap has
+nothing to do with where its pressure acts, so the tangent is unsymmetric.
 """
 
 from __future__ import annotations
@@ -17,27 +17,40 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.geometry.compiled import compiled
-from contactverif.geometry.projection import dot, foot_on_surface, frame, minus, nearest_segment, node, search_tree
-from contactverif_mortar import transmission
-from contactverif_mortar.cells import C, Cells, Quadrature
-from contactverif_mortar.geometry import D_C
-from contactverif_mortar.options import AREAS, check_free_end, check_penalty, chosen
-from contactverif_mortar.reported import at_points
+from contactverif.geometry.projection import (
+    Tree,
+    dot,
+    foot_on_surface,
+    frame,
+    minus,
+    nearest_segment,
+    node,
+    search_tree,
+)
+from contactverif_mortar import cell_forces
+from contactverif_mortar.cell_contact_points import at_points
+from contactverif_mortar.cell_geometry import D_C
+from contactverif_mortar.integration_cells import AREAS, C, Cells, Quadrature
 
-N_POINTS = 2
+N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure × a shape function has degree 2.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChenHisada:
-    """Nodal pressures −ε̂ g_i where g_i ≤ 0 and the foot is on the master.
+    """The formulation: nodal pressures −ε̂ g_i where g_i ≤ 0 and the foot is on the master.
 
     Attributes
     ----------
+    traits : Traits
+        The promises.
+    penalty : float
+        Distributed stiffness ε̂.
     quadrature : Quadrature
-        The points on a cell, and where their lengths are measured.
+        The points on a cell, and the configuration in which lengths are measured.
     tau : float
-        How far past a free end of the master a node's foot still counts, in lengths of its segment.
+        The part of a master segment by which a node's foot may lie past its free end and still count.
     """
 
     traits: Traits
@@ -46,27 +59,27 @@ class ChenHisada:
     tau: float
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """The cells, and of each slave node its nearest master segment and whether it is in contact."""
+        """Find the cells, the nearest master segment of each slave node, and which slave nodes are in contact."""
         x = np.array(z).reshape(-1, 2)
         master = interface.master
         nearest, active = _pair_nodes(
-            x, interface.n_slave_nodes, master.segments, master.neighbours, *search_tree(master, x), self.tau
+            x, interface.n_slave_nodes, master.segments, master.neighbours, search_tree(master, x), self.tau
         )
         cells = Cells.find(interface, x, averaged=False)
         return Pairing({**cells.as_arrays(), "nearest": nearest, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Forces (..., n_unknowns)."""
+        """Compute the forces (..., n_unknowns)."""
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
         cells, ends = _carrying(interface, pairing, len(self.quadrature))
         points = self.quadrature.points(interface, cells, x)
         pressure = self._node_pressures(interface, pairing, x)[:, ends]  # (n_states, n_points, 2)
         c = points[..., C]
         at_points = (1 - c) / 2 * pressure[..., 0] + (1 + c) / 2 * pressure[..., 1]
-        return transmission.forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
+        return cell_forces.forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
-        """The exact derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
+        """Compute the derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
         x = np.array(z).reshape(-1, 2)
         cells, ends = _carrying(interface, pairing, len(self.quadrature))
         points, gains = self.quadrature.points(interface, cells, x[None])[0], self.quadrature.gains(interface, cells, x)
@@ -76,17 +89,19 @@ class ChenHisada:
         shapes = np.column_stack([(1 - c) / 2, (1 + c) / 2])
         slope = (pressure[ends[:, 1]] - pressure[ends[:, 0]]) / 2
         d_pressure = slope[:, None, None] * gains[:, D_C]
-        own = transmission.tangent(points, gains, (shapes * pressure[ends]).sum(axis=1), d_pressure, nodes, z.size)
+        derivative = cell_forces.tangent(
+            points, gains, (shapes * pressure[ends]).sum(axis=1), d_pressure, nodes, z.size
+        )
         places = interface.slave.segments[cells.slave]
-        influence = transmission.influence(points, shapes, places, nodes, (z.size, len(active)))
+        influence = cell_forces.influence(points, shapes, places, nodes, (z.size, len(active)))
         d_gaps = _node_gap_rows(x, interface.master.segments, pairing["nearest"])  # (n_slave_nodes, 3, 2)
-        of = np.column_stack([np.arange(len(active)), interface.master.segments[pairing["nearest"]]])
-        rows = transmission.gathered(d_gaps[:, None], np.arange(len(active))[:, None], of, (len(active), z.size))
+        local = np.column_stack([np.arange(len(active)), interface.master.segments[pairing["nearest"]]])
+        rows = cell_forces.gathered(d_gaps[:, None], np.arange(len(active))[:, None], local, (len(active), z.size))
         springs = sparse.diags_array(np.where(active, -self.penalty, 0.0))
-        return (own.tocsr() + influence.tocsr() @ springs @ rows.tocsr()).tocoo()
+        return (derivative.tocsr() + influence.tocsr() @ springs @ rows.tocsr()).tocoo()
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """The Gauss points of all cells, with their gaps along the slave's normal and interpolated pressures."""
+        """Return the Gauss points of all cells, with gaps along the slave's normal and interpolated pressures."""
         cells = Cells.of(pairing)
         x = np.array(z).reshape(1, -1, 2)
         points = self.quadrature.points(interface, cells, x)[0]
@@ -97,13 +112,13 @@ class ChenHisada:
         return at_points(interface, cells, points, z, pressure, active)
 
     def _node_pressures(self, interface: Interface, pairing: Pairing, x: Array) -> Array:
-        """Pressures (n_states, n_slave_nodes) at positions x (n_states, n_nodes, 2)."""
+        """Return pressures (n_states, n_slave_nodes) at positions x (n_states, n_nodes, 2)."""
         gaps = _node_gaps(x, interface.master.segments, pairing["nearest"])
         return np.where(pairing["active"], -self.penalty * gaps, 0.0)
 
 
 def _carrying(interface: Interface, pairing: Pairing, n_q: int) -> tuple[Cells, IntArray]:
-    """The cells whose slave segment has an active node, and the slave nodes (n_points, 2) of their points."""
+    """Return the cells whose slave segment has an active node, and the slave nodes (n_points, 2) of their points."""
     cells = Cells.of(pairing).near(pairing["active"], interface)
     return cells, interface.slave.segments[np.repeat(cells.slave, n_q)]
 
@@ -114,10 +129,11 @@ def _pair_nodes(
     n_nodes: int,
     master: IntArray,
     neighbours: IntArray,
-    order: IntArray,
-    boxes: FloatArray,
+    tree: Tree,
     tau: float,
 ) -> tuple[IntArray, BoolArray]:
+    """Return the nearest master segment of each slave node, and whether the node is in contact."""
+    order, boxes = tree
     nearest = np.empty(n_nodes, dtype=np.int64)
     active = np.empty(n_nodes, dtype=np.bool_)
     for number in range(n_nodes):
@@ -133,46 +149,53 @@ def _pair_nodes(
 
 @compiled
 def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
-    """Gaps (n_states, n_slave_nodes) of the slave nodes to the lines of their master segments."""
-    found = np.empty((x.shape[0], len(nearest)), dtype=x.dtype)
+    """Return the gaps (n_states, n_slave_nodes) of the slave nodes to the lines of their master segments."""
+    gaps = np.empty((x.shape[0], len(nearest)), dtype=x.dtype)
     for state in range(x.shape[0]):
         for number in range(len(nearest)):
             x_1, x_2 = node(x[state], master[nearest[number], 0]), node(x[state], master[nearest[number], 1])
             _, _, n = frame(x_1, x_2)
-            found[state, number] = dot(minus(node(x[state], number), x_1), n)
-    return found
+            gaps[state, number] = dot(minus(node(x[state], number), x_1), n)
+    return gaps
 
 
 @compiled
 def _node_gap_rows(x: FloatArray, master: IntArray, nearest: IntArray) -> FloatArray:
-    """Δg = n·(Δx_V − (1−ξ)Δx_1 − ξΔx_2), rows (n_slave_nodes, 3: V, 1, 2, 2)."""
-    found = np.empty((len(nearest), 3, 2))
+    """Return Δg = n·(Δx_V − (1−ξ)Δx_1 − ξΔx_2) of each slave node, (n_slave_nodes, 3 nodes V, 1, 2, 2)."""
+    d_gaps = np.empty((len(nearest), 3, 2))
     for number in range(len(nearest)):
         x_1, x_2 = node(x, master[nearest[number], 0]), node(x, master[nearest[number], 1])
         length, t, n = frame(x_1, x_2)
         xi = dot(minus(node(x, number), x_1), t) / length
         for i in range(2):
-            found[number, 0, i], found[number, 1, i], found[number, 2, i] = n[i], (xi - 1) * n[i], -xi * n[i]
-    return found
+            d_gaps[number, 0, i], d_gaps[number, 1, i], d_gaps[number, 2, i] = n[i], (xi - 1) * n[i], -xi * n[i]
+    return d_gaps
 
 
 def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> ChenHisada:
-    """Node gaps as in NTS, pressures interpolated along the slave and integrated over cells.
+    """Chen & Hisada: node gaps as in NTS, pressures interpolated along the slave and integrated over cells.
+
+    It passes the flat patch test and conserves force and moment. It does not cover an overhang: the pressure falls to
+    zero at the node that overhangs, not at the end of the master.
 
     Parameters
     ----------
     penalty : float
         Distributed stiffness ε̂ > 0, force per length per length of penetration.
     area : str
-        "current" or "reference", where lengths are measured.
+        "current" or "reference": the configuration in which lengths are measured.
     tau : float
-        How far past a free end of the master the foot of a node still counts, in lengths of its segment.
+        The part of a master segment by which a node's foot may lie past its free end and still count.
+
+    References
+    ----------
+    Chen & Hisada, as Zavarise & De Lorenzis (2009), Section 1, describe their method; tangent: here.
     """
-    current = chosen("area", area, AREAS)
+    current = choose("area", area, AREAS)
     return ChenHisada(
         Traits(
             passes_flat_patch=True,
-            covers_overhang=False,  # the pressure falls to the node that overhangs, not to the end of the master
+            covers_overhang=False,
             tangent="exact",
             symmetric=False,
             conserves_force=True,
@@ -186,5 +209,5 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
         ),
         check_penalty(penalty),
         Quadrature.gauss(N_POINTS, current),
-        check_free_end(tau),
+        check_tau(tau),
     )

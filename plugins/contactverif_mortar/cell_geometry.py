@@ -1,23 +1,27 @@
-"""One slave segment A B against one master segment 1 → 2: where they overlap, and a point of the overlap with its Δ.
+"""One slave segment A B against one master segment 1 → 2: what a point of the slave sees, and its Δ.
 
-Each point of the slave, at c ∈ [−1, 1], looks along a direction ν(c), linear in c between those of the two ends, and
-sees the master where the line along it meets the segment:
+Each point of the slave, at c ∈ [−1, 1], looks along a direction ν(c), linear in c between the directions of both ends.
+It sees the master where the line along ν meets the segment:
 
     x_s = (1−c)/2 x_A + (1+c)/2 x_B      n = ν/|ν| (out of the slave)      τ = n turned, along the slave
     ξ = (x_s − x_1)·τ / (x_2 − x_1)·τ    x_m = (1−ξ) x_1 + ξ x_2           g = (x_m − x_s)·n, negative in penetration
 
-With the segment's own normal at both ends ν is constant. With averaged normals it is (n_A + n_B)/2 + c (n_B − n_A)/2,
-with n_A the unit vector along the sum of the normals of the two segments at A; a node e of the master is then seen from
-the c that solves the quadratic (x_e − x_s(c))·τ(c) |ν| = 0. In both cases x_m − x_s is along n, so that forces along n
-at x_s and x_m balance in sum and in moment, and those of a point need no other point's.
+With the segment's own normal at both ends ν is constant. With averaged normals ν = (n_A + n_B)/2 + c (n_B − n_A)/2, and
+n_A is the unit vector along the sum of the normals of the two segments at A. A node e of the master is then seen from
+the c that solves the quadratic (x_e − x_s(c))·τ(c) |ν| = 0. In both cases x_m − x_s is along n. So forces along n at
+x_s and x_m balance in sum and in moment, point by point.
 
-A Δ is a row (n_local, 2): what a number gains for each displacement of A, B, 1, 2, and with averaged normals of the
-slave nodes before A and behind B. With ω the turn of the directions, Δτ = n ω, Δn = −τ ω.
+A Δ of a number is an array (n_local, 2): what the number gains for each displacement of A, B, 1, 2, and with averaged
+normals of the slave nodes before A and behind B. With ω the turn of the directions, Δτ = n ω and Δn = −τ ω.
 
-Source: Zavarise & Wriggers (1998), Puso & Laursen (2004), Popp, Gitterle, Gee & Wall (2010); the rows are derived here.
+Rule for the next editor: every function here takes real and complex positions, except those that compute a Δ.
+
+Source: Zavarise & Wriggers (1998), Puso & Laursen (2004), Popp, Gitterle, Gee & Wall (2010). The Δ are derived here.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,29 +30,44 @@ from contactverif.geometry.compiled import compiled
 from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 
 A, B, ONE, TWO, BEFORE, BEHIND = range(6)  # local nodes
-D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # the rows of a point
+D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # The Δ of a point, in this order.
+
+
+class SlaveView(NamedTuple):
+    """A slave segment A B and the directions in which its two ends look."""
+
+    x_a: Vector
+    x_b: Vector
+    n_a: Vector
+    n_b: Vector
+    straight: bool  # both ends look along the segment's own normal
 
 
 @compiled
 def turned(n: Vector) -> Vector:
-    """τ of a normal n: the tangent that `frame` would have with it."""
+    """Return τ of a normal n: the tangent that belongs to it in `frame`."""
     return -n[1], n[0]
 
 
 @compiled
-def end_normals(x: FloatArray, slave: IntArray, segment: int, before: int, behind: int) -> tuple[Vector, Vector]:
-    """Directions in which the two ends of a slave segment look: averaged with those segments, or its own where −1."""
-    _, _, n = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
+def slave_view(x: FloatArray, slave: IntArray, segment: int, before: int, behind: int) -> SlaveView:
+    """Return a slave segment with the directions of its ends.
+
+    The normal at A is averaged with that of the segment `before`, the normal at B with that of `behind`, −1 for none.
+    """
+    x_a, x_b = node(x, slave[segment, 0]), node(x, slave[segment, 1])
+    _, _, n = frame(x_a, x_b)
     n_a, n_b = n, n
     if before >= 0:
         n_a = _averaged(x, slave, n, before)
     if behind >= 0:
         n_b = _averaged(x, slave, n, behind)
-    return n_a, n_b
+    return SlaveView(x_a, x_b, n_a, n_b, before < 0 and behind < 0)
 
 
 @compiled
 def _averaged(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
+    """Return the unit vector along the sum of the normal n and that of another slave segment."""
     _, _, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
     total = (n[0] + n_other[0], n[1] + n_other[1])
     size = np.sqrt(dot(total, total))
@@ -56,8 +75,9 @@ def _averaged(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
 
 
 @compiled
-def seen_from(x_e: Vector, x_a: Vector, x_b: Vector, n_a: Vector, n_b: Vector, straight: bool) -> float:
-    """The c from which the point x_e is seen; the root at which it passes from ahead to behind as c grows."""
+def seen_from(x_e: Vector, view: SlaveView) -> float:
+    """Return the c from which the point x_e is seen: the root at which it passes from ahead to behind as c grows."""
+    x_a, x_b, n_a, n_b, straight = view
     half = ((x_b[0] - x_a[0]) / 2, (x_b[1] - x_a[1]) / 2)
     arm = minus(x_e, between(x_a, x_b, 0.0))
     tau_0 = turned(between(n_a, n_b, 0.0))
@@ -71,12 +91,10 @@ def seen_from(x_e: Vector, x_a: Vector, x_b: Vector, n_a: Vector, n_b: Vector, s
 
 
 @compiled
-def facing_point(
-    x_a: Vector, x_b: Vector, n_a: Vector, n_b: Vector, x_1: Vector, x_2: Vector, c: float
-) -> tuple[float, float, Vector]:
-    """ξ, gap and normal n (out of the slave) at c."""
-    x_s = between(x_a, x_b, c)
-    nu = between(n_a, n_b, c)
+def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[float, float, Vector]:
+    """Return ξ, the gap g and the normal n (out of the slave) at c."""
+    x_s = between(view.x_a, view.x_b, c)
+    nu = between(view.n_a, view.n_b, c)
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
     tau = turned(n)
@@ -89,12 +107,13 @@ def facing_point(
 def turn_of_ends(
     x: FloatArray, slave: IntArray, segment: int, before: int, behind: int, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
-    """The turns of n_A and n_B, as rows: ω = n·(Δx_B − Δx_A)/l of the segment alone.
+    """Write the turns of n_A and n_B into two arrays (n_local, 2): ω = n·(Δx_B − Δx_A)/l of the segment alone.
 
-    Averaged with the normal n′ of a neighbour: τ_A·(t ω + t′ ω′)/|n + n′|.
+    A normal that is averaged with the normal n′ of a neighbour turns by τ_A·(t ω + t′ ω′)/|n + n′|.
     """
     length, t, n = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
     for row in (d_omega_a, d_omega_b):
+        row[:] = 0.0
         for i in range(2):
             row[A, i] = -n[i] / length
             row[B, i] = n[i] / length
@@ -108,6 +127,10 @@ def turn_of_ends(
 def _average_turn(
     row: FloatArray, x: FloatArray, slave: IntArray, other: int, t: Vector, n: Vector, first: int, second: int
 ) -> None:
+    """Change the turn of a segment's own normal n into that of the average with segment `other`.
+
+    The nodes of `other` are the local nodes `first` and `second`.
+    """
     length, t_other, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
     total = (n[0] + n_other[0], n[1] + n_other[1])
     squared = dot(total, total)
@@ -125,18 +148,16 @@ def cut_gains(
     c: float,
     cutting: int,
     x_e: Vector,
-    x_a: Vector,
-    x_b: Vector,
-    n_a: Vector,
-    n_b: Vector,
+    view: SlaveView,
     d_omega_a: FloatArray,
     d_omega_b: FloatArray,
 ) -> None:
-    """Δ of the c from which local node `cutting`, at x_e, is seen.
+    """Write Δ of the c from which local node `cutting`, at x_e, is seen, into d_c (n_local, 2).
 
     [τ·(x_B − x_A)/2 − h ω_c] Δc = τ·(Δx_e − (1−c)/2 Δx_A − (1+c)/2 Δx_B) + h ω, with h = (x_e − x_s)·n, ω the turn of n
     at fixed c and ω_c its turn for each unit of c.
     """
+    x_a, x_b, n_a, n_b, _ = view
     nu = between(n_a, n_b, c)
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
@@ -158,23 +179,21 @@ def cut_gains(
 def point_gains(
     gains: FloatArray,
     c: float,
-    x_a: Vector,
-    x_b: Vector,
-    n_a: Vector,
-    n_b: Vector,
+    view: SlaveView,
     x_1: Vector,
     x_2: Vector,
     d_omega_a: FloatArray,
     d_omega_b: FloatArray,
 ) -> None:
-    """The rows of Δξ, Δg and ω at c into `gains` (5, n_local, 2), whose row of Δc is there.
+    """Write Δξ, Δg and ω at c into `gains` (5, n_local, 2), which holds Δc already.
 
         (x_2 − x_1)·τ Δξ = τ·(Δx_s − (1−ξ)Δx_1 − ξΔx_2) − g ω
         Δg = n·((1−ξ)Δx_1 + ξΔx_2 − Δx_s) + n·(x_2 − x_1) Δξ
 
-    with Δx_s at fixed c gaining (x_B − x_A)/2 Δc, and ω gaining ω_c Δc.
+    Δx_s at fixed c gains (x_B − x_A)/2 Δc, and ω gains ω_c Δc.
     """
-    xi, gap, n = facing_point(x_a, x_b, n_a, n_b, x_1, x_2, c)
+    xi, gap, n = facing_point(view, x_1, x_2, c)
+    x_a, x_b, n_a, n_b, _ = view
     nu = between(n_a, n_b, c)
     size = np.sqrt(dot(nu, nu))
     tau = turned(n)

@@ -1,4 +1,7 @@
-"""What the formulations of this family say of their points."""
+"""Report the contact points of the formulations of this family.
+
+The ends of areas of competence are NaN here: cells end at nodes by construction, and no decision depends on that.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,26 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
-from contactverif_mortar.cells import GAP, NORMAL_X, WEIGHT, XI, C, Cells, Quadrature
+from contactverif_mortar.integration_cells import GAP, NORMAL_X, WEIGHT, XI, C, Cells, Quadrature
 
 
 def at_points(
     interface: Interface, cells: Cells, points: FloatArray, z: FloatArray, pressure: FloatArray, active: BoolArray
 ) -> ContactPoints:
-    """The quadrature points (n_points, 6) of the cells.
+    """Return the quadrature points of the cells as contact points.
 
-    The ends of their areas of competence are NaN: they lie at master nodes by construction, and decide nothing.
+    Parameters
+    ----------
+    interface : Interface
+        The interface.
+    cells : Cells
+        The cells.
+    points : FloatArray, shape (n_points, 6)
+        The points of `Quadrature.points` at one state.
+    z : FloatArray, shape (n_unknowns,)
+        The state.
+    pressure, active : FloatArray or BoolArray, shape (n_points,)
+        Pressures, and which points are in contact.
     """
     n_q = len(points) // max(len(cells.slave), 1)
     segment, master = np.repeat(cells.slave, n_q), np.repeat(cells.master, n_q)
@@ -47,28 +61,42 @@ def at_nodes(
     pressure: FloatArray,
     active: BoolArray,
 ) -> ContactPoints:
-    """The slave nodes (n_slave_nodes,) with ∫N_j, weighted gap and nodal pressure.
+    """Return the slave nodes as contact points, with ∫N_j, weighted gap and nodal pressure.
 
-    A node is measured against the master segment that it sees itself, the one behind it along the slave where two cells
-    meet there, and against none (−1) if it overhangs.
+    A node is measured against the master segment that it sees itself. Where two cells meet there, that is the one
+    behind it along the slave. A node that overhangs is measured against none (−1).
+
+    Parameters
+    ----------
+    interface : Interface
+        The interface.
+    cells : Cells
+        The cells.
+    x : FloatArray, shape (n_nodes, 2)
+        Positions.
+    areas, gaps, pressure : FloatArray, shape (n_slave_nodes,)
+        ∫N_j, weighted gaps and nodal pressures.
+    active : BoolArray, shape (n_slave_nodes,)
+        The nodes in contact.
     """
     n_nodes = interface.n_slave_nodes
     carrier, place = np.full(n_nodes, -1), np.full(n_nodes, np.nan)
-    for end, own in ((1, interface.slave.segments[:, 1]), (0, interface.slave.segments[:, 0])):
-        carrier[own], place[own] = np.arange(len(own)), 2.0 * end - 1
-    seen, xi, normal = np.full(n_nodes, -1), np.full(n_nodes, np.nan), np.full((n_nodes, 2), np.nan)
+    for end in (1, 0):
+        numbers = interface.slave.segments[:, end]
+        carrier[numbers], place[numbers] = np.arange(len(numbers)), 2.0 * end - 1
+    master, xi, normal = np.full(n_nodes, -1), np.full(n_nodes, np.nan), np.full((n_nodes, 2), np.nan)
     for end, c in ((1, 1.0), (0, -1.0)):
         at_end = Quadrature(np.array([c]), np.ones(1), current=True)
         here = np.flatnonzero(~(cells.cut_high if end else cells.cut_low))  # cells that end at the node
         number = interface.slave.segments[cells.slave[here], end]
         carrier[number], place[number] = cells.slave[here], c
         ends = at_end.points(interface, cells.where(here), x[None])[0]
-        seen[number], xi[number], normal[number] = cells.master[here], ends[:, XI], -ends[:, NORMAL_X:]
+        master[number], xi[number], normal[number] = cells.master[here], ends[:, XI], -ends[:, NORMAL_X:]
     nowhere = np.full(n_nodes, np.nan)
     return ContactPoints(
         slave_segment=carrier,
         c=place,
-        master_segment=seen,
+        master_segment=master,
         xi=xi,
         position=x[:n_nodes],
         normal=normal,

@@ -1,14 +1,14 @@
-"""How pressures at slave nodes are interpolated along the slave, weighted gaps with the same shapes, and Δ of both.
+"""Interpolate pressures of slave nodes along the slave, weight gaps with the same shapes, and compute Δ of both.
 
-Standard: N_A = (1−c)/2, N_B = (1+c)/2. Dual: ψ_A, ψ_B with ∫ψ_j N_k = δ_jk ∫N_j over the covered part of each slave
-segment. With c̄ the mean of c over that part and v its variance these are
+Standard shapes: N_A = (1−c)/2, N_B = (1+c)/2. Dual shapes: ψ_A, ψ_B with ∫ψ_j N_k = δ_jk ∫N_j over the covered part of
+each slave segment. With c̄ the mean of c over that part and v its variance these are
 
     ψ_A, ψ_B = N_A(c̄) − κ (c − c̄), N_B(c̄) + κ (c − c̄)        κ = (1 − c̄²) / 2v
 
-(∫ψ_B = ∫N_B gives the constant, ∫ψ_B c = ∫N_B the slope). No matrix is inverted, so a sliver is as good as a whole
-segment; there κ grows like 1/length unless the sliver is at an end, as biorthogonality wants.
+(∫ψ_B = ∫N_B gives the constant, ∫ψ_B c = ∫N_B the slope.) No matrix is inverted, so a sliver is as good as a whole
+segment. On a sliver in the middle of a segment κ grows like 1/length, as biorthogonality wants.
 
-Weighted gap of a node: G_j = ∫φ_j g / ∫φ_j over all that is covered, φ = N or ψ. ∫φ_j = ∫N_j in both cases.
+The weighted gap of a node is G_j = ∫φ_j g / ∫φ_j over all that is covered, φ = N or ψ. ∫φ_j = ∫N_j in both cases.
 
 Source: Puso & Laursen (2004); dual shapes: Wohlmuth (2000), on the covered part: Popp, Gitterle, Gee & Wall (2010).
 """
@@ -21,27 +21,27 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif_mortar.cells import GAP, WEIGHT, C
-from contactverif_mortar.geometry import D_C, D_GAP, D_WEIGHT
-from contactverif_mortar.transmission import gathered, summed
+from contactverif_mortar.cell_forces import gathered, summed
+from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT
+from contactverif_mortar.integration_cells import GAP, WEIGHT, C
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shapes:
-    """Shapes at points of some states.
+    """The values of shapes at points of some states, and how they change.
 
     Attributes
     ----------
     values : Array, shape (n_states, n_points, 2)
-        Of the nodes A and B of the slave segment that a point is on.
+        Values of the shapes of A and B, the nodes of the slave segment that carries the point.
     slope : Array, shape (n_states, n_points)
-        Δ of the second for each unit of c; that of the first is the opposite.
+        Δ of the second shape for each unit of c; Δ of the first is the opposite.
     by_mean, by_variance : Array, shape (n_states, n_points)
-        Likewise for each unit of c̄ and v of the segment; zero if not dual.
+        Δ of the second shape for each unit of c̄ and of v of the segment; zero for standard shapes.
     centred, extent : Array, shape (n_states, n_points)
-        C − c̄, and ∫1 of the segment; dual only.
+        c − c̄, and ∫1 of the segment; zero for standard shapes.
     variance : Array, shape (n_states, n_points)
-        v.
+        The variance v of the segment; zero for standard shapes.
     """
 
     values: Array
@@ -54,13 +54,13 @@ class Shapes:
 
     @classmethod
     def standard(cls, points: Array) -> Shapes:
-        """Linear between the nodes."""
+        """Return the standard shapes at points (n_states, n_points, 6)."""
         c, nothing = points[..., C], np.zeros_like(points[..., C])
         return cls(np.stack([(1 - c) / 2, (1 + c) / 2], axis=-1), nothing + 0.5, *[nothing] * 5)
 
     @classmethod
     def dual(cls, points: Array, segment: IntArray, n_segments: int) -> Shapes:
-        """Biorthogonal to those, on what the points (of slave segments `segment`, (n_points,)) cover."""
+        """Return the dual shapes on what the points cover; `segment` (n_points,) is the slave segment of each."""
         c, w = points[..., C], points[..., WEIGHT]
         first = _first_of_each(segment)
         rough = c[..., first]  # a place in the covered part: so c − c̄ is as exact as c, however short the part
@@ -83,19 +83,19 @@ class Shapes:
         )
 
     def at(self, node_values: Array, ends: IntArray) -> Array:
-        """Values (n_states, n_nodes) at the nodes, interpolated to the points, which are between nodes `ends`."""
-        found: Array = (self.values * node_values[..., ends]).sum(axis=-1)
-        return found
+        """Interpolate values (n_states, n_nodes) of the nodes to the points, each between its nodes `ends`."""
+        interpolated: Array = (self.values * node_values[..., ends]).sum(axis=-1)
+        return interpolated
 
 
 def _first_of_each(segment: IntArray) -> IntArray:
-    """For each point the first point of its slave segment; points of a segment follow each other."""
+    """Return for each point the first point of its slave segment; the points of a segment follow each other."""
     begins = np.r_[True, segment[1:] != segment[:-1]] if len(segment) else np.zeros(0, bool)
     return np.maximum.accumulate(np.where(begins, np.arange(len(segment)), 0))
 
 
 def integrals(shapes: Shapes, points: Array, ends: IntArray, n_nodes: int) -> tuple[Array, Array]:
-    """∫φ_j and ∫φ_j g (n_states, n_nodes) of the slave nodes."""
+    """Return ∫φ_j and ∫φ_j g (n_states, n_nodes) of the slave nodes."""
     weighted = shapes.values * points[..., WEIGHT, None]
     with_gap = weighted * points[..., GAP, None]
     areas = summed(weighted.reshape(len(points), -1), ends.ravel(), n_nodes)
@@ -104,18 +104,26 @@ def integrals(shapes: Shapes, points: Array, ends: IntArray, n_nodes: int) -> tu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """Δ of what belongs to the points of one state, as sparse rows over the unknowns.
+    """The Δ of the points of one state, and the sparse rows over all unknowns that follow from them.
 
     Attributes
     ----------
     gains : FloatArray, shape (n_points, 5, n_local, 2)
-        Of `Quadrature.gains`.
-    shapes, points : Shapes or FloatArray
-        Of that one state, without the leading axis (n_states,).
-    segment, ends : IntArray, shape (n_points,)
-        And (n_points, 2) slave segment and slave nodes of each point.
+        The Δ of `Quadrature.gains`.
+    points : FloatArray, shape (n_points, 6)
+        The points of `Quadrature.points`.
+    shapes : Shapes
+        The shapes at that one state, n_states = 1.
+    segment : IntArray, shape (n_points,)
+        The slave segment of each point.
+    ends : IntArray, shape (n_points, 2)
+        The slave nodes of each point.
     nodes : IntArray, shape (n_cells, n_local)
-        Of `Cells.local_nodes`.
+        The nodes of `Cells.local_nodes`.
+    n_segments, n_unknowns : int
+        Numbers of slave segments and of positions.
+    dual : bool
+        The shapes are dual.
     """
 
     gains: FloatArray
@@ -128,8 +136,8 @@ class Rows:
     n_unknowns: int
     dual: bool
 
-    def of_segments(self) -> sparse.csr_array:
-        """Δc̄ and behind them Δv of each slave segment (2 n_segments, n_unknowns).
+    def segment_moments(self) -> sparse.csr_array:
+        """Return Δc̄ and, behind them, Δv of all slave segments, (2 n_segments, n_unknowns).
 
         ∫1 Δc̄ = Σ (c − c̄) Δw + w Δc        ∫1 Δv = Σ ((c − c̄)² − v) Δw + 2 w (c − c̄) Δc
         """
@@ -143,10 +151,10 @@ class Rows:
         rows = np.stack([d_mean, d_variance], axis=1)
         return gathered(rows, places, self.nodes, (2 * self.n_segments, self.n_unknowns)).tocsr()
 
-    def of_gaps(self, reference: FloatArray, divisor: FloatArray) -> sparse.csr_array:
-        """Rows (n_nodes, n_unknowns) of Σ [w φ Δg + (g − G) Δ(w φ)] / divisor.
+    def weighted_gaps(self, reference: FloatArray, divisor: FloatArray) -> sparse.csr_array:
+        """Return Σ [w φ Δg + (g − G) Δ(w φ)] / divisor, (n_nodes, n_unknowns).
 
-        With G the weighted gaps and ∫φ_j as divisor this is ΔG_j; with zero and one Δ∫φ_j g. The form with the
+        With the weighted gaps as `reference` G and ∫φ_j as `divisor` this is ΔG_j. With zero and one it is Δ∫φ_j g. The
         difference g − G does not cancel on a sliver.
         """
         s, points, n_nodes = self.shapes, self.points, len(divisor)
@@ -158,7 +166,7 @@ class Rows:
         signed = above * w[:, None] * [-1.0, 1.0]
         rows += _times(signed * s.slope[0][:, None], self.gains[:, D_C, None])
         places = self.by_cell(self.ends)
-        found = gathered(rows, places, self.nodes, (n_nodes, self.n_unknowns)).tocsr()
+        total = gathered(rows, places, self.nodes, (n_nodes, self.n_unknowns)).tocsr()
         if self.dual:
             by = np.stack([signed * s.by_mean[0][:, None], signed * s.by_variance[0][:, None]])  # (2, n_points, 2)
             lines = np.broadcast_to(self.ends, by.shape)
@@ -166,15 +174,15 @@ class Rows:
             chain = sparse.coo_array(
                 (by.ravel(), (lines.ravel(), columns.ravel())), shape=(n_nodes, 2 * self.n_segments)
             )
-            found = found + chain.tocsr() @ self.of_segments()
-        return found
+            total = total + chain.tocsr() @ self.segment_moments()
+        return total
 
-    def by_cell(self, of_points: IntArray) -> IntArray:
-        """What the points (n_points, …) of a cell have in common, once for each cell."""
-        return of_points[:: max(len(of_points) // max(len(self.nodes), 1), 1)]
+    def by_cell(self, by_point: IntArray) -> IntArray:
+        """Return what all points of a cell have in common once for each cell, from (n_points, …)."""
+        return by_point[:: max(len(by_point) // max(len(self.nodes), 1), 1)]
 
 
 def _times(factor: FloatArray, rows: FloatArray) -> FloatArray:
-    """A factor for each point (and node of it), times its row."""
+    """Multiply the Δ of each point (and node of it) by a factor."""
     product: FloatArray = factor[..., None, None] * rows
     return product

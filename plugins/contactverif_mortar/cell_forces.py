@@ -1,10 +1,11 @@
-"""From pressures at the points of cells to nodal forces, and the tangent of that.
+"""Turn pressures at the points of cells into nodal forces, and compute the tangent of that.
 
-With F = w p, w a point's length, p its pressure and n out of the slave:
+With F = w p, w the weight (a length) of a point, p its pressure and n out of the slave:
 
     R_A = (1−c)/2 F n    R_B = (1+c)/2 F n    R_1 = −(1−ξ) F n    R_2 = −ξ F n
 
-x_m − x_s is along n, so forces and moments balance point by point, whatever the pressures are.
+What must stay true: forces and moments balance point by point, whatever the pressures are. They do because x_m − x_s
+is along n. `gathered` and `summed` add up numbers of points that belong to the same node or segment.
 """
 
 from __future__ import annotations
@@ -14,17 +15,31 @@ from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.geometry.compiled import compiled
-from contactverif_mortar.cells import NORMAL_X, NORMAL_Y, WEIGHT, XI, C
-from contactverif_mortar.geometry import D_C, D_WEIGHT, D_XI, OMEGA
+from contactverif_mortar.cell_geometry import D_C, D_WEIGHT, D_XI, OMEGA
+from contactverif_mortar.integration_cells import NORMAL_X, NORMAL_Y, WEIGHT, XI, C
 
 
 @compiled
 def forces(points: Array, pressure: Array, nodes: IntArray, n_nodes: int) -> Array:
-    """Nodal forces (n_states, n_nodes, 2) of points (n_states, n_points, 6) under pressures (n_states, n_points).
+    """Compute nodal forces from pressures at points.
 
-    nodes (n_cells, ≥ 4) are A, B, 1, 2 of the cell that a point is in.
+    Parameters
+    ----------
+    points : Array, shape (n_states, n_points, 6)
+        The points of `Quadrature.points`; the points of a cell follow each other.
+    pressure : Array, shape (n_states, n_points)
+        Pressures, force per length, positive where the surfaces press.
+    nodes : IntArray, shape (n_cells, n_local)
+        Node numbers of each cell; A, B, 1, 2 come first.
+    n_nodes : int
+        Number of nodes of the interface.
+
+    Returns
+    -------
+    Array, shape (n_states, n_nodes, 2)
+        Internal forces.
     """
-    found = np.zeros((points.shape[0], n_nodes, 2), dtype=points.dtype)
+    totals = np.zeros((points.shape[0], n_nodes, 2), dtype=points.dtype)
     n_q = points.shape[1] // max(len(nodes), 1)
     for state in range(points.shape[0]):
         for number in range(points.shape[1]):
@@ -34,20 +49,20 @@ def forces(points: Array, pressure: Array, nodes: IntArray, n_nodes: int) -> Arr
             f = point[WEIGHT] * pressure[state, number]
             c, xi = point[C], point[XI]
             for k, shape in enumerate(((1 - c) / 2, (1 + c) / 2, xi - 1, -xi)):
-                found[state, local[k], 0] += shape * f * point[NORMAL_X]
-                found[state, local[k], 1] += shape * f * point[NORMAL_Y]
-    return found
+                totals[state, local[k], 0] += shape * f * point[NORMAL_X]
+                totals[state, local[k], 1] += shape * f * point[NORMAL_Y]
+    return totals
 
 
 @compiled
 def _blocks(
     points: FloatArray, gains: FloatArray, pressure: FloatArray, d_pressure: FloatArray, n_q: int
 ) -> FloatArray:
-    """Δ of the forces of each cell, (n_cells, 4 nodes, 2, n_local, 2)."""
+    """Compute Δ of the forces of each cell, (n_cells, 4 nodes, 2, n_local, 2)."""
     n_local = gains.shape[2]
-    found = np.zeros((len(points) // n_q, 4, 2, n_local, 2))
+    blocks = np.zeros((len(points) // n_q, 4, 2, n_local, 2))
     for number in range(len(points)):
-        block, point, gain = found[number // n_q], points[number], gains[number]
+        block, point, gain = blocks[number // n_q], points[number], gains[number]
         c, xi, w, p = point[C], point[XI], point[WEIGHT], pressure[number]
         n = (point[NORMAL_X], point[NORMAL_Y])
         tau = (-n[1], n[0])
@@ -64,13 +79,34 @@ def _blocks(
                     along_tau = -shape[k] * omega  # Δn = −τ ω
                     for i in range(2):
                         block[k, i, column, j] += along_n * n[i] + along_tau * tau[i]
-    return found
+    return blocks
 
 
 def tangent(
     points: FloatArray, gains: FloatArray, pressure: FloatArray, d_pressure: FloatArray, nodes: IntArray, size: int
 ) -> sparse.coo_array:
-    """Derivative (size, size) of the forces, each point's pressure having its own row `d_pressure` (n_points, …)."""
+    """Compute the derivative of `forces` at one state.
+
+    Parameters
+    ----------
+    points : FloatArray, shape (n_points, 6)
+        The points of `Quadrature.points` at that state.
+    gains : FloatArray, shape (n_points, 5, n_local, 2)
+        Their Δ, from `Quadrature.gains`.
+    pressure : FloatArray, shape (n_points,)
+        Pressures.
+    d_pressure : FloatArray, shape (n_points, n_local, 2)
+        The part of Δ of a pressure that depends on the local nodes of its own cell.
+    nodes : IntArray, shape (n_cells, n_local)
+        Node numbers of each cell.
+    size : int
+        Number of rows and columns of the result.
+
+    Returns
+    -------
+    sparse.coo_array, shape (size, size)
+        The derivative.
+    """
     n_q = len(points) // max(len(nodes), 1)
     if not n_q:
         return sparse.coo_array((size, size))
@@ -84,9 +120,27 @@ def tangent(
 def influence(
     points: FloatArray, shares: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[int, int]
 ) -> sparse.coo_array:
-    """What a unit of each source does to the nodes: forces (n_unknowns, n_sources).
+    """Compute the forces that a unit of each source puts on the nodes.
 
-    Sources are places (n_cells, n_of_a_cell), and a point has the pressure shares (n_points, n_of_a_cell) of them.
+    A source is a number that pressures depend on linearly, such as the pressure at a slave node.
+
+    Parameters
+    ----------
+    points : FloatArray, shape (n_points, 6)
+        The points of `Quadrature.points` at one state.
+    shares : FloatArray, shape (n_points, n_sources_of_cell)
+        The pressure at a point for a unit of each source of its cell.
+    places : IntArray, shape (n_cells, n_sources_of_cell)
+        The columns of the sources of each cell.
+    nodes : IntArray, shape (n_cells, n_local)
+        Node numbers of each cell.
+    shape : tuple[int, int]
+        Shape (n_unknowns, n_sources) of the result.
+
+    Returns
+    -------
+    sparse.coo_array, shape (n_unknowns, n_sources)
+        Internal forces.
     """
     c, xi = points[:, C], points[:, XI]
     transmit = np.stack([(1 - c) / 2, (1 + c) / 2, xi - 1, -xi], axis=1) * points[:, WEIGHT, None]  # (n_points, 4)
@@ -105,9 +159,23 @@ def influence(
 
 
 def gathered(rows: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[int, int]) -> sparse.coo_array:
-    """Rows of Δ (n_points, n_of_a_cell, n_local, 2), added up at places (n_cells, n_of_a_cell).
+    """Add up Δ of numbers of points that belong to the same place, such as a node.
 
-    Returns (n_places, n_unknowns).
+    Parameters
+    ----------
+    rows : FloatArray, shape (n_points, n_places_of_cell, n_local, 2)
+        Δ of the numbers.
+    places : IntArray, shape (n_cells, n_places_of_cell)
+        The rows of the result to which the numbers of each cell belong.
+    nodes : IntArray, shape (n_cells, n_local)
+        Node numbers of each cell.
+    shape : tuple[int, int]
+        Shape (n_places, n_unknowns) of the result.
+
+    Returns
+    -------
+    sparse.coo_array, shape (n_places, n_unknowns)
+        The sums.
     """
     values = rows.reshape(len(nodes), len(rows) // max(len(nodes), 1), *rows.shape[1:]).sum(axis=1)
     unknown = 2 * nodes[:, None, :, None] + np.arange(2)
@@ -118,9 +186,9 @@ def gathered(rows: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[i
 
 @compiled
 def summed(values: Array, places: IntArray, n_places: int) -> Array:
-    """Sums (n_states, n_places) of values (n_states, n) that belong to places (n,)."""
-    found = np.zeros((values.shape[0], n_places), dtype=values.dtype)
+    """Return sums (n_states, n_places) of the values (n_states, n) that belong to the same of the places (n,)."""
+    sums = np.zeros((values.shape[0], n_places), dtype=values.dtype)
     for state in range(values.shape[0]):
         for number in range(len(places)):
-            found[state, places[number]] += values[state, number]
-    return found
+            sums[state, places[number]] += values[state, number]
+    return sums

@@ -1,0 +1,67 @@
+"""Check the options that formulations have in common: penalty, counts, tolerances and words.
+
+A factory calls these functions on its arguments before it does anything else, so that a user who misspells an option
+reads which one it is and what was needed. Every function returns the value that the formulation stores.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import TypeVar
+
+from contactverif.contract.errors import MisuseError
+
+_Choice = TypeVar("_Choice")
+
+
+def choose(option: str, word: str, choices: Mapping[str, _Choice]) -> _Choice:
+    """Return the value that the word of an option stands for.
+
+    Raises
+    ------
+    MisuseError
+        If the word is none of the choices.
+    """
+    if not isinstance(word, str) or word not in choices:
+        raise MisuseError(option, repr(word), " or ".join(map(repr, choices)))
+    return choices[word]
+
+
+def check_penalty(penalty: float) -> float:
+    """Return the penalty as a float.
+
+    Raises
+    ------
+    MisuseError
+        If the penalty is no finite number above zero.
+    """
+    if isinstance(penalty, bool) or not isinstance(penalty, int | float) or not (isfinite(penalty) and penalty > 0):
+        raise MisuseError("penalty", repr(penalty), "a finite number > 0")
+    return float(penalty)
+
+
+def check_count(n: int) -> int:
+    """Return the number n of points on a slave segment.
+
+    Raises
+    ------
+    MisuseError
+        If n is no whole number of at least one.
+    """
+    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+        raise MisuseError("n", repr(n), "a whole number ≥ 1")
+    return n
+
+
+def check_tau(tau: float) -> float:
+    """Return τ, the part of a master segment by which a foot may lie past its free end, as a float.
+
+    Raises
+    ------
+    MisuseError
+        If τ is no number from 0 to below 1.
+    """
+    if isinstance(tau, bool) or not isinstance(tau, int | float) or not 0 <= tau < 1:
+        raise MisuseError("tau", repr(tau), "a number ≥ 0 and < 1")
+    return float(tau)

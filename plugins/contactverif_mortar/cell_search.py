@@ -1,0 +1,179 @@
+"""Find the cells: the pairs of a slave and a master segment that face each other, and what cuts each cell.
+
+A slave segment and a master segment make a cell where
+
+1. they face each other: the master's normal runs against the directions in which both ends of the slave look;
+2. they overlap: some point of the slave sees the master segment along its direction (`cell_geometry`), either way;
+3. no other master segment that faces the slave is nearer, seen from the middle of the overlap. So of bodies one behind
+   the other only the first is touched, and never one at the far side of a ring, which does not face the slave;
+4. the gap there is at most 2 (h_s + h_m) either way, h the longest segment of the chain. A deeper penetration is no
+   contact, and neither is a floor far below an overhang (our choice; a penetration of two segments is well within it).
+
+Candidates come from the tree of `search_tree`, at a cost of O(log n) for each slave segment and each cell.
+
+Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.interface import Surface
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node, segments_in_strip
+from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turned
+
+# The longest overlap, in c ∈ [−1, 1], that counts as none: roundoff could not tell its points apart.
+ROUNDOFF = 4 * UNIT_ROUNDOFF
+LOW, HIGH, GAP = range(3)  # The columns of the table of candidates: ends of the overlap, and |gap| in its middle.
+
+
+def longest_of_chain(surface: Surface, x: FloatArray) -> FloatArray:
+    """Return for each segment the length of the longest one of its chain, at the positions x (n_nodes, 2)."""
+    order = surface.chain_order
+    begins = np.flatnonzero(np.r_[True, surface.neighbours[order[:-1], 1] != order[1:]])
+    longest = np.maximum.reduceat(surface.lengths(x)[order], begins)
+    lengths = np.empty(len(order))
+    lengths[order] = np.repeat(longest, np.diff(np.r_[begins, len(order)]))
+    return lengths
+
+
+@compiled
+def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[IntArray, IntArray]:
+    """Return with which segment the normals at the two ends of each slave segment are averaged, −1 for none.
+
+    There is none at a free end, and where two segments meet at 90° or sharper: that is a corner, not a facet of a
+    smooth surface (our choice).
+    """
+    partners = np.full((2, len(slave)), -1, dtype=np.int64)
+    for segment in range(len(slave)):
+        _, t, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
+        for end in range(2):
+            other = neighbours[segment, end]
+            if other >= 0:
+                _, t_other, _ = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
+                if dot(t, t_other) > 0:
+                    partners[end, segment] = other
+    return partners[0], partners[1]
+
+
+@compiled
+def find_cells(
+    x: FloatArray,
+    slave: IntArray,
+    master: IntArray,
+    before: IntArray,
+    behind: IntArray,
+    slave_longest: FloatArray,
+    master_longest: FloatArray,
+    tree: Tree,
+) -> tuple[IntArray, IntArray, BoolArray, BoolArray]:
+    """Return the slave and the master segment of each cell, and whether master nodes cut its lower and its upper end.
+
+    The second node of the master segment cuts the lower end, the first node the upper end. Cells are in the order of
+    the slave segments, and on one slave segment in the order in which one meets them along it.
+    """
+    order, boxes = tree
+    cell_slave, cell_master = [0 for _ in range(0)], [0 for _ in range(0)]
+    cut_low, cut_high = [False for _ in range(0)], [False for _ in range(0)]
+    longest = np.max(master_longest)
+    for s in range(len(slave)):
+        view = slave_view(x, slave, s, before[s], behind[s])
+        reach = 2 * (slave_longest[s] + longest)
+        in_strip = segments_in_strip(view.x_a, view.n_a, view.x_b, view.n_b, reach, order, boxes)
+        in_strip.sort()
+        members, table = _candidates(x, master, view, in_strip, slave_longest[s], master_longest)
+        along = np.argsort(table[:, LOW], kind="mergesort")
+        reached = -1.0  # the highest upper end so far
+        for place in range(len(along)):
+            i = along[place]
+            if _is_nearest(x, master, view, members, table, along, place, reached):
+                cell_slave.append(s)
+                cell_master.append(members[i])
+                cut_low.append(table[i, LOW] > -1)
+                cut_high.append(table[i, HIGH] < 1)
+            reached = max(reached, table[i, HIGH])
+    return np.array(cell_slave), np.array(cell_master), np.array(cut_low), np.array(cut_high)
+
+
+@compiled
+def _candidates(
+    x: FloatArray,
+    master: IntArray,
+    view: SlaveView,
+    in_strip: list[int],
+    slave_longest: float,
+    master_longest: FloatArray,
+) -> tuple[IntArray, FloatArray]:
+    """Return the master segments in the strip that overlap the slave segment and are near enough, and their table."""
+    table = np.empty((len(in_strip), 3))
+    members = np.empty(len(in_strip), dtype=np.int64)
+    count = 0
+    for m in in_strip:
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        low, high = overlap(view, x_1, x_2)
+        if high - low <= ROUNDOFF:
+            continue
+        _, gap, _ = facing_point(view, x_1, x_2, (low + high) / 2)
+        if abs(gap) <= 2 * (slave_longest + master_longest[m]):
+            table[count, LOW], table[count, HIGH], table[count, GAP] = low, high, abs(gap)
+            members[count] = m
+            count += 1
+    return members[:count], table[:count]
+
+
+@compiled
+def _is_nearest(
+    x: FloatArray,
+    master: IntArray,
+    view: SlaveView,
+    members: IntArray,
+    table: FloatArray,
+    along: IntArray,
+    place: int,
+    reached: float,
+) -> bool:
+    """Return whether no other candidate is nearer in the middle of the overlap of candidate `along[place]`.
+
+    `along` sorts the candidates by their lower ends, and `reached` is the highest upper end of those before. Of two
+    equally near segments the one with the lower number counts as nearer.
+    """
+    i = along[place]
+    middle = (table[i, LOW] + table[i, HIGH]) / 2
+    # Overlapping are at most the candidates before this one, if any of them reaches its middle, and behind it those
+    # that begin before its middle.
+    start, stop = 0 if reached > middle else place + 1, place + 1
+    while stop < len(along) and table[along[stop], LOW] < middle:
+        stop += 1
+    for other in along[start:stop]:
+        if other != i and table[other, LOW] < middle < table[other, HIGH]:
+            x_1, x_2 = node(x, master[members[other], 0]), node(x, master[members[other], 1])
+            _, gap, _ = facing_point(view, x_1, x_2, middle)
+            if abs(gap) < table[i, GAP] or (abs(gap) == table[i, GAP] and members[other] < members[i]):
+                return False
+    return True
+
+
+@compiled
+def overlap(view: SlaveView, x_1: Vector, x_2: Vector) -> tuple[float, float]:
+    """Return the lower and upper end on the slave of what it sees of the master segment 1 2; (1, −1) if nothing.
+
+    As c grows, the line along the slave's direction passes node 2 first, because the master runs against the slave. So
+    node 1 is ahead of where the slave begins to look, and node 2 is passed where it ends. This does not hold where
+    averaged directions have crossed before they reach the master, deeper than the slave's own radius of curvature; the
+    slave then sees nothing (our choice).
+    """
+    x_a, x_b, n_a, n_b, _ = view
+    along = minus(x_2, x_1)
+    tau_a, tau_b = turned(n_a), turned(n_b)
+    if dot(along, tau_a) >= 0 or dot(along, tau_b) >= 0:
+        return 1.0, -1.0
+    if dot(minus(x_1, x_a), tau_a) <= 0 or dot(minus(x_2, x_b), tau_b) >= 0:
+        return 1.0, -1.0
+    low, high = -1.0, 1.0
+    if dot(minus(x_2, x_a), tau_a) > 0:
+        low = max(seen_from(x_2, view), -1.0)
+    if dot(minus(x_1, x_b), tau_b) < 0:
+        high = min(seen_from(x_1, view), 1.0)
+    return low, high

@@ -1,0 +1,309 @@
+"""The cells of a pairing, and the quadrature points on them with their Δ.
+
+`Cells` are decisions: they come from `cell_search` and are stored in a pairing. `Quadrature` puts points on them and
+computes every real number from the positions. `cell_forces` turns pressures at the points into nodal forces.
+
+Rules for the next editor:
+
+1. `Quadrature.points` takes float64 and complex128, for many states; `Quadrature.gains` takes one real state.
+2. A kernel gets the fields of `Segments`, `CellArrays` and `Rule` as plain tuples and unpacks them in its first lines.
+   numba reads a plain tuple in half the time of a named one, and an array that is read through a tuple inside a loop
+   costs two atomic operations each time. Named tuples of numbers, such as `SlaveView`, are free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
+from contactverif.geometry.compiled import compiled
+from contactverif.geometry.projection import Vector, frame, node, search_tree
+from contactverif_mortar.cell_geometry import (
+    D_C,
+    D_WEIGHT,
+    ONE,
+    TWO,
+    A,
+    B,
+    SlaveView,
+    cut_gains,
+    facing_point,
+    point_gains,
+    seen_from,
+    slave_view,
+    turn_of_ends,
+)
+from contactverif_mortar.cell_search import averaging, find_cells, longest_of_chain
+
+C, XI, GAP, WEIGHT, NORMAL_X, NORMAL_Y = range(6)  # The numbers of a point, in this order.
+AREAS = {"current": True, "reference": False}  # The words of the option `area`.
+
+Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+
+
+class Segments(NamedTuple):
+    """The arrays of an interface that the kernels read."""
+
+    reference_length: FloatArray  # (n_slave_segments,)
+    slave: IntArray  # (n_slave_segments, 2), nodes
+    master: IntArray  # (n_master_segments, 2), nodes
+
+
+class CellArrays(NamedTuple):
+    """The arrays of `Cells`, in the same order."""
+
+    slave: IntArray
+    master: IntArray
+    cut_low: BoolArray
+    cut_high: BoolArray
+    before: IntArray
+    behind: IntArray
+
+
+class Rule(NamedTuple):
+    """The arrays of `Quadrature`, in the same order."""
+
+    places: FloatArray
+    weights: FloatArray
+    current: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """Pairs of a slave and a master segment, in the order of the slave segments.
+
+    Attributes
+    ----------
+    slave, master : IntArray, shape (n_cells,)
+        The segments.
+    cut_low, cut_high : BoolArray, shape (n_cells,)
+        A master node cuts the lower end (the second node) and the upper end (the first node).
+    before, behind : IntArray, shape (n_slave_segments,)
+        The segments with which normals at the two ends are averaged, −1 for none.
+    """
+
+    slave: IntArray
+    master: IntArray
+    cut_low: BoolArray
+    cut_high: BoolArray
+    before: IntArray
+    behind: IntArray
+
+    @classmethod
+    def find(cls, interface: Interface, x: FloatArray, averaged: bool) -> Cells:
+        """Find the cells at the positions x (n_nodes, 2)."""
+        slave, master = interface.slave, interface.master
+        before = behind = np.full(len(slave), -1)
+        if averaged:
+            before, behind = averaging(x, slave.segments, slave.neighbours)
+        pairs_and_cuts = find_cells(
+            x,
+            slave.segments,
+            master.segments,
+            before,
+            behind,
+            longest_of_chain(slave, x),
+            longest_of_chain(master, x),
+            search_tree(master, x),
+        )
+        return cls(*pairs_and_cuts, before, behind)
+
+    @classmethod
+    def of(cls, pairing: Pairing) -> Cells:
+        """Return the cells of a pairing."""
+        return cls(*(pairing[entry.name] for entry in fields(cls)))
+
+    def as_arrays(self) -> dict[str, IntArray | BoolArray]:
+        """Return the arrays by name, for a pairing."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
+
+    def where(self, selection: BoolArray | IntArray) -> Cells:
+        """Return some of the cells, selected by mask or number."""
+        return Cells(
+            self.slave[selection],
+            self.master[selection],
+            self.cut_low[selection],
+            self.cut_high[selection],
+            self.before,
+            self.behind,
+        )
+
+    def near(self, nodes: BoolArray, interface: Interface) -> Cells:
+        """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
+        first, second = nodes[interface.slave.segments].T
+        return self.where((first | second)[self.slave])
+
+    def local_nodes(self, interface: Interface) -> IntArray:
+        """Return the nodes (n_cells, n_local): A, B, 1, 2, and with averaged normals those before A and behind B."""
+        slave, master = interface.slave.segments, interface.master.segments
+        ends = [slave[self.slave], master[self.master]]
+        if self.averaged:
+            around = [
+                np.where(other >= 0, slave[other, end], slave[:, 0])  # no segment: any node, Δ is zero
+                for end, other in enumerate((self.before, self.behind))
+            ]
+            ends.append(np.column_stack(around)[self.slave])
+        return np.hstack(ends)
+
+    @property
+    def averaged(self) -> bool:
+        """Whether any normals are averaged."""
+        return bool((self.before >= 0).any() or (self.behind >= 0).any())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quadrature:
+    """A quadrature rule for each cell.
+
+    Attributes
+    ----------
+    places, weights : FloatArray, shape (n_q,)
+        Places on [−1, 1], and weights that add up to 1.
+    current : bool
+        Lengths are those of the current configuration; else those of the reference configuration.
+    """
+
+    places: FloatArray
+    weights: FloatArray
+    current: bool
+
+    @classmethod
+    def gauss(cls, n: int, current: bool) -> Quadrature:
+        """Return the rule with n Gauss points, exact for polynomials of degree 2n − 1."""
+        places, weights = np.polynomial.legendre.leggauss(n)
+        return cls(places, weights / 2, current)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def points(self, interface: Interface, cells: Cells, x: Array) -> Array:
+        """Compute the points of all cells.
+
+        Parameters
+        ----------
+        x : Array, shape (n_states, n_nodes, 2)
+            Positions, real or complex.
+
+        Returns
+        -------
+        Array, shape (n_states, n_cells × n_q, 6)
+            c, ξ, gap (negative in penetration), weight (a length) and the normal out of the slave.
+        """
+        return _points(x, *self._arguments(interface, cells))
+
+    def gains(self, interface: Interface, cells: Cells, x: FloatArray) -> FloatArray:
+        """Compute the Δ of the points of all cells.
+
+        Parameters
+        ----------
+        x : FloatArray, shape (n_nodes, 2)
+            Positions.
+
+        Returns
+        -------
+        FloatArray, shape (n_cells × n_q, 5, n_local, 2)
+            Δ of c, ξ, gap and weight, and the turn ω of the normal.
+        """
+        n_local = 6 if cells.averaged else 4
+        return _gains(x, n_local, *self._arguments(interface, cells))
+
+    def _arguments(self, interface: Interface, cells: Cells) -> tuple[Fields, Fields, Fields]:
+        """Return the fields of `Segments`, `CellArrays` and `Rule`."""
+        return (
+            (interface.slave.lengths(interface.nodes), interface.slave.segments, interface.master.segments),
+            (cells.slave, cells.master, cells.cut_low, cells.cut_high, cells.before, cells.behind),
+            (self.places, self.weights, self.current),
+        )
+
+
+@compiled
+def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
+    """Return the lower and the upper end of a cell on the slave, as c, cut by the nodes 2 and 1 of the master."""
+    zero = 0 * view.x_a[0]  # of the type of the positions
+    low, high = zero - 1, zero + 1
+    if cut_low:
+        low = seen_from(x_2, view)
+    if cut_high:
+        high = seen_from(x_1, view)
+    return low, high
+
+
+@compiled
+def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
+    """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
+    reference_length, slave, master = segments
+    cell_slave, cell_master, cut_low, cut_high, before, behind = cells
+    places, weights, current = rule
+    n_q = len(places)
+    points = np.empty((x.shape[0], len(cell_slave) * n_q, 6), dtype=x.dtype)
+    for state in range(x.shape[0]):
+        now = x[state]
+        for cell in range(len(cell_slave)):
+            s, m = cell_slave[cell], cell_master[cell]
+            view = slave_view(now, slave, s, before[s], behind[s])
+            x_1, x_2 = node(now, master[m, 0]), node(now, master[m, 1])
+            low, high = _ends(view, x_1, x_2, cut_low[cell], cut_high[cell])
+            length, _, _ = frame(view.x_a, view.x_b)
+            if not current:
+                length = 0 * length + reference_length[s]
+            for q in range(n_q):
+                c = (low + high) / 2 + (high - low) / 2 * places[q]
+                xi, gap, n = facing_point(view, x_1, x_2, c)
+                point = points[state, cell * n_q + q]
+                point[C], point[XI], point[GAP] = c, xi, gap
+                point[WEIGHT] = weights[q] * (high - low) / 2 * length
+                point[NORMAL_X], point[NORMAL_Y] = n
+    return points
+
+
+@compiled
+def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: Fields) -> FloatArray:
+    """Compute the Δ (n_points, 5, n_local, 2) of the points at positions x (n_nodes, 2)."""
+    reference_length, slave, master = segments
+    cell_slave, cell_master, cut_low, cut_high, before, behind = cells
+    places, weights, current = rule
+    n_q = len(places)
+    gains = np.zeros((len(cell_slave) * n_q, 5, n_local, 2))
+    d_omega_a, d_omega_b, d_low, d_high = np.zeros((4, n_local, 2))
+    for cell in range(len(cell_slave)):
+        s, m = cell_slave[cell], cell_master[cell]
+        view = slave_view(x, slave, s, before[s], behind[s])
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        low, high = _ends(view, x_1, x_2, cut_low[cell], cut_high[cell])
+        turn_of_ends(x, slave, s, before[s], behind[s], d_omega_a, d_omega_b)
+        d_low[:], d_high[:] = 0.0, 0.0
+        if cut_low[cell]:
+            cut_gains(d_low, low, TWO, x_2, view, d_omega_a, d_omega_b)
+        if cut_high[cell]:
+            cut_gains(d_high, high, ONE, x_1, view, d_omega_a, d_omega_b)
+        length, t_s, _ = frame(view.x_a, view.x_b)
+        if not current:
+            length = reference_length[s]
+        for q in range(n_q):
+            d = gains[cell * n_q + q]
+            _place_gains(d, d_low, d_high, places[q], weights[q], length)
+            if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
+                share = weights[q] * (high - low) / 2
+                for i in range(2):
+                    d[D_WEIGHT, A, i] -= share * t_s[i]
+                    d[D_WEIGHT, B, i] += share * t_s[i]
+            c = (low + high) / 2 + (high - low) / 2 * places[q]
+            point_gains(d, c, view, x_1, x_2, d_omega_a, d_omega_b)
+    return gains
+
+
+@compiled
+def _place_gains(
+    d: FloatArray, d_low: FloatArray, d_high: FloatArray, place: float, weight: float, length: float
+) -> None:
+    """Write Δc and, at a fixed length of the slave segment, Δ of the weight of a point into `d` (5, n_local, 2)."""
+    for k in range(d.shape[1]):
+        for i in range(2):
+            spread = d_high[k, i] - d_low[k, i]
+            d[D_C, k, i] = (d_low[k, i] + d_high[k, i]) / 2 + spread / 2 * place
+            d[D_WEIGHT, k, i] = weight * spread / 2 * length

@@ -1,0 +1,282 @@
+"""NTS, NTS-AR, VTS-G and VTS-ME: points on slave segments, each against its nearest master segment by Eq. 6.
+
+A method of this file is a list of points:
+
+| method | points | area of a point |
+|---|---|---|
+| NTS | slave nodes | 1 (nodal penalty) |
+| NTS-AR | slave nodes | half of each adjacent slave segment |
+| VTS-G(n) | n Gauss points on each slave segment | w l_AB / 2 |
+| VTS-ME(n) | c_k = −1 + (2k+1)/n on each slave segment | l_AB / n |
+
+Force and moment are conserved by all of them: Eq. 6 spreads a force over 1 and 2 by the lever rule, and V lies on its
+line of action. None of them passes the flat patch test on every mesh, and none covers an overhang. The traits name a
+case that shows each failure.
+
+Source: Zavarise & De Lorenzis (2009), Sections 4.1, 4.2 and 5.1.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
+from contactverif.contract.state_vector import join_rows, split_state, split_states
+from contactverif.geometry.projection import search_tree
+from contactverif_nts import eq6
+from contactverif_nts.eq6 import AREAS, Fields
+
+_PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointContact:
+    """A formulation that is a list of points on slave segments.
+
+    Attributes
+    ----------
+    traits : Traits
+        The promises.
+    penalty : float
+        Stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
+    c, weight : FloatArray, shape (n_slots,)
+        Places on a slave segment in [−1, 1], and their shares of its length.
+    at_nodes : bool
+        The points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
+    area_from : int
+        `eq6.NODAL`, `eq6.CURRENT` or `eq6.REFERENCE`.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+    """
+
+    traits: Traits
+    penalty: float
+    c: FloatArray
+    weight: FloatArray
+    at_nodes: bool
+    area_from: int
+    tau: float
+
+    def n_multipliers(self, interface: Interface, /) -> int:
+        """Return the number of multipliers: one for each point, in their order, or 0 for a penalty."""
+        return len(self._points(interface)[0]) if self.traits.enforcement == "multiplier" else 0
+
+    def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
+        """Find the nearest master segment of each point, and decide which points are active."""
+        x, multipliers = split_state(interface, z)
+        segment, other, slot = self._points(interface)
+        tree, surfaces = search_tree(interface.master, x), self._surfaces(interface)
+        nearest, active = eq6.pair(x, multipliers, surfaces, tree, segment, slot, self.c, self.tau, self.penalty)
+        return Pairing({"segment": segment, "other": other, "slot": slot, "master": nearest, "active": active})
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
+        """Compute the forces (..., n_unknowns) of Eq. 6 and, behind them, the constraints of multipliers."""
+        x, multipliers = split_states(interface, z)
+        forces, rows = eq6.residual(x, multipliers, *self._arguments(interface, pairing))
+        return join_rows(forces, rows, z)
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+        """Compute the derivative of the residual, sparse."""
+        x, multipliers = split_state(interface, z)
+        rows, columns, values = eq6.tangent(x, multipliers, *self._arguments(interface, pairing))
+        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+
+    def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
+        """Return the points with their gaps and pressures.
+
+        The ends of areas of competence are NaN: the points stand for areas, but no decision depends on where they end.
+        """
+        x, multipliers = split_state(interface, z)
+        ends = x[interface.slave.segments[pairing["segment"]]]  # (n_points, 2, dim)
+        c = self.c[pairing["slot"]]
+        position = (1 - c[:, None]) / 2 * ends[:, 0] + (1 + c[:, None]) / 2 * ends[:, 1]
+        x1, x2 = np.swapaxes(x[interface.master.segments[pairing["master"]]], 0, 1)
+        length = np.linalg.norm(x2 - x1, axis=1)
+        t = (x2 - x1) / length[:, None]
+        normal = np.column_stack([t[:, 1], -t[:, 0]])
+        gap = ((position - x1) * normal).sum(axis=1)
+        measured = interface.nodes if self.area_from == eq6.REFERENCE else x
+        lengths = np.append(interface.slave.lengths(measured), 0.0)  # the last one stands for "no segment", −1
+        weight = self.weight[pairing["slot"]] * (lengths[pairing["segment"]] + lengths[pairing["other"]])
+        if self.area_from == eq6.NODAL:
+            weight = np.ones_like(gap)
+        pressure = multipliers if len(multipliers) else -self.penalty * gap
+        nowhere = np.full_like(gap, np.nan)
+        return ContactPoints(
+            slave_segment=pairing["segment"],
+            c=c,
+            master_segment=pairing["master"],
+            xi=((position - x1) * t).sum(axis=1) / length,
+            position=position,
+            normal=normal,
+            gap=gap,
+            pressure=np.where(pairing["active"], pressure, 0.0),
+            weight=weight,
+            active=pairing["active"],
+            area_from=nowhere,
+            area_to=nowhere,
+        )
+
+    def _points(self, interface: Interface) -> tuple[IntArray, IntArray, IntArray]:
+        """Return slave segment, other slave segment at a slave node (−1 if there is none) and slot of each point."""
+        slave = interface.slave
+        if not self.at_nodes:
+            segment = np.repeat(np.arange(len(slave)), len(self.c))
+            return segment, np.full_like(segment, -1), np.tile(np.arange(len(self.c)), len(slave))
+        last = np.flatnonzero(slave.neighbours[:, 1] < 0)  # the only segments whose second node begins no segment
+        segment = np.concatenate([np.arange(len(slave)), last])
+        slot = np.concatenate([np.zeros(len(slave), np.int64), np.ones(len(last), np.int64)])
+        other = np.concatenate([slave.neighbours[:, 0], np.full_like(last, -1)])
+        return segment, other, slot
+
+    @staticmethod
+    def _surfaces(interface: Interface) -> Fields:
+        """Return the fields of `eq6.Surfaces`."""
+        master = interface.master
+        return interface.nodes, interface.slave.segments, master.segments, master.neighbours
+
+    def _arguments(self, interface: Interface, pairing: Pairing) -> tuple[Fields, Fields, Fields]:
+        """Return the fields of `eq6.Surfaces`, `eq6.Points` and `eq6.Options`."""
+        points = tuple([pairing[name] for name in eq6.Points._fields])
+        return self._surfaces(interface), points, (self.c, self.weight, self.area_from, self.penalty)
+
+
+def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
+    """Node to segment: a spring at each slave node.
+
+    The nodal springs know nothing of areas, so a uniform pressure does not come out on meshes of unequal segments: it
+    fails the flat patch test (case A1). Its tangent is exact and symmetric.
+
+    Parameters
+    ----------
+    penalty : float
+        Nodal stiffness ε > 0, force per length.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
+    """
+    traits = _traits("a1", "nodal", None, symmetric=True)
+    return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, eq6.NODAL, at_nodes=True)
+
+
+def nts_ar(*, penalty: float, area: str = "current", tau: float = 1e-2) -> PointContact:
+    """Node to segment with area regularisation: each slave node has the springs of its area of competence.
+
+    The slave side is loaded exactly, the master side is not where a slave node's area covers several master segments:
+    it fails the flat patch test (case B). Its tangent is exact, and symmetric with reference areas.
+
+    Parameters
+    ----------
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    area : str
+        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Section 4.2, Eq. 6 with F = ε̂ g a.
+    """
+    area_from = choose("area", area, AREAS)
+    traits = _traits("b", "distributed", area_from)
+    return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, area_from, at_nodes=True)
+
+
+def vts_g(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e-2) -> PointContact:
+    """VTS-G: virtual slave nodes at the n Gauss points of each slave segment.
+
+    A Gauss point does not balance the moment of the part of the segment that it stands for, so it fails the flat patch
+    test (case B). Its tangent is exact, and symmetric with reference areas.
+
+    Parameters
+    ----------
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    n : int
+        Number of Gauss points on a slave segment, ≥ 1.
+    area : str
+        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g w l_AB / 2.
+    """
+    c, weights = np.polynomial.legendre.leggauss(check_count(n))
+    area_from = choose("area", area, AREAS)
+    traits = _traits("b", "distributed", area_from)
+    return _points_at(c, weights / 2, traits, penalty, tau, area_from)
+
+
+def vts_me(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e-2) -> PointContact:
+    """VTS-ME: virtual slave nodes in the middle of n equal parts of each slave segment.
+
+    Moments balance where each part faces one master segment only, as in case B. Where a part covers several, it fails
+    the flat patch test (case C′). Its tangent is exact, and symmetric with reference areas.
+
+    Parameters
+    ----------
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per length per length of penetration.
+    n : int
+        Number of virtual slave nodes on a slave segment, ≥ 1; with 2 they are the quarter points.
+    area : str
+        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g l_AB / n.
+    """
+    n = check_count(n)
+    area_from = choose("area", area, AREAS)
+    c = -1 + (2 * np.arange(n) + 1) / n
+    traits = _traits("c-prime", "distributed", area_from)
+    return _points_at(c, np.full(n, 1 / n), traits, penalty, tau, area_from)
+
+
+def _traits(patch_witness: str, penalty: str, area_from: int | None, symmetric: bool | None = None) -> Traits:
+    """Return the promises of a method that fails the flat patch test on the case `patch_witness`."""
+    areas = {eq6.CURRENT: "current", eq6.REFERENCE: "reference", None: None}
+    return Traits(
+        passes_flat_patch=False,
+        covers_overhang=False,
+        tangent="exact",
+        symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
+        conserves_force=True,
+        conserves_moment=True,
+        area=areas[area_from],  # type: ignore[arg-type]
+        penalty=penalty,  # type: ignore[arg-type]
+        batched=True,
+        takes_complex=True,
+        witnesses={"patch": patch_witness, "patch.dead-zone": "dead-zone"},
+        source=_PAPER,
+    )
+
+
+def _points_at(
+    c: ArrayLike, weight: ArrayLike, traits: Traits, penalty: float, tau: float, area_from: int, at_nodes: bool = False
+) -> PointContact:
+    """Return the formulation with points at c on each slave segment, its options checked."""
+    return PointContact(
+        traits=traits,
+        penalty=check_penalty(penalty),
+        c=freeze(c, np.float64),
+        weight=freeze(weight, np.float64),
+        at_nodes=at_nodes,
+        area_from=area_from,
+        tau=check_tau(tau),
+    )

@@ -1,0 +1,187 @@
+"""Two passes: the sum of any one-pass formulation and the same formulation with slave and master exchanged.
+
+The second pass asks the formulation about `interface.swap_roles()`. Both passes get the same penalty, so it acts twice:
+springs share a pressure between the passes and penetrate half as much. In z the multipliers of the first pass come
+first. Two passes provide what the formulation provides, no more and no less.
+
+What must stay true: exchanging the roles of the surfaces changes no force, not even in the last bit.
+
+Source: Zavarise & De Lorenzis (2009), Sections 1 and 5, after Taylor & Papadopoulos' two-pass node-to-segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import Subject
+
+NAMES = ("pass_1.", "pass_2.")  # The prefixes of the names in a pairing.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pass:
+    """One of the two passes.
+
+    Attributes
+    ----------
+    interface : Interface
+        The interface with the roles of this pass.
+    places : IntArray, shape (n_unknowns + n_multipliers,)
+        Where the unknowns of this pass are in z; only its own multipliers count.
+    name : str
+        The prefix of its names in a pairing.
+    """
+
+    interface: Interface
+    places: IntArray
+    name: str
+
+    def part(self, pairing: Pairing | None) -> Pairing | None:
+        """Return the part of a pairing of both passes that belongs to this one."""
+        if pairing is None:
+            return None
+        arrays = {name.removeprefix(self.name): array for name, array in pairing.items() if name.startswith(self.name)}
+        return Pairing(arrays)
+
+
+class TwoPass:
+    """A formulation in two passes; `pair`, `tangent` and `contact_points` are None where the formulation has none."""
+
+    def __init__(self, inner: Subject, penalty: float) -> None:
+        self._inner = inner.with_penalty(penalty)
+        self._last_passes: tuple[Interface, tuple[Pass, Pass]] | None = None
+        self.traits = _traits(inner.traits)
+        self.pair = self._pair if "pair" in inner.provides else None
+        self.tangent = self._tangent if "tangent" in inner.provides else None
+        self.contact_points = self._contact_points if "contact_points" in inner.provides else None
+
+    def n_multipliers(self, interface: Interface, /) -> int:
+        """Return the number of multipliers of both passes, 0 for a penalty."""
+        return sum(len(each.places) - interface.n_unknowns for each in self._passes(interface))
+
+    def residual(self, interface: Interface, pairing: Pairing | None, z: Array, /) -> Array:
+        """Compute the sum of the forces of both passes, then the constraints of the first and of the second pass."""
+        total = np.zeros_like(z)
+        for each in self._passes(interface):
+            total[..., each.places] += self._inner.residual(each.interface, each.part(pairing), z[..., each.places])
+        return total
+
+    def _pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
+        """Find the pairings of both passes; each name carries the prefix of its pass."""
+        arrays = {}
+        for each in self._passes(interface):
+            pairing = self._inner.pair(each.interface, z[each.places])
+            assert pairing is not None
+            arrays.update({each.name + name: array for name, array in pairing.items()})
+        return Pairing(arrays)
+
+    def _tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> sparse.coo_array:
+        """Compute the sum of both tangents, sparse."""
+        parts = []
+        for each in self._passes(interface):
+            part = sparse.coo_array(self._inner.tangent(each.interface, each.part(pairing), z[each.places]))
+            parts.append((part.data, each.places[part.row], each.places[part.col]))
+        values, rows, columns = (np.concatenate(both) for both in zip(*parts, strict=True))
+        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+
+    def _contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> ContactPoints:
+        """Return the points of both passes, each with the gap, area and pressure of its own pass.
+
+        The points of the second pass lie on the master: `slave_segment` is −1, `c` and the ends of areas are NaN, and
+        `master_segment`, `xi` and `position` say where a point is. Their normal is the one out of the slave, reversed.
+        The forces pressure × weight of both passes add up.
+        """
+        first, second = (
+            self._inner.contact_points(each.interface, each.part(pairing), z[each.places])
+            for each in self._passes(interface)
+        )
+        meaningless = np.full_like(second.c, np.nan)
+        on_master = replace(
+            second,
+            slave_segment=np.full_like(second.slave_segment, -1),
+            master_segment=second.slave_segment,
+            xi=(1 + second.c) / 2,
+            normal=-second.normal,
+            c=meaningless,
+            area_from=meaningless,
+            area_to=meaningless,
+        )
+        names = [entry.name for entry in fields(ContactPoints)]
+        return ContactPoints(
+            **{name: np.concatenate([getattr(first, name), getattr(on_master, name)]) for name in names}
+        )
+
+    def _passes(self, interface: Interface) -> tuple[Pass, Pass]:
+        """Return both passes. The last ones are kept, because exchanging the roles costs far more than a residual."""
+        if self._last_passes is None or self._last_passes[0] is not interface:
+            self._last_passes = interface, self._new_passes(interface)
+        return self._last_passes[1]
+
+    def _new_passes(self, interface: Interface) -> tuple[Pass, Pass]:
+        """Make both passes of an interface."""
+        swapped, positions = interface.swap_roles(), np.arange(interface.n_unknowns)
+        n_slave_unknowns = interface.dim * interface.n_slave_nodes
+        first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))
+        multipliers = interface.n_unknowns + np.arange(first + second)
+        return (
+            Pass(interface, np.concatenate([positions, multipliers[:first]]), NAMES[0]),
+            Pass(swapped, np.concatenate([np.roll(positions, -n_slave_unknowns), multipliers[first:]]), NAMES[1]),
+        )
+
+
+def two_pass(*, penalty: float, inner: Callable[..., Any]) -> TwoPass:
+    """Two passes of a formulation: the formulation, plus the same with slave and master exchanged.
+
+    With a penalty two passes fail the flat patch test (case A1): springs on both sides give twice the pressure. With
+    nodal multipliers that balance force and moment they pass it. All other promises are those of the formulation.
+
+    Parameters
+    ----------
+    penalty : float
+        The penalty of both passes, of the formulation's own kind.
+    inner : Callable[..., Any]
+        The factory `make(*, penalty)` of the formulation.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Sections 1 and 5.
+    """
+    return TwoPass(Subject("inner", inner), penalty)
+
+
+def _traits(inner: Traits) -> Traits:
+    """Return what two passes promise, from what one pass promises.
+
+    With a penalty, a penetration gives twice the pressure that it should, and where one pass is wrong, the other does
+    not make it right. With nodal multipliers all gaps vanish at the nodes of both surfaces. Where force and moment
+    balance, the force of a node is spread over the segment that it meets by the lever rule. The exact forces of a
+    uniform pressure are such forces, with an overhang or without: they are those of trapezoids between neighbours in
+    the union of the nodes that face a segment.
+    """
+    passes, independent = None, None
+    witnesses = {part: name for part, name in inner.witnesses.items() if not part.startswith(("patch", "multipliers"))}
+    if inner.enforcement == "penalty" and inner.passes_flat_patch is not None:
+        passes, witnesses["patch"] = False, "a1"
+    elif inner.enforcement == "multiplier":
+        independent = False  # where two nodes coincide, each has a multiplier for the one gap
+        witnesses["multipliers"] = "a1"
+        if inner.penalty == "nodal" and inner.conserves_force and inner.conserves_moment:
+            passes = True
+    return replace(
+        inner,
+        passes_flat_patch=passes,
+        covers_overhang=passes,
+        area=None,
+        independent_multipliers=independent,
+        batched=True,
+        witnesses=witnesses,
+        source=f"two passes of: {inner.source}" if inner.source else "",
+    )

@@ -1,0 +1,112 @@
+"""`free_end` of VTS-PPT acts at free ends of the master only; everywhere else Box 3 stands as printed.
+
+It once cut the part of an interior segment, too, where the foot of a virtual slave node lies past the segment's end:
+1.9 % of the force on a random bent surface with n = 3.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from surfaces import bent, flat, pushed
+
+from contactverif import Interface, Surface
+from contactverif_nts import vts_ppt, vts_ppt_balanced
+
+PENALTY = 8.0
+VALLEY = [[2.0, 1.0], [0.0, 0.0], [-2.0, 1.0]]  # both feet of a point below its vertex lie past the segments' ends
+
+
+def test_a_foot_past_the_end_of_an_interior_segment_leaves_box_3_as_printed() -> None:
+    """The area of competence begins behind the first segment's end, so that a > 1 and the segment pulls."""
+    slave = np.array([[-0.04, -0.2], [0.06, -0.2]])
+    interface = Interface.from_chains(slave, VALLEY)
+    formulation = vts_ppt(penalty=PENALTY, n=1)
+    pairing = formulation.pair(interface, interface.nodes.ravel())
+    assert pairing["active"].all()
+    assert (pairing["master"], pairing["first"], pairing["last"]) == (0, 0, 1)
+    forces = pushed(formulation, interface, interface.nodes.ravel())[2:]
+
+    (x_1, x_2, x_3), (x_q, x_p) = np.array(VALLEY), slave
+    t = (x_2 - x_1) / np.linalg.norm(x_2 - x_1)
+    normal = np.array([t[1], -t[0]])
+    gap = ((x_p + x_q) / 2 - x_1) @ normal
+    lengths = (x_2 - x_1) @ t, (x_3 - x_2) @ t
+    a, b = (x_p - x_1) @ t / lengths[0], (x_q - x_2) @ t / lengths[1]
+    assert a > 1
+    assert 0 < b < 1
+    shares = [
+        lengths[0] * ((1 - a) - (1 - a**2) / 2),
+        lengths[0] * (1 - a**2) / 2 + lengths[1] * (b - b**2 / 2),
+        lengths[1] * b**2 / 2,
+    ]
+    assert forces == pytest.approx(PENALTY * gap * np.outer(shares, normal), rel=1e-12)
+    assert sum(shares) == pytest.approx((x_q - x_p) @ t)  # nothing is lost
+
+
+def test_a_segment_seen_edge_on_is_no_free_end() -> None:
+    """The walk stops before a step of the master; the slave presses on past it with its whole length."""
+    slave, master = [[-0.4, -0.1], [1.4, -0.1]], [[3.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, -1.0]]
+    interface = Interface.from_chains(slave, master)
+    for free_end in ("truncate", "extend"):
+        formulation = vts_ppt(penalty=PENALTY, n=1, free_end=free_end)
+        pairing = formulation.pair(interface, interface.nodes.ravel())
+        assert (pairing["first"], pairing["last"]) == (0, 1)
+        forces = pushed(formulation, interface, interface.nodes.ravel())
+        assert -forces[2:, 1].sum() == pytest.approx(PENALTY * 0.1 * 1.8)
+
+
+def test_at_a_free_end_the_master_loses_what_lies_past_it() -> None:
+    interface, z = flat([4.0], [3.375, 0.125])  # the slave overhangs by 0.5, at g = −1/8
+    for free_end, carried in (("truncate", 3.5), ("extend", 4.0)):
+        forces = pushed(vts_ppt(penalty=PENALTY, free_end=free_end), interface, z)
+        assert forces[:2, 1].sum() == 4.0
+        assert -forces[2:, 1].sum() == pytest.approx(carried, rel=1e-15)
+
+
+def overhangs(interface: Interface, z: Any, n: int, pairing: Any) -> bool:
+    """Return whether the area of competence of an active virtual slave node reaches past an end of the master chain."""
+    x, master = z.reshape(-1, 2), interface.master.segments
+    first_node, last_node = x[master[0, 0]], x[master[-1, 1]]
+    for i in np.flatnonzero(pairing["active"]):
+        x_a, x_b = x[interface.slave.segments[i // n]]
+        c = -1 + (2 * (i % n) + 1) / n
+        x_q, x_p = ((1 - end) / 2 * x_a + (1 + end) / 2 * x_b for end in (c - 1 / n, c + 1 / n))
+        x_1, x_2 = x[master[pairing["master"][i]]]
+        if (x_p - first_node) @ (x_2 - x_1) < 0 or (x_q - last_node) @ (x_2 - x_1) > 0:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("make", [vts_ppt, vts_ppt_balanced])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_where_nothing_overhangs_a_free_end_the_option_changes_nothing(make: Any, n: int) -> None:
+    compared = differ = 0
+    for seed in range(400):
+        interface, z = bent(seed)
+        truncate, extend = (make(penalty=PENALTY, n=n, free_end=word) for word in ("truncate", "extend"))
+        pairing = truncate.pair(interface, z)
+        forces = [pushed(formulation, interface, z) for formulation in (truncate, extend)]
+        if overhangs(interface, z, n, pairing):
+            differ += not np.array_equal(*forces)
+        else:
+            compared += bool(pairing["active"].any())
+            assert np.array_equal(*forces)
+    assert compared > 100
+    assert differ > 5
+
+
+def test_a_closed_master_has_no_free_end() -> None:
+    angle = np.linspace(0, 2 * np.pi, 8)[:-1]
+    ring = np.column_stack([np.arange(7), np.roll(np.arange(7), -1)])
+    hole = np.column_stack([np.cos(angle), np.sin(angle)])[::-1]
+    for seed in range(50):
+        random = np.random.default_rng(seed)
+        disk = 1.05 * np.column_stack([np.cos(angle + 0.3), np.sin(angle + 0.3)])
+        interface = Interface(np.vstack([disk, hole]), Surface(ring), Surface(ring + 7))
+        z = (interface.nodes + random.normal(scale=0.05, size=(14, 2))).ravel()
+        forces = [pushed(vts_ppt(penalty=PENALTY, n=3, free_end=word), interface, z) for word in ("truncate", "extend")]
+        assert forces[0].any()
+        assert np.array_equal(*forces)
