@@ -43,6 +43,32 @@ class Handmade:
         )
 
 
+class Springs(Handmade):
+    """A spring between the ends of the slave segment; its stiffness is of the kind that the traits promise."""
+
+    def stretch(self, z: Any) -> Any:
+        return z[2:4] - z[0:2]
+
+    def area(self, z: Any) -> float:
+        along = self.stretch(z)
+        return float(np.sqrt(along @ along)) if self.traits.penalty == "distributed" else 1.0
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        force = self.penalty * self.area(z) * self.stretch(z)
+        forces[0:2], forces[2:4] = -force, force
+        return forces
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        along, area = self.stretch(z), self.area(z)
+        k = self.penalty * area * np.eye(2)
+        if self.traits.penalty == "distributed":
+            k = k + self.penalty * np.outer(along, along) / area
+        tangent = np.zeros((z.size, z.size))
+        tangent[:4, :4] = np.kron([[1, -1], [-1, 1]], k)
+        return tangent
+
+
 def subject(plugin: Callable[..., Any], **options: Any) -> Subject:
     """A formulation on trial: `plugin(**options)` with the penalty as an attribute."""
 

@@ -1,4 +1,4 @@
-"""Scaling for each kind of penalty, and objectivity where a state is exactly between two answers."""
+"""The property `objectivity`, also where a state is exactly between two answers."""
 
 from __future__ import annotations
 
@@ -7,78 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from handmade import Handmade, case, over_a_node, subject
+from handmade import Handmade, Springs, case, over_a_node, subject
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import judge_case
 from contactverif_properties.objectivity import OBJECTIVITY, measure_objectivity
-from contactverif_properties.scaling import FORCES, SCALING, TANGENT, measure_scaling
 
 SEEDS = range(1, 30)
-
-
-class Springs(Handmade):
-    """A spring between the ends of the slave segment, towards each other; its stiffness is of the kind promised."""
-
-    def stretch(self, z: Any) -> Any:
-        return z[2:4] - z[0:2]
-
-    def area(self, z: Any) -> float:
-        along = self.stretch(z)
-        return float(np.sqrt(along @ along)) if self.traits.penalty == "distributed" else 1.0
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = 0 * z
-        force = self.penalty * self.area(z) * self.stretch(z)
-        forces[0:2], forces[2:4] = -force, force
-        return forces
-
-    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        along, area = self.stretch(z), self.area(z)
-        k = self.penalty * area * np.eye(2)
-        if self.traits.penalty == "distributed":
-            k = k + self.penalty * np.outer(along, along) / area
-        tangent = np.zeros((z.size, z.size))
-        tangent[:4, :4] = np.kron([[1, -1], [-1, 1]], k)
-        return tangent
-
-
-@pytest.mark.parametrize("penalty", ["nodal", "distributed"])
-def test_a_penalty_that_scales_with_its_unit_changes_no_digit(penalty: str) -> None:
-    for seed in SEEDS:
-        measurement = measure_scaling(case(seed=seed), subject(Springs, penalty=penalty))
-        assert measurement.values == {FORCES.name: 0.0, TANGENT.name: 0.0}
-
-
-@pytest.mark.parametrize(("promised", "actual"), [("nodal", "distributed"), ("distributed", "nodal")])
-def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
-    class Boasts(Springs):
-        def area(self, z: Any) -> float:
-            return float(np.hypot(*self.stretch(z))) if actual == "distributed" else 1.0
-
-    verdicts = [judge_case(SCALING, case(seed=seed), subject(Boasts, penalty=promised)).verdict for seed in SEEDS]
-    assert verdicts.count(Verdict.FAIL) >= 20
-
-
-def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
-    assert "not stated" in SCALING.applicable(Traits())
-    assert SCALING.applicable(Traits(penalty="nodal")) == ""
-    assert SCALING.applicable(Traits(penalty="nodal", enforcement="multiplier")) == ""
-    assert "barrier" in SCALING.applicable(Traits(penalty="nodal", enforcement="barrier"))
-    result = run([subject(Springs)], [SCALING], examples=3, seed=1)
-    assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
-    assert result.passed
-
-
-def test_an_absolute_tolerance_is_found() -> None:
-    class Careful(Springs):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            forces = super().residual(interface, pairing, z)
-            return forces if np.abs(self.stretch(z)).max() > 1e-12 else 0 * z
-
-    verdicts = [judge_case(SCALING, case(seed=seed), subject(Careful, penalty="nodal")).verdict for seed in range(60)]
-    assert Verdict.FAIL in verdicts
 
 
 def test_a_force_that_turns_with_the_state_is_objective() -> None:
