@@ -70,7 +70,7 @@ def nearest_multipliers(
     nearest : FloatArray, shape (n_multipliers,)
         The multipliers to judge.
     sharpness : float
-        s, the smallest singular value of the loads of unit multipliers on the bodies over the largest one. Forces that
+        The number s: the smallest singular value of the loads of unit multipliers on the bodies over the largest one. Forces that
         are wrong by roundoff leave the multipliers uncertain by roundoff over s.
     """
     solution = case.multipliers
