@@ -70,8 +70,8 @@ def nearest_multipliers(
     nearest : FloatArray, shape (n_multipliers,)
         The multipliers to judge.
     sharpness : float
-        The number s: the smallest singular value of the loads of unit multipliers on the bodies over the largest one. Forces that
-        are wrong by roundoff leave the multipliers uncertain by roundoff over s.
+        The number s: the smallest singular value of the loads of unit multipliers on the bodies over the largest one.
+        Forces that are wrong by roundoff leave the multipliers uncertain by roundoff over s.
     """
     solution = case.multipliers
     pairing = formulation.pair(case.interface, case.z)
