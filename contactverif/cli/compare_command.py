@@ -40,20 +40,20 @@ def compare(
 ) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
 
-    An argument that ends in .nc is a report, and so is any other file that
-    no formulation is named after.
+    A name that ends in .nc is a report. So is the name of any other file,
+    unless an installed formulation has the same name.
 
     \bExit status, for formulations
       0  compared, and every candidate keeps its promises
       1  a candidate breaks a promise, cannot be judged or does not load.
          A candidate that is worse than the reference is a result and no
-         error. Promises of the reference itself do not count here
+         error; promises of the reference do not count
     \bExit status, for two reports
       0  nothing got worse; being slower does not count as worse
-      1  a property passed and fails now, a promise was kept and is broken
-         now, an error beyond the tolerance more than doubled, or more cases
-         are undecided or do not converge than roundoff can explain. What is
-         only worth a look is printed and does not count
+      1  a property passed and fails now; a promise was kept and is broken
+         now; an error beyond the tolerance has more than doubled; or more
+         cases are undecided, or do not converge, than roundoff explains.
+         Smaller changes are printed and do not count
     \bFor both
       2  the command line is wrong; one line says what is needed
 

@@ -17,6 +17,10 @@ def list_installed(
 
     \bExit status
       0  listed
+
+    \bExamples
+      contactverif list
+      contactverif list --traits
     """
     from contactverif.cli.run_tables import formulations_table, properties_table, show
     from contactverif.run.registry import load_formulations, load_properties

@@ -27,7 +27,7 @@ def replay(
         typer.Option("--out", help="Draw the case to FILE.png or FILE.svg. Repeatable.", metavar="FILE"),
     ] = None,
 ) -> None:
-    """Judge one stored counterexample again. Without --case, list their ids.
+    """Judge one stored counterexample again; without --case, list the ids.
 
     \bExit status
       0  the case does not fail any more
