@@ -1,7 +1,11 @@
 """contactverif tells whether a contact formulation is right.
 
-The names that a plugin, a test or a script needs. Each is imported at its first use, so that importing `contactverif`
-takes no longer than importing Python's own library.
+Here are the names that a plugin, a test or a script needs; scripts and documents import them from here and from
+`contactverif.testing`, never from the folders below.
+
+Rules for the next editor: each name is imported at its first use, so that ``import contactverif`` imports nothing but
+the standard library. A name is public once it is in `__all__`, `_HOMES` and the block for type checkers; a test
+compares the three lists with its own.
 """
 
 from __future__ import annotations
@@ -21,11 +25,14 @@ if TYPE_CHECKING:
     from contactverif.mechanics.bulk import body_from_mesh
     from contactverif.mechanics.newton import End, Trace, solve
     from contactverif.mechanics.scene import Scene
+    from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
     from contactverif.meshes.mesh_file import read_interface
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import judge_case
     from contactverif.run.runner import run as verify
+    from contactverif.scenes.blocks import two_blocks
     from contactverif.scenes.catalogue import load_scene
+    from contactverif.scenes.named_states import named_case
 
 __version__ = "0.1.0"
 
@@ -41,10 +48,13 @@ _HOMES = {
     "mechanics.bulk": ("body_from_mesh",),
     "mechanics.newton": ("End", "Trace", "solve"),
     "mechanics.scene": ("Scene",),
+    "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),
     "meshes.mesh_file": ("read_interface",),
     "run.registry": ("load_formulation", "load_properties"),
     "run.runner": ("judge_case", "verify"),
+    "scenes.blocks": ("two_blocks",),
     "scenes.catalogue": ("load_scene",),
+    "scenes.named_states": ("named_case",),
 }
 _NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
@@ -63,8 +73,10 @@ __all__ = [
     "MisuseError",
     "Outcome",
     "Pairing",
+    "Placing",
     "Property",
     "Quantity",
+    "Rectangle",
     "ResidualOnly",
     "Row",
     "Run",
@@ -74,13 +86,17 @@ __all__ = [
     "Trace",
     "Traits",
     "Verdict",
+    "block",
     "body_from_mesh",
     "judge_case",
     "load_formulation",
     "load_properties",
     "load_scene",
+    "named_case",
     "read_interface",
+    "rigid_surface",
     "solve",
+    "two_blocks",
     "verify",
 ]
 

@@ -128,7 +128,7 @@ def block(
     >>> base = block(Rectangle([-1, 1, 3], [-2, 0], young=5.0), contact="top", approach=0.0, name="base")
     >>> scene = Scene((punch, base), penalty=100.0)
     >>> scene.interface.n_slave_nodes, scene.n_free
-    (3, 4)
+    (3, 8)
     """
     x, y = _grid_lines(f"{name}: x", rectangle.x), _grid_lines(f"{name}: y", rectangle.y)
     axis = as_floats(f"{name}: axis", placing.axis, (2,))

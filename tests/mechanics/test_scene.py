@@ -23,7 +23,7 @@ from contactverif.geometry import projection
 from contactverif.geometry.compiled import uncompiled
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
-from contactverif.mechanics.bulk import body_from_mesh, stiffness
+from contactverif.mechanics.bulk import assemble_stiffness, body_from_mesh
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.run.registry import load_formulation
@@ -237,7 +237,7 @@ def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
     displaced = scene.displacements(scene.start)
     assert np.abs(displaced[2] - [0, -0.25]).max() <= 64 * UNIT_ROUNDOFF  # pushed from above and nothing below
     assert np.abs(scene.stresses(scene.start)[2]).max() <= 64 * UNIT_ROUNDOFF
-    hanging = np.asarray(stiffness(free)[0])[np.ix_(*[np.flatnonzero(~free.fixed)] * 2)]
+    hanging = np.asarray(assemble_stiffness(free)[0])[np.ix_(*[np.flatnonzero(~free.fixed)] * 2)]
     bound = UNIT_ROUNDOFF * (np.linalg.cond(hanging) + 201) * 0.5  # its nodes are up to 201 cells from the origin
     assert np.abs(scene.stresses(scene.start)[3] - [0, -0.5, 0]).max() <= bound
     assert np.abs(scene.stresses(scene.start, 0.5)[3] - [0, -0.25, 0]).max() <= bound
