@@ -20,7 +20,12 @@ punch = skfem.MeshTri.init_tensor(np.linspace(2, 4, 8), np.linspace(0, 1, 5)).wi
 scene = Scene(
     (
         body_from_mesh(
-            punch, contact="bottom", supports={"top": "both"}, displacements={"top": (0.0, -0.02)}, young=2e4, poisson=0.3
+            punch,
+            contact="bottom",
+            supports={"top": "both"},
+            displacements={"top": (0.0, -0.02)},
+            young=2e4,
+            poisson=0.3,
         ),
         body_from_mesh(block, contact="top", supports={"bottom": "both"}, young=1e4, poisson=0.3),
     ),
