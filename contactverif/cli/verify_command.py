@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -110,10 +111,12 @@ def write_results(result: Run, files: OutputFiles) -> None:
     from contactverif_reports.netcdf.stored import read_report
 
     with tempfile.TemporaryDirectory() as folder:
+        stored = report or Path(folder) / "report.nc"
         if report is None:
-            report = Path(folder) / "FILE.nc"
-            write(result, report)
-        write_page(page, report_page(read_report(report)), "--out")
+            write(result, stored)
+        # The page names the report in the commands that replay a case; without --out FILE.nc that is still to be made.
+        named = replace(read_report(stored), path=str(files.names.get(REPORT, "FILE.nc")))
+        write_page(page, report_page(named), "--out")
 
 
 def _show_counterexamples(

@@ -22,6 +22,20 @@ def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
     return path, ask("verify", "nts", "vts-ppt", *options, "--out", path)
 
 
+@pytest.mark.parametrize("files", [("page.html",), ("words.nc", "page.html")])
+def test_verify_writes_the_page_with_or_without_the_report(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = [word for file in files for word in ("--out", file)]
+    answer = ask("verify", "nts", "-p", "patch.flat.transmission", "--examples", "4", "--seed", "3", *options)
+    assert (answer.status, answer.err) == (0, "")
+    assert "\npage: page.html\n" in answer.out
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
+    name = "words.nc" if "words.nc" in files else "FILE.nc"
+    assert f"contactverif replay {name} --case nts.patch.flat.transmission" in (tmp_path / "page.html").read_text()
+
+
 def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
     path, verified = run
     answer = ask("report", path)
