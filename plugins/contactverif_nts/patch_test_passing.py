@@ -30,7 +30,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.geometry.projection import search_tree
-from contactverif_nts import box3, walk
+from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
 from contactverif_nts.walk import FREE_ENDS, Areas
 
@@ -107,7 +107,7 @@ class PatchTestPassing:
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
         x, multipliers = split_state(interface, z)
-        rows, columns, values = box3.tangent(x, multipliers, *self._arguments(interface, pairing))
+        rows, columns, values = box3_tangent.tangent(x, multipliers, *self._arguments(interface, pairing))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:

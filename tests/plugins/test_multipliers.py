@@ -21,7 +21,7 @@ from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error
-from contactverif_nts import box3, eq6, walk
+from contactverif_nts import box3, box3_tangent, eq6, walk
 
 METHODS = [
     ("nts_lm", {}),
@@ -201,7 +201,7 @@ def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatc
         return found
 
     compiled = answers()
-    for module in (projection, eq6, walk, box3):
+    for module in (projection, eq6, walk, box3, box3_tangent):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
                 monkeypatch.setattr(module, attribute, uncompiled(value))

@@ -11,7 +11,7 @@ from surfaces import bent
 import contactverif_nts
 from contactverif.geometry import projection
 from contactverif.geometry.compiled import uncompiled
-from contactverif_nts import box3, eq6, walk
+from contactverif_nts import box3, box3_tangent, eq6, walk
 
 METHODS = [
     ("nts", {}),
@@ -86,7 +86,7 @@ def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatc
         return found
 
     compiled = answers()
-    for module in (projection, eq6, walk, box3):
+    for module in (projection, eq6, walk, box3, box3_tangent):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
                 monkeypatch.setattr(module, attribute, uncompiled(value))
