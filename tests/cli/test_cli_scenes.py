@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import meshio
+import numpy as np
 import pytest
 from asking import Ask, asking
 from handmade_run import run_with
@@ -15,7 +16,10 @@ from handmade_run import run_with
 from contactverif.cli import scene_drawing
 from contactverif.cli.gallery import MEANINGS
 from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import End
 from contactverif.run import runner
+from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.scenes.named_states import named_case
 from contactverif.studies import solved_scenes as pictures
@@ -184,6 +188,37 @@ def test_a_formulation_that_cannot_be_asked_is_a_line(
     assert answer.status == 1
     assert answer.out.endswith("nts: not loaded: no licence\n")
     assert not (tmp_path / "none.png").exists()
+
+
+class WrongTangent:
+    """VTS-PPT with a tangent of the wrong sign, so that Newton's method diverges."""
+
+    def __init__(self, penalty: float) -> None:
+        subject = load_formulation("vts-ppt")
+        assert isinstance(subject, Subject)
+        self.right = subject.with_penalty(penalty).plugin
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        return self.right.pair(interface, z)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.right.residual(interface, pairing, z)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return -1e4 * np.eye(z.size)
+
+
+def test_draw_says_what_to_try_where_newtons_method_diverges(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diverging = Subject("mine", lambda *, penalty: WrongTangent(penalty))
+    monkeypatch.setattr(scene_drawing, "load_formulation", lambda name: diverging)
+    answer = ask("draw", "--scene", "c", "-f", "mine", "--out", tmp_path / "c.svg", columns=80)
+    assert answer.status == 0
+    assert "diverged" in answer.out
+    assert f"mine: {End.DIVERGED.advice}" in " ".join(answer.out.split())
+    assert max(len(line) for line in answer.out.splitlines() if not line.startswith("picture: ")) <= 80
+    assert "mine: " + End.DIVERGED.advice in (tmp_path / "c.svg").read_text()
 
 
 def test_a_stored_scene_is_solved_by_who_failed_it_or_by_another(ask: Ask, scene_report: Path, tmp_path: Path) -> None:
