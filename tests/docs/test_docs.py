@@ -51,7 +51,8 @@ def last_lines(printed: str) -> list[str]:
 def test_a_quoted_output_is_what_the_command_prints(page: Path, tmp_path: Path) -> None:
     results = outputs(page, tmp_path, QUICK)
     for command, finished in results.items():
-        assert finished.returncode == 0, f"{command}\n{finished.stdout}{finished.stderr}"
+        fails_again = "replay" in command and re.search(r"now +\S+ +fail", finished.stdout)
+        assert finished.returncode == (1 if fails_again else 0), f"{command}\n{finished.stdout}{finished.stderr}"
     for quote in quotes(page):
         printed = excerpt(results[quote.command].stdout, quote.argument)
         assert rows(quote.block) == rows(printed)

@@ -117,7 +117,7 @@ def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
             "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "40"
         )
         assert answer.returncode == 1
-        assert rows(answer.stdout) == [(property_id, "passes", "fail")]
+        assert rows(answer.stdout) == [(property_id, "passes", "BROKEN PROMISE")]
         assert "PROMISED, AND FAILS" in answer.stdout
 
 

@@ -31,7 +31,7 @@ PROMISES = {
     "locking": [
         r"nts-ar .*stiffest [1-9]e-01",
         r"two-pass/nts-ar .*stiffest [1-9]e-05",
-        r"vts-ppt .*softest [1-9]e-1[4-7]",
+        r"vts-ppt .*softest penalty [1-9]e-1[4-7]",
     ],
     "newton_trace": [r"vts-ppt\n(?s:.*?)converged: ", r"vts-me\n(?s:.*)2-cycle: "],
     "own_mesh": [r"2 slave segments on 2 master segments", r"vts-me +patch\.flat\.transmission +fail"],
@@ -81,7 +81,7 @@ def test_an_example_is_short_and_uses_public_names_only(script: Path) -> None:
     text = script.read_text(encoding="utf-8")
     tree = ast.parse(text)
     assert "\n\n" in (ast.get_docstring(tree) or ""), "one line says what one learns, then a paragraph explains it"
-    assert 20 <= len(text.splitlines()) <= 60
+    assert 12 <= len(text.splitlines()) <= 60
     modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     modules += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     ours = {module for module in modules if module.startswith("contactverif")}
