@@ -1,4 +1,8 @@
-"""Exact answers to judge by. The judge shares no code with the judged: nothing here is used by a plugin."""
+"""Exact answers to judge by: consistent nodal forces, projections, and the distance of a state to a kink.
+
+Rule for the next editor: the judge shares no code with the judged. No plugin uses anything here, and nothing here uses
+the compiled geometry of plugins. Where it is affordable, the arithmetic is rational and thus exact.
+"""
 
 from contactverif.oracle.consistent import uniform_pressure_weights, uniform_pressure_weights_exact
 from contactverif.oracle.exact_projection import Projection, project_point, projection_cases

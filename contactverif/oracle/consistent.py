@@ -1,4 +1,7 @@
-"""Exact consistent nodal lengths of a flat interface: what a uniform pressure is multiplied by."""
+"""The consistent nodal forces of a uniform pressure on a flat interface, exact.
+
+Rule for the next editor: all arithmetic is rational on the stored floats; the only rounding is the last one.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,22 @@ from contactverif.oracle.rationals import integers
 
 
 def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> list[Fraction]:
-    """Lengths (n_nodes,) that a uniform pressure is multiplied by to give the consistent nodal forces.
+    """Return the lengths that turn a uniform pressure into consistent nodal forces, as exact rationals.
 
-    ∫ N over the part of the node's surface that faces chains of the other surface: where both are, whichever is wider.
-    `along` (n_nodes,) is the coordinate of each node along the straight interface, a length; floats count as the
-    rationals that they are. Chains are open, and those of one surface do not overlap.
+    The weight of a node is ∫ N over the part of its surface that faces chains of the other surface. What lies beside
+    the other surface has no weight, whichever of the two is wider.
+
+    Parameters
+    ----------
+    interface : Interface
+        A flat interface of open chains; those of one surface do not overlap.
+    along : ArrayLike, shape (n_nodes,)
+        The coordinate of each node along the straight interface, a length. Floats count as the rationals that they are.
+
+    Returns
+    -------
+    list[Fraction]
+        The weight of each node, a length: force = pressure × weight.
     """
     places, scale = integers(np.asarray(along, dtype=np.float64))
     weights = [Fraction(0)] * len(places)
@@ -26,10 +40,13 @@ def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> li
         ordered = sorted(sorted(ends, key=places.__getitem__) for ends in surface.segments.tolist())
         ordered.sort(key=lambda ends: places[ends[0]])
         starts = [places[low] for low, _ in ordered]
-        for low, high in _covered(other, places):
+        for low, high in _stretches(other, places):
             for first, second in ordered[max(bisect_right(starts, low) - 1, 0) : bisect_right(starts, high)]:
                 begin, length = places[first], places[second] - places[first]
-                a, b = max(low, begin) - begin, min(high, places[second]) - begin  # the covered part, from first node
+                a, b = (
+                    max(low, begin) - begin,
+                    min(high, places[second]) - begin,
+                )  # The covered part, from the first node.
                 if a < b:
                     towards_second = Fraction(b * b - a * a, 2 * length)
                     weights[second] += towards_second
@@ -38,12 +55,12 @@ def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> li
 
 
 def uniform_pressure_weights(interface: Interface, along: ArrayLike) -> FloatArray:
-    """As `uniform_pressure_weights_exact`, each length (n_nodes,) rounded once."""
+    """Return the weights of `uniform_pressure_weights_exact` as floats (n_nodes,), each rounded once."""
     return np.array([float(weight) for weight in uniform_pressure_weights_exact(interface, along)])
 
 
-def _covered(surface: Surface, places: list[int]) -> list[tuple[int, int]]:
-    """The stretch that each chain covers."""
+def _stretches(surface: Surface, places: list[int]) -> list[tuple[int, int]]:
+    """Return the stretch that each chain covers."""
     firsts, lasts = surface.segments[:, 0].tolist(), surface.segments[:, 1].tolist()
     stretches: list[tuple[int, int]] = []
     for segment in surface.chain_order.tolist():

@@ -1,4 +1,8 @@
-"""Exact projections of slave points onto the master, in rationals on the stored floats; lengths as their squares."""
+"""Exact projections of slave points onto the master, and how areas of competence fall on it.
+
+Rule for the next editor: all arithmetic is in integers and rationals on the stored floats, so lengths appear as their
+squares. A tie is a tie here, and is reported as one.
+"""
 
 from __future__ import annotations
 
@@ -24,17 +28,17 @@ class Projection:
     Attributes
     ----------
     segment : int
-        The master segment that is nearest.
+        The nearest master segment.
     xi : Fraction
-        Foot on it, 0 at its first node, 1 at its second, unclipped.
+        The foot on that segment: 0 at its first node, 1 at its second, unclipped.
     squared_distance : Fraction
-        To the closed segment, a length squared.
+        The square of the distance to the closed segment, a length squared.
     signed_squared_gap : Fraction
-        Square of the distance to the segment's line, a length squared, negative in penetration.
+        The square of the distance to the segment's line, a length squared, negative in penetration.
     tied : tuple[int, ...]
-        All segments at that distance.
+        All segments at the same distance.
     undecided : tuple[int, ...]
-        Those of them that the least overshoot does not tell apart either; more than one is a kink.
+        Those of the tied segments that have the same overshoot too; more than one is a kink.
     """
 
     segment: int
@@ -46,22 +50,39 @@ class Projection:
 
     @property
     def gap_sign(self) -> int:
-        """−1 in penetration, 0 in touch, +1 open."""
+        """The sign of the gap: −1 in penetration, 0 in touch, +1 open."""
         return (self.signed_squared_gap > 0) - (self.signed_squared_gap < 0)
 
 
 def project_point(interface: Interface, z: FloatArray, slave_segment: int, c: float | Fraction) -> Projection:
-    """The master segment nearest to the point at c ∈ [−1, 1] of a slave segment, in exact arithmetic.
+    """Project a point of a slave segment onto the master, in exact arithmetic.
 
-    The nearest closed segment; where the foot lies at or past an end the distance is taken to the end node itself.
-    Ties: the least length of the unclipped foot past the segment's end, then the lower index.
+    The nearest closed segment is taken; where the foot lies at or past an end, the distance is that to the end node. A
+    tie is decided by the smallest overshoot, the length of the unclipped foot past the segment's end, then by the lower
+    number.
+
+    Parameters
+    ----------
+    interface : Interface
+        The two meshes.
+    z : FloatArray, shape (n_unknowns,)
+        The current positions, flat.
+    slave_segment : int
+        The number of the slave segment.
+    c : float | Fraction
+        The place on it, from −1 at its first node to +1 at its second.
+
+    Returns
+    -------
+    Projection
+        The nearest segment and the place on it.
     """
     exact = _Exact(interface, z, [Fraction(c)])
     return exact.nearest(exact.point(slave_segment, Fraction(c)))
 
 
 class _Exact:
-    """The state on an integer lattice fine enough to hold the nodes and the points at the given c's."""
+    """A state on an integer lattice that is fine enough for its nodes and for the points at certain places c."""
 
     def __init__(self, interface: Interface, z: FloatArray, places: Iterable[Fraction]) -> None:
         values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
@@ -73,34 +94,38 @@ class _Exact:
         self.neighbours = interface.master.neighbours.tolist()
 
     def point(self, segment: int, c: Fraction) -> _Point:
+        """Return the point at c of a slave segment."""
         (ax, ay), (bx, by) = (self.nodes[node] for node in self.slave[segment])
         towards = int((1 + c) / 2 * self.fineness)
         away = self.fineness - towards
         return (away * ax + towards * bx) // self.fineness, (away * ay + towards * by) // self.fineness
 
     def ends(self, segment: int) -> tuple[_Point, _Point]:
+        """Return the end points of a master segment."""
         return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
 
     def direction(self, segment: int) -> _Point:
-        return _from(*self.ends(segment))
+        """Return the vector from the first to the second node of a master segment."""
+        return _subtract(*self.ends(segment))
 
     def nearest(self, point: _Point) -> Projection:
+        """Return the projection of a point."""
         ranked = []
         for segment in range(len(self.master)):
             first, second = self.ends(segment)
             along = self.direction(segment)
             squared = _dot(along, along)
-            foot = _dot(_from(first, point), along)
+            foot = _dot(_subtract(first, point), along)
             if 0 < foot < squared:
-                distance = Fraction(_cross(along, _from(first, point)) ** 2, squared)
+                distance = Fraction(_cross(along, _subtract(first, point)) ** 2, squared)
                 ranked.append((distance, Fraction(0), segment))
             else:
                 past, end = (-foot, first) if foot <= 0 else (foot - squared, second)
-                distance = Fraction(_dot(_from(end, point), _from(end, point)))
+                distance = Fraction(_dot(_subtract(end, point), _subtract(end, point)))
                 ranked.append((distance, Fraction(past * past, squared), segment))
         best, overshoot, segment = min(ranked)
-        along, from_first = self.direction(segment), _from(self.ends(segment)[0], point)
-        gap = -_cross(along, from_first)  # times the segment's length
+        along, from_first = self.direction(segment), _subtract(self.ends(segment)[0], point)
+        gap = -_cross(along, from_first)  # The gap, times the length of the segment.
         return Projection(
             segment=segment,
             xi=Fraction(_dot(from_first, along), _dot(along, along)),
@@ -111,7 +136,7 @@ class _Exact:
         )
 
 
-def _from(a: _Point, b: _Point) -> _Point:
+def _subtract(a: _Point, b: _Point) -> _Point:
     return b[0] - a[0], b[1] - a[1]
 
 
@@ -124,26 +149,42 @@ def _cross(a: _Point, b: _Point) -> int:
 
 
 def projection_cases(interface: Interface, z: FloatArray, n: int = 2) -> Counter[str]:
-    """How the areas of competence of the virtual slave nodes c = −1 + (2k+1)/n fall on the master; small meshes only.
+    """Count how the areas of competence of n virtual slave nodes a segment fall on the master; for small meshes.
 
-    Keys: "one segment"; the roles "first", "intermediate", "last" of segments where there are several;
-    "node exactly hit" by a foot; "beyond an end"; "convex vertex" and "concave vertex" inside an area; "edge-on",
-    before a segment seen edge-on or from behind, where the walk stops; "turned away", where nothing is covered.
+    The virtual slave nodes lie at c = −1 + (2k+1)/n.
+
+    Parameters
+    ----------
+    interface : Interface
+        The two meshes.
+    z : FloatArray, shape (n_unknowns,)
+        The current positions, flat.
+    n : int
+        The number of virtual slave nodes on each slave segment.
+
+    Returns
+    -------
+    Counter[str]
+        The number of each of these: "one segment"; the roles "first", "intermediate" and "last" of segments where there
+        are several; "node exactly hit" by a foot or an end; "beyond an end"; "convex vertex" and "concave vertex"
+        inside an area; "edge-on", before a segment seen edge-on or from behind, where the walk stops; "turned away",
+        where nothing is covered.
     """
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     half = Fraction(1, n)
     centres = [-1 + (2 * k + 1) * half for k in range(n)]
     exact = _Exact(interface, z, [*centres, *(c - half for c in centres), *(c + half for c in centres)])
     for slave_segment in range(len(exact.slave)):
         for c in centres:
-            found.update(_cases_at(exact, slave_segment, c, half))
-    return found
+            counts.update(_cases_at(exact, slave_segment, c, half))
+    return counts
 
 
 def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) -> Iterator[str]:
+    """Yield the cases of one area of competence, from c − half to c + half."""
     home = exact.nearest(exact.point(slave_segment, c))
     along = exact.direction(home.segment)
-    low = _dot(exact.point(slave_segment, c + half), along)  # P, nearer the slave segment's second node
+    low = _dot(exact.point(slave_segment, c + half), along)  # P, nearer the slave segment's second node.
     high = _dot(exact.point(slave_segment, c - half), along)  # Q
     if low >= high:
         yield "turned away"
@@ -154,26 +195,34 @@ def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) ->
         yield "beyond an end"
     covered = [home.segment]
     for side, sign, end in ((0, -1, low), (1, 1, high)):
-        segment = home.segment
-        while True:
-            node = sign * _dot(exact.nodes[exact.master[segment][side]], along)
-            if sign * end == node:
-                yield "node exactly hit"
-            if sign * end <= node:
-                break
-            following = exact.neighbours[segment][side]
-            if following < 0 or following in covered:
-                yield "beyond an end"
-                break
-            if _dot(exact.direction(following), along) <= 0:
-                yield "edge-on"
-                break
-            turn = sign * _cross(exact.direction(segment), exact.direction(following))
-            if turn:
-                yield "convex vertex" if turn > 0 else "concave vertex"
-            covered.append(following)
-            segment = following
+        yield from _walk(exact, home.segment, side, sign * end, covered)
     if len(covered) == 1:
         yield "one segment"
     else:
         yield from ("first", "last", *["intermediate"] * (len(covered) - 2))
+
+
+def _walk(exact: _Exact, home: int, side: int, end: int, covered: list[int]) -> Iterator[str]:
+    """Walk along the master from a segment to the end of an area, append what is covered, and yield what is met.
+
+    The end is measured along the home segment, in the direction of the walk: side 0 walks back, side 1 forward.
+    """
+    sign, along, segment = 2 * side - 1, exact.direction(home), home
+    while True:
+        node = sign * _dot(exact.nodes[exact.master[segment][side]], along)
+        if end == node:
+            yield "node exactly hit"
+        if end <= node:
+            return
+        following = exact.neighbours[segment][side]
+        if following < 0 or following in covered:
+            yield "beyond an end"
+            return
+        if _dot(exact.direction(following), along) <= 0:
+            yield "edge-on"
+            return
+        turn = sign * _cross(exact.direction(segment), exact.direction(following))
+        if turn:
+            yield "convex vertex" if turn > 0 else "concave vertex"
+        covered.append(following)
+        segment = following

@@ -1,4 +1,8 @@
-"""A bound, in floats, on how far a state is from a kink."""
+"""A bound, in floats, on the distance of a state to the nearest kink.
+
+Rule for the next editor: the bound must be conservative, since a case within it is undecided and one beyond it is
+judged. The derivation is in `kink_margin`; a new decision of formulations needs a margin of its own.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,26 @@ from numpy.typing import ArrayLike
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
 
-_PAIRS_AT_ONCE = 2**18  # of points and master segments, so that memory stays small
-_SNAP = 1e-2  # past a free end by this share of the segment, formulations may still see contact
+_PAIRS_AT_ONCE = 2**18  # The number of pairs of points and master segments in memory at once.
+_SNAP = 1e-2  # Formulations may still see contact past a free end by this share of the segment.
 
 
 def default_points(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """Contact points to ask about where a plugin names none: nodes, quarter points, middles of the slave segments.
+    """Return contact points for plugins that name none: nodes, quarter points and middles of the slave segments.
 
-    Returns (slave_segment, c, area_from, area_to), each (5 n_segments,): quarter points with the half of the segment
-    around them as area of competence, the others with none (NaN).
+    Parameters
+    ----------
+    interface : Interface
+        The two meshes.
+
+    Returns
+    -------
+    slave_segment : IntArray, shape (n_points,)
+        The segment of each point; five points a segment.
+    c : FloatArray, shape (n_points,)
+        The place of each point on its segment.
+    area_from, area_to : FloatArray, shape (n_points,)
+        The ends of the areas of competence: the half of the segment around a quarter point, NaN for other points.
     """
     places = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
     count = len(interface.slave)
@@ -35,38 +50,42 @@ def kink_margin(
     area_from: ArrayLike | None = None,
     area_to: ArrayLike | None = None,
 ) -> float:
-    """How far every node may move, at least, before a method of the node-to-segment kind decides anything else.
+    """Return how far every node may move, at least, before a formulation of the node-to-segment kind decides otherwise.
 
     Parameters
     ----------
+    interface : Interface
+        The two meshes.
     z : FloatArray, shape (n_unknowns,)
-        Current positions, flat.
+        The current positions, flat.
     slave_segment, c : ArrayLike, shape (n_points,)
         The contact points; −1 or NaN is no point.
     area_from, area_to : ArrayLike | None, shape (n_points,)
-        Ends of their areas of competence, as `c`; NaN or None where there is none. One exactly at the node
-        where the walk must stop was cut there by the formulation, which is no decision.
+        The ends of their areas of competence, as `c`; NaN or None where there is none. An end exactly at the node where
+        the walk must stop was cut there by the formulation, which is no decision.
 
     Returns
     -------
-    A length r ≥ 0. As long as no node moves by more than r: the same master segment is nearest to each point, its gap
-    keeps its sign, its foot stays on its side of a free end (and of 1e-2 segments past it), and the walk from that
-    segment to the ends of the area crosses the same nodes. Never more than ℓ/8, ℓ the shortest master segment.
+    float
+        A length r ≥ 0. As long as no node moves by more than r, the same master segment is nearest to each point, its
+        gap keeps its sign, its foot stays on its side of a free end (and of 1e-2 segments past it), and the walk from
+        that segment to the ends of the area crosses the same nodes. Never more than ℓ/8, with ℓ the shortest master
+        segment.
 
-    How: points are convex combinations of nodes, so a difference d of two places changes by 2r, and the tangent of a
-    segment of length l turns by at most 1.05 (2r/l) while r ≤ l/8. Thus d·t changes by less than 3r (1 + |d|/l), and
-    each decision of that form gets the margin |d·t| / 3(1 + |d|/l). The same with the bisector at a vertex v, whose
-    direction is the mean of two, so that 1/l is the mean of both; gaps with |d| replaced by the overshoot of the foot,
-    since a line moves by r (1 + 2 overshoot/l) there. For other pairs of segments a quarter of the difference of the
-    distances, which changes by 4r. The bound is conservative, by a factor of 2 or so; it is computed in floats and
-    means nothing below roundoff, some u X.
+    Notes ----- Points are convex combinations of nodes, so a difference d of two places changes by 2r, and the tangent
+    of a segment of length l turns by at most 1.05 (2r/l) while r ≤ l/8. Thus d·t changes by less than 3r (1 + |d|/l),
+    and each decision of that form gets the margin |d·t| / 3(1 + |d|/l). The bisector at a vertex, whose direction is
+    the mean of two, has the mean of both 1/l. For gaps the overshoot of the foot replaces |d|, since a line moves by r
+    (1 + 2 overshoot/l) there. Other pairs of segments get a quarter of the difference of the distances, which changes
+    by 4r. The bound is conservative by a factor of about 2. It is computed in floats and means nothing below roundoff,
+    some u X.
     """
     nodes = np.asarray(z, dtype=np.float64)[: interface.n_unknowns].reshape(-1, 2)
-    there = (np.asarray(slave_segment) >= 0) & np.isfinite(c)
-    carriers = nodes[interface.slave.segments[np.asarray(slave_segment)[there]]]  # (n_points, 2 ends, dim)
-    line = _Line.of(interface.master, nodes)
+    valid = (np.asarray(slave_segment) >= 0) & np.isfinite(c)
+    carriers = nodes[interface.slave.segments[np.asarray(slave_segment)[valid]]]  # (n_points, 2 ends, dim)
+    line = _Line.from_surface(interface.master, nodes)
     margin = float(line.length.min()) / 8
-    points = _at(carriers, np.asarray(c, dtype=np.float64)[there])
+    points = _interpolate(carriers, np.asarray(c, dtype=np.float64)[valid])
     rows = max(1, _PAIRS_AT_ONCE // len(interface.master))
     home = np.empty(len(points), dtype=np.int64)
     for start in range(0, len(points), rows):
@@ -74,31 +93,32 @@ def kink_margin(
         home[part], least = _nearest_margin(line, points[part])
         margin = min(margin, least)
     if area_from is not None and area_to is not None:
-        high, low = (_at(carriers, np.asarray(end, dtype=np.float64)[there]) for end in (area_from, area_to))
-        ours = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
-        margin = min(margin, _area_margin(line, home[ours], low[ours], high[ours]))
+        high, low = (_interpolate(carriers, np.asarray(end, dtype=np.float64)[valid]) for end in (area_from, area_to))
+        whole = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
+        margin = min(margin, _area_margin(line, home[whole], low[whole], high[whole]))
     return max(margin, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """The master in floats; axes are those of a surface's segments."""
+    """The master surface in floats; axes are those of a surface's segments."""
 
-    first: FloatArray  # (n_segments, dim), as the second ends and the tangents
+    first: FloatArray  # (n_segments, dim), as for the second ends and the tangents.
     second: FloatArray
     length: FloatArray  # (n_segments,)
     tangent: FloatArray
     neighbours: IntArray
 
     @classmethod
-    def of(cls, master: Surface, nodes: FloatArray) -> _Line:
+    def from_surface(cls, master: Surface, nodes: FloatArray) -> _Line:
         first, second = nodes[master.segments[:, 0]], nodes[master.segments[:, 1]]
         length = np.hypot(*(second - first).T)
         tangent = (second - first) / length[:, None]
         return cls(first, second, length, tangent, master.neighbours)
 
 
-def _at(carriers: FloatArray, c: FloatArray) -> FloatArray:
+def _interpolate(carriers: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the points (n_points, dim) at c (n_points,) of segments with these end points (n_points, 2, dim)."""
     share = ((1 + c) / 2)[:, None]
     points: FloatArray = (1 - share) * carriers[:, 0] + share * carriers[:, 1]
     return points
@@ -109,14 +129,14 @@ def _dots(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _margin(difference: FloatArray, tangent: FloatArray, inverse_length: FloatArray) -> FloatArray:
-    """|d·t| / 3(1 + |d|/l)."""
+    """Return the margin |d·t| / 3(1 + |d|/l) of a difference d, a tangent t and 1/l."""
     size = np.hypot(difference[..., 0], difference[..., 1])
     margin: FloatArray = np.abs(_dots(difference, tangent)) / (3 * (1 + size * inverse_length))
     return margin
 
 
 def _distances(line: _Line, points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Distances (n_points, n_segments) to the closed segments, and the nearest, ties by overshoot and number."""
+    """Return distances (n_points, n_segments) to the closed segments, and the nearest segments (n_points,)."""
     dx, dy = (points[:, None, k] - line.first[:, k] for k in (0, 1))
     ex, ey = (points[:, None, k] - line.second[:, k] for k in (0, 1))
     foot = dx * line.tangent[:, 0] + dy * line.tangent[:, 1]
@@ -131,16 +151,16 @@ def _distances(line: _Line, points: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
-    """The nearest segments (n_points,) and the least margin of: which is nearest, the gap's sign, free ends."""
+    """Return the nearest segments (n_points,) and the least margin of that choice, the gap's sign and free ends."""
     distance, home = _distances(line, points)
     rows = np.arange(len(points))
-    own = distance[rows, home]
+    nearest = distance[rows, home]
     length, inverse, tangent = line.length[home], 1 / line.length[home], line.tangent[home]
     difference = points - line.first[home]
     foot, gap = _dots(difference, tangent), _dots(difference, tangent[:, ::-1] * [1, -1])
     overshoot = np.maximum(np.maximum(-foot, foot - length), 0.0)
     least = float((np.abs(gap) / (3 * (1 + overshoot * inverse))).min(initial=np.inf))
-    by_distance = (distance - own[:, None]) / 4
+    by_distance = (distance - nearest[:, None]) / 4
     by_distance[rows, home] = np.inf
     for side, vertex, far in ((0, line.first, line.second), (1, line.second, line.first)):
         other = line.neighbours[home, side]
@@ -159,13 +179,13 @@ def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
         clear = np.where(inside > 0, _margin(points - far[home], tangent, inverse), 0.0)
         by_vertex = np.minimum(np.where(size > 0, bisector, 0.0), clear)
         at = (rows[~free], other[~free])
-        twice = (line.neighbours[home, 0] == line.neighbours[home, 1])[~free]  # a chain of two, closed: both vertices
+        twice = (line.neighbours[home, 0] == line.neighbours[home, 1])[~free]  # A closed chain of two.
         by_distance[at] = np.where(twice, by_distance[at], np.maximum(by_distance[at], by_vertex[~free]))
     return home, min(least, float(by_distance.min(initial=np.inf)))
 
 
 def _area_margin(line: _Line, home: IntArray, low: FloatArray, high: FloatArray) -> float:
-    """The least margin of the decisions on the way from the nearest segments to the ends of the areas."""
+    """Return the least margin of the decisions on the way from the nearest segments to the ends of the areas."""
     tangent, inverse = line.tangent[home], 1 / line.length[home]
     roundoff = 64 * UNIT_ROUNDOFF * np.abs(line.first).max()
     turned: BoolArray = _dots(high - low, tangent) <= 0
@@ -178,8 +198,8 @@ def _area_margin(line: _Line, home: IntArray, low: FloatArray, high: FloatArray)
             facing = (following >= 0) & (_dots(along, frame) > 0)
             cut = ~facing & (np.abs(past) <= roundoff)
             least = min(least, float(_margin(step, frame, inverse[going])[~cut].min(initial=np.inf)))
-            seen = (cut | (past > 0)) & (following >= 0)
-            least = min(least, float(_margin(along, frame, inverse[going])[seen].min(initial=np.inf)))
+            visible = (cut | (past > 0)) & (following >= 0)
+            least = min(least, float(_margin(along, frame, inverse[going])[visible].min(initial=np.inf)))
             onward = facing & (past > 0) & (following != home[going])
             going, segment = going[onward], following[onward]
     return least
