@@ -1,4 +1,4 @@
-"""The page of the reference paper: its statements, what was found, and the figures, all from reports/paper.
+"""The page of the reference paper: its figures and statements, and what was computed, all from reports/paper.
 
 Rule: the facts are those of `paper.nc`. A statement or figure that is added there appears here without a change.
 """
@@ -9,10 +9,12 @@ import re
 from pathlib import Path
 
 import xarray as xr
-from page_text import plain, table
+from page_text import plain, sentence, table
 from repository_pages import relink
 
 FOLDER = Path("reports") / "paper"
+# What the variables of /statements were called before, {name now: name before}.
+_FORMER = {"place": "figure", "claim": "says", "result": "found", "agreement": "verdict", "figure": "drawing"}
 
 
 def paper_figures(root: Path) -> dict[str, Path]:
@@ -21,33 +23,52 @@ def paper_figures(root: Path) -> dict[str, Path]:
 
 
 def paper_page(root: Path) -> str:
-    """Return the page: what the paper is, every statement beside what was found, and every figure."""
+    """Return the page: what the paper is, every statement beside what was computed, and every figure."""
     readme = relink((root / FOLDER / "README.md").read_text(encoding="utf-8"), "reports/paper/README.md")
     with xr.open_datatree(root / FOLDER / "paper.nc") as tree:
         statements = tree["statements"].to_dataset().load()
-    meanings = str(statements.verdict.attrs["flag_meanings"]).split()
-    verdicts = [meanings[int(code)] for code in statements.verdict.values]
-    count = ", ".join(f"{word.replace('_', ' ')} {verdicts.count(word)}" for word in meanings if word in verdicts)
-    rows = [
-        [str(figure), plain(str(says)), plain(str(result)), f"**{word.replace('_', ' ')}**"]
-        for figure, says, result, word in zip(
-            statements.figure.values, statements.says.values, statements.found.values, verdicts, strict=True
+        captions = _captions(tree)
+    if "claim" not in statements:
+        statements = statements.rename({"figure": "place"}).rename(
+            {former: name for name, former in _FORMER.items() if name != "place"}
         )
-    ]
+    meanings = str(statements.agreement.attrs["flag_meanings"]).split()
+    verdicts = [meanings[int(code)].replace("_", " ") for code in statements.agreement.values]
+    counts = [(word.replace("_", " "), verdicts.count(word.replace("_", " "))) for word in meanings]
+    conditions = statements.condition.values if "condition" in statements else [""] * len(verdicts)
+    rows = []
+    for number, verdict in enumerate(verdicts):
+        place, claim, result = (str(statements[name].values[number]) for name in ("place", "claim", "result"))
+        condition = f"<br>*{plain(str(conditions[number]))}*" if conditions[number] else ""
+        rows.append([place, sentence(plain(claim)), sentence(plain(result)), f"**{verdict}**{condition}"])
     text = [
         _introduction(readme),
         "## What the paper states\n",
-        f"{len(rows)} statements: {count}.\n",
-        table(["in the paper", "the paper says", "computed here", "result"], rows),
+        f"{len(rows)} statements: {', '.join(f'{word} {count}' for word, count in counts if count)}.\n",
+        table(["in the paper", "the paper says", "computed here", "agreement"], rows),
         "## Figures\n",
     ]
     for path in paper_figures(root):
         name = Path(path).stem
-        label = re.sub(r"^fig0?(\d+)", r"Fig. \1", name).replace("-", ": ", 1)
-        text.append(f"### {label[0].upper() + label[1:]}\n\n![{label}]({Path(path).name})\n")
+        label = re.sub(r"^fig0?(\d+)", r"Fig. \1", name).replace("-", " ")
+        title = label[0].upper() + label[1:]
+        caption = sentence(plain(captions.get(name, "")))
+        text.append(f"### {title}\n\n![{title}]({Path(path).name})\n\n{caption}\n")
     return "\n".join(text)
 
 
+def _captions(tree: xr.DataTree) -> dict[str, str]:
+    """Return {name of a figure: its caption}; none where the file holds no captions."""
+    if "figures" not in tree.children:
+        return {}
+    figures = tree["figures"].to_dataset()
+    columns = [name for name in ("caption", "title") if name in figures.variables]
+    if "name" not in figures.variables or not columns:
+        return {}
+    pairs = zip(figures["name"].values, figures[columns[0]].values, strict=True)
+    return {str(name): str(caption) for name, caption in pairs}
+
+
 def _introduction(readme: str) -> str:
-    """Return the README of the folder up to its first heading below the title, without its code."""
-    return re.split(r"^(?:## |```)", readme, maxsplit=1, flags=re.MULTILINE)[0].rstrip() + "\n"
+    """Return the README of the folder up to its first table, code or heading below the title."""
+    return re.split(r"^(?:## |```|\|)", readme, maxsplit=1, flags=re.MULTILINE)[0].rstrip() + "\n"

@@ -71,7 +71,7 @@ def property_page(question: Property) -> str:
         "- [Which formulations pass](index.md#who-does-what)\n"
         f"- On the command line: `contactverif verify NAME -p {question.id}`\n",
     ]
-    return "\n".join(text)
+    return re.sub(r"`docs/([\w/-]+)\.md`", r"[\1](../../\1.md)", "\n".join(text))
 
 
 def _answers(question: Property) -> list[str]:
