@@ -85,7 +85,6 @@ UNFINISHED = {
     "names": {
         "contactverif/cli",
         "contactverif/geometry",
-        "contactverif/mechanics",
         "contactverif/meshes",
         "contactverif/oracle",
         "contactverif/run",
@@ -140,13 +139,11 @@ UNFINISHED = {
         "tests/mutants",
         "tests/plugins",
         "tests/reports",
-        "tests/run",
         "tests/scenes",
         "tests/strategies",
         "tests/studies",
     },
     "comments": {
-        "contactverif/mechanics",
         "contactverif/meshes",
         "contactverif/oracle",
         "contactverif/scenes",
