@@ -85,8 +85,6 @@ UNFINISHED = {
     "names": {
         "contactverif/cli",
         "contactverif/geometry",
-        "contactverif/meshes",
-        "contactverif/oracle",
         "contactverif/run",
         "contactverif/scenes",
         "contactverif/strategies",
@@ -118,8 +116,6 @@ UNFINISHED = {
         "contactverif/contract",
         "contactverif/geometry",
         "contactverif/mechanics",
-        "contactverif/meshes",
-        "contactverif/oracle",
         "contactverif/run",
         "contactverif/scenes",
         "contactverif/strategies",
@@ -144,8 +140,6 @@ UNFINISHED = {
         "tests/studies",
     },
     "comments": {
-        "contactverif/meshes",
-        "contactverif/oracle",
         "contactverif/scenes",
         "contactverif/strategies",
         "contactverif/studies",
