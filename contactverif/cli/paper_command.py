@@ -28,7 +28,7 @@ def paper(
       contactverif paper
       contactverif paper --out reports/paper
     """
-    from contactverif_paper.paper_page import N_FIGURES, check_folder, summary, write
+    from contactverif_paper.paper_page import check_folder, summary, write
 
     if not out:  # as an unset variable of the shell gives it
         raise MisuseError("--out", "''", "the name of a folder")
@@ -37,7 +37,7 @@ def paper(
     from contactverif.cli.progress import Bar
     from contactverif_paper import compute, steps
 
-    n_finished, n_planned = 0, steps() + N_FIGURES
+    n_finished, n_planned = 0, steps()
     with Bar() as bar:
 
         def report_step(description: str) -> None:

@@ -1,57 +1,48 @@
-"""The page and the files of the reproduction of the paper: one netCDF file, figures as SVG, one HTML page."""
+"""Writes the reproduction of the paper: one netCDF file, figures as SVG, one HTML page. This file names no item."""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from contactverif_paper.paper_data import MultiplierRow, Paper, Said
-from contactverif_paper.paper_figures import drawings
+from contactverif_paper.figure_style import render_figure
+from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, Progress, Statement, sentence
 from contactverif_paper.paper_tree import REFERENCE, tree_of
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
 
 NUMBERS, PAGE = "paper.nc", "paper.html"
-MARKS = {Said.AGREES: "✓", Said.DIFFERS: "✗", Said.SILENT: "–", Said.DEFECT: "!"}
-CLASSES = {Said.AGREES: "good", Said.DIFFERS: "bad", Said.SILENT: "soft", Said.DEFECT: "warn"}
-N_FIGURES = 19  # drawn by `write`
-CHOICES = (
-    ("Patch tests", "E = 10⁴ and ν = 0.3 in both bodies, heights 4, two layers of cells, rollers at all sides"),
-    (
-        "Case A2, Examples 1 and 1bis",
-        "the lengths of the segments, which are drawn but not printed. Master lengths 3 1 4 1 3 in Example 1: of six "
-        "equal ones each faces a slave node in its middle, and two-pass NTS-AR passes by symmetry",
-    ),
-    ("Penalty of the figures", "one for each figure, with which the curves fill the pressure axis that it prints"),
-    ("Penalty of the pass/fail table", "ε̂ = 10 E/h with the mean slave segment h; NTS: ε = ε̂ h"),
-    ("Pressure of NTS and of two passes", "nodal force over the node's share of the interface, Eq. 3"),
-    ("VTS-G", "two Gauss points on each slave segment"),
-    (
-        "Fig. 30",
-        "ε̂ = E, p = E/100, free sides, the slave begins where it touches; both blocks alike, and one half as stiff",
-    ),
-    (
-        "Convergence",
-        "largest entry of the residual, to its own roundoff; the paper: an energy norm of 1e−15 in Example 2",
-    ),
-    (
-        "Example 2",
-        "plane strain, the whole disk held on its axis, a foundation 20 wide and 10 deep, clamped below, free at its "
-        "sides, 160 × 30 elements of which 61 are equally wide over |x| ≤ 0.6; four segments of the disk to five of "
-        "them; the disk begins as deep as Hertz on springs ε̂ has it",
-    ),
-    ("Ties at a vertex, feet past a free end, the end of a walk", "see plugins/README.md and the docstrings there"),
-)
+MARKS: Mapping[Agreement, str] = {
+    Agreement.AGREES: "✓",
+    Agreement.DIFFERS: "✗",
+    Agreement.SILENT: "–",
+    Agreement.DEFECT: "!",
+    Agreement.CONDITIONAL: "(✓)",
+}
+CLASSES: Mapping[Agreement, str] = {
+    Agreement.AGREES: "good",
+    Agreement.DIFFERS: "bad",
+    Agreement.SILENT: "soft",
+    Agreement.DEFECT: "warn",
+    Agreement.CONDITIONAL: "warn",
+}
 
 
 def check_folder(folder: Path, argument: str = "--out") -> None:
-    """Makes the folder, and says before anything takes long what would stop files from being written to it.
+    """Make the folder, and say before anything takes long what would stop files from being written to it.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    argument : str
+        The name of the option, for the message.
 
     Raises
     ------
@@ -64,9 +55,25 @@ def check_folder(folder: Path, argument: str = "--out") -> None:
 
 
 def write(
-    paper: Paper, folder: Path, told: Callable[[str], None] = lambda _: None, argument: str = "--out"
+    paper: Paper, folder: Path, report_progress: Progress = lambda _: None, argument: str = "--out"
 ) -> tuple[Path, ...]:
-    """Writes all files, each whole or not at all, and returns their paths; `told` hears of each figure.
+    """Write all files, each whole or not at all.
+
+    Parameters
+    ----------
+    paper : Paper
+        The results.
+    folder : Path
+        The folder; it is made if it does not exist.
+    report_progress : Progress
+        Is called before each figure.
+    argument : str
+        The name of the option, for messages.
+
+    Returns
+    -------
+    tuple[Path, ...]
+        The files, the page last.
 
     Raises
     ------
@@ -74,77 +81,76 @@ def write(
         As `check_folder`.
     """
     check_folder(folder, argument)
-    written = [folder / NUMBERS]
+    paths = [folder / NUMBERS]
     with whole(folder / NUMBERS) as part:
         tree_of(paper).to_netcdf(part, engine="netcdf4", format="NETCDF4")
     inlined: dict[str, Markup] = {}
-    for drawing in drawings(paper):
-        told(drawing.caption)
-        figure = drawing.drawn()
-        written.append(folder / f"{drawing.name}.svg")
-        with whole(written[-1]) as part:
-            part.write_text(svg(figure), encoding="utf-8", newline="\n")
-        inlined[drawing.name] = svg_inline(figure, f"{drawing.figure}. {drawing.caption}")
-    written.append(folder / PAGE)
-    write_page(written[-1], page(paper, inlined), argument)
-    return tuple(written)
+    for result in paper.results:
+        for figure in result.item.figures:
+            report_progress(figure.source if figure.source != OURS else figure.name)
+            drawing = render_figure(figure, result.data)
+            paths.append(folder / f"{figure.name}.svg")
+            with whole(paths[-1]) as part:
+                part.write_text(svg(drawing), encoding="utf-8", newline="\n")
+            inlined[figure.name] = svg_inline(drawing, f"{sentence(figure.source)}. {figure.caption}")
+    paths.append(folder / PAGE)
+    write_page(paths[-1], page(paper, inlined), argument)
+    return tuple(paths)
 
 
-def page(paper: Paper, figures: dict[str, Markup]) -> str:
-    """The page, with the figures by name."""
+def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    paper : Paper
+        The results.
+    figures : Mapping[str, Markup]
+        {name: figure as an SVG element}.
+    """
     return render(
         "paper.html.j2",
         package="contactverif_paper",
         paper=paper,
         figures=figures,
-        drawings=[drawing for drawing in drawings(paper) if not drawing.name.startswith("defect")],
-        defects=[drawing for drawing in drawings(paper) if drawing.name.startswith("defect")],
-        said=Said,
+        agreements=Agreement,
         marks_of=MARKS,
         class_of=CLASSES,
-        choices=CHOICES,
+        counts={
+            agreement: sum(statement.agreement is agreement for statement in paper.statements)
+            for agreement in Agreement
+        },
+        statements_of={figure.name: statements_of(paper, figure.name) for figure in paper.figures},
+        lone_statements_of={result.item.name: lone_statements(result) for result in paper.results},
         reference=REFERENCE,
-        counts={verdict: sum(one.verdict is verdict for one in paper.statements) for verdict in Said},
-        about=_about(paper),
-        titles=_titles(paper),
-        scenes=list(dict.fromkeys(row.scene for row in paper.multipliers)),
-        multipliers=_by_legend(paper.multipliers),
-        rounding=max(row.rounding for table in paper.forces for row in table.rows),
+        sentence=sentence,
     )
+
+
+def statements_of(paper: Paper, figure: str) -> list[int]:
+    """Return the numbers of the statements that a figure shows."""
+    return [number for number, statement in enumerate(paper.statements) if statement.figure == figure]
+
+
+def lone_statements(result: ItemResult) -> list[int]:
+    """Return the numbers, within the item, of the statements that none of its own figures shows."""
+    own_figures = {figure.name for figure in result.item.figures}
+    return [number for number, statement in enumerate(result.statements) if statement.figure not in own_figures]
 
 
 def summary(paper: Paper) -> str:
-    """Every statement that does not merely note a silence, a line each."""
-    return "\n".join(
-        f"  {MARKS[one.verdict]} {one.verdict.mark:8} {one.figure}: {one.found}"
-        for one in paper.statements
-        if one.verdict is not Said.SILENT
-    )
+    """Return every statement that does not merely note a silence, a line each."""
+    return "\n".join(_line(statement) for statement in paper.statements if statement.agreement is not Agreement.SILENT)
 
 
-def _by_legend(rows: Sequence[MultiplierRow]) -> dict[str, list[MultiplierRow]]:
-    """{legend: its rows, a scene each}."""
-    found: dict[str, list[MultiplierRow]] = {}
-    for row in rows:
-        found.setdefault(row.member.legend, []).append(row)
-    return found
-
-
-def _titles(paper: Paper) -> dict[str, str]:
-    """{scene: what the paper calls it}, as the head of a column."""
-    return {"c-prime": "C′ (ours)"} | {patch.scene: patch.title.removeprefix("Case ") for patch in paper.patches}
-
-
-def _about(paper: Paper) -> dict[str, list[int]]:
-    """{drawing: numbers of the statements that it shows}."""
-    found: dict[str, list[int]] = {}
-    for number, statement in enumerate(paper.statements):
-        found.setdefault(statement.drawing, []).append(number)
-    return found
+def _line(statement: Statement) -> str:
+    verdict = f"{MARKS[statement.agreement]:3} {statement.agreement.words:17}"
+    condition = f". It holds if: {statement.condition}" if statement.condition else ""
+    return f"  {verdict} {statement.place}: {statement.result}{condition}"
 
 
 def svg(figure: Figure) -> str:
-    """The figure with its letters as paths, the same for the same figure, without what nothing is drawn from.
+    """Return the figure as SVG with its letters as paths: the same text for the same figure, and no unused parts.
 
     Lengths are rounded to a hundredth of a point, which nobody sees; matplotlib writes a millionth.
     """
@@ -153,14 +159,14 @@ def svg(figure: Figure) -> str:
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = re.sub(r"<!--.*?-->\s*", "", buffer.getvalue(), flags=re.DOTALL)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r'(?<= )(?:d|x|y)="[^"]*"|translate\([^)]*\)', _rounded, text)
-    text = re.sub(r'<g id="[^"]*"', "<g", text)  # to which nothing refers
+    text = re.sub(r'(?<= )(?:d|x|y)="[^"]*"|translate\([^)]*\)', _round_lengths, text)
+    text = re.sub(r'<g id="[^"]*"', "<g", text)  # Nothing refers to the ids of groups.
     text = re.sub(r'(?<= )style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
-    text = text.replace("stroke-dashoffset:0;", "")  # which it is anyway
+    text = text.replace("stroke-dashoffset:0;", "")  # Zero is the default.
     return "\n".join(line.strip() for line in text.splitlines()) + "\n"
 
 
-def _rounded(attribute: re.Match[str]) -> str:
-    """Its numbers with two decimals at most, and a blank for each end of a line."""
-    short = re.sub(r"-?\d+\.\d{3,}", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), attribute[0])
-    return " ".join(short.split())
+def _round_lengths(attribute: re.Match[str]) -> str:
+    """Return an attribute with two decimals at most, and a blank for each end of a line."""
+    rounded = re.sub(r"-?\d+\.\d{3,}", lambda digits: f"{float(digits[0]):.2f}".rstrip("0").rstrip("."), attribute[0])
+    return " ".join(rounded.split())

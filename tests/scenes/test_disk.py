@@ -18,7 +18,8 @@ from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, graded
-from contactverif_paper.disk_study import Pressed, difference, over_slopes, pressed
+from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk
+from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, PaperFormulation
 
 PAPER = DiskProblem()
 BASE = disk_on_foundation()
@@ -26,8 +27,8 @@ PENALTY_METHODS = ("nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced")
 
 
 @pytest.fixture(scope="module")
-def solved() -> dict[str, Pressed]:
-    return {name: pressed(name) for name in PENALTY_METHODS}
+def solved() -> dict[str, DiskSolution]:
+    return {name: solve_disk(PaperFormulation(name, name)) for name in PENALTY_METHODS}
 
 
 def corner_angles(body: Body) -> FloatArray:
@@ -143,7 +144,7 @@ def test_a_contact_that_the_meshes_are_not_made_for() -> None:
 
 
 @pytest.mark.parametrize("name", PENALTY_METHODS)
-def test_the_papers_numbers(name: str, solved: dict[str, Pressed]) -> None:
+def test_the_papers_numbers(name: str, solved: dict[str, DiskSolution]) -> None:
     """Fig. 38 ends at 1.61e6; the half-width is that on the layer, less the 1.6 % by which p/E compresses it."""
     found = solved[name]
     assert found.converged
@@ -152,7 +153,7 @@ def test_the_papers_numbers(name: str, solved: dict[str, Pressed]) -> None:
     assert found.half_width == pytest.approx(PAPER.winkler_contact().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
 
 
-def test_what_transfer_to_the_master_changes(solved: dict[str, Pressed]) -> None:
+def test_what_transfer_to_the_master_changes(solved: dict[str, DiskSolution]) -> None:
     """Fig. 39."""
     x, differences = difference(solved["vts-ppt"], solved["vts-me"])
     assert len(x) == 68
@@ -161,7 +162,7 @@ def test_what_transfer_to_the_master_changes(solved: dict[str, Pressed]) -> None
 
 
 @pytest.mark.parametrize("name", PENALTY_METHODS)
-def test_the_other_half_is_symmetrical(name: str, solved: dict[str, Pressed]) -> None:
+def test_the_other_half_is_symmetrical(name: str, solved: dict[str, DiskSolution]) -> None:
     """But for the one element that is on one side alone, far away."""
     found = solved[name]
     assert np.abs(found.pressure - found.pressure[::-1]).max() <= 1e-5 * found.peak
@@ -180,11 +181,11 @@ def test_nodal_forces_carry_the_load() -> None:
 
 def test_what_is_left_of_the_difference_falls_with_the_mesh_and_is_the_current_length() -> None:
     """With reference areas nothing is left but the mesh; with current ones what falls like the slope a/R."""
-    coarse, fine = (pressed("vts-me:area=reference", refine=refine).over_layer for refine in (1, 2))
+    coarse, fine = (solve_disk(REFERENCE_AREAS, refine=refine).excess for refine in (1, 2))
     assert 0 < fine < coarse / 2
     assert coarse <= 1e-3
-    steep, flat = over_slopes(("vts-me",), (1.0, 0.5), refine=1)
-    left = [one.over_layer - coarse for one in (steep, flat)]
+    steep, flat = (solve_disk(VTS_ME, flatter(slope)) for slope in (1.0, 0.5))
+    left = [one.excess - coarse for one in (steep, flat)]
     assert left[0] / left[1] == pytest.approx(2, rel=0.05)
     assert left[0] == pytest.approx(
         PAPER.winkler_contact().peak / PAPER.young[0], rel=0.15

@@ -21,7 +21,7 @@ from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 
-FAILS = 1e-2  # of the pressure
+FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")
 TABLE = {
     # formulation: (A1 and both A2), (B, Example 1), (C, C′, Example 1bis)
@@ -71,7 +71,7 @@ def test_the_table_is_whole() -> None:
 @pytest.mark.parametrize("name", PRINTED)
 @pytest.mark.parametrize("formulation", TABLE)
 def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
-    passes = next(said for group, said in zip(GROUPS, TABLE[formulation], strict=True) if name in group)
+    passes = next(row_passes for group, row_passes in zip(GROUPS, TABLE[formulation], strict=True) if name in group)
     error = error_of(formulation, name)
     if passes:
         assert error <= tolerance_of(name)
@@ -80,12 +80,12 @@ def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
 
 
 def multipliers(formulation: str, name: str) -> FloatArray:
-    """Of the solved scene (n_multipliers,), over the pressure."""
+    """Return the multipliers (n_multipliers,) of the solved scene, over the pressure."""
     scene = catalogue.make_scene(name)
     subject = load_formulation(formulation)
     assert isinstance(subject, Subject)
-    found: FloatArray = newton.solve(scene, subject.for_case(scene.case())).multipliers / scene.facts["pressure"]
-    return found
+    pressures: FloatArray = newton.solve(scene, subject.for_case(scene.case())).multipliers / scene.facts["pressure"]
+    return pressures
 
 
 @pytest.mark.parametrize("name", ["b", "c", "c-prime", "example-1", "example-1bis"])
@@ -100,9 +100,9 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
 ) -> None:
     """There are forces that it transmits exactly, by multipliers that are not uniform."""
     assert error_of("vts-me-lm", name) <= tolerance_of(name)
-    found = multipliers("vts-me-lm", name)
-    assert found.min() == pytest.approx(least, abs=1e-10)
-    assert found.max() == pytest.approx(most, abs=1e-10)
+    pressures = multipliers("vts-me-lm", name)
+    assert pressures.min() == pytest.approx(least, abs=1e-10)
+    assert pressures.max() == pytest.approx(most, abs=1e-10)
     (question,) = load_properties(["patch.flat.solve"])
     assert isinstance(question, Property)
     subject = load_formulation("vts-me-lm")

@@ -1,0 +1,170 @@
+"""Defect 2 of VTS-PPT as it is published: the forces jump between Eq. 6 and Box 3.
+
+Where an area of competence lies over one segment Eq. 6 holds, and nothing is lost; over several segments Box 3 loses
+1 − cos θ. So the forces jump when the end of an area passes a master node, by up to 1 − cos θ of the force of that
+virtual slave node. Here two areas meet over the node, and their jumps partly cancel.
+
+Source: Zavarise & De Lorenzis (2009), Eq. 6 and Box 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from contactverif.contract.arrays import FloatArray
+from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.figure_style import (
+    REFERENCE_LINE,
+    TWO_COLUMNS,
+    Series,
+    add_legend,
+    new_figure,
+    new_panels,
+    plot_logarithmic,
+    plot_series,
+    use_round_ticks,
+)
+from contactverif_paper.paper_formulations import PaperFormulation, name_variables
+from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_paper.tilted_segment import DEPTH, TILTS, nodal_forces
+from contactverif_reports.html.pages import number
+from contactverif_reports.netcdf.variables import numbers
+
+FORMULATIONS = (formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
+SLIDING_TILT = 0.3  # Radians: the tilt at which the area slides past the node.
+SHIFTS = np.linspace(-0.06, 0.06, 121) + 2.0**-12  # The end of the area past the node over the slave's length.
+_NEAR = 2.0**-40  # The distance to either side of the jump over the slave's length.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Jump:
+    """The jump of the forces where the end of an area of competence passes a master node.
+
+    Attributes
+    ----------
+    sliding : Series
+        Over the position of that end: the force on the master over that on the slave, at `SLIDING_TILT`.
+    jump : Series
+        Over the tilt (rad): the largest jump of a nodal force, over the slave's force.
+    formula : FloatArray, shape (n_tilts,)
+        The same by formula, for the printed algorithm.
+    """
+
+    sliding: Series
+    jump: Series
+    formula: FloatArray
+
+
+def compute(report_progress: Progress) -> Jump:
+    """Compute forces beside the node and on both sides of it."""
+    report_progress("jump between Eq. 6 and Box 3")
+    sliding = np.array([[_transmission(row, SLIDING_TILT, shift) for shift in SHIFTS] for row in FORMULATIONS])
+    jumps = np.array([[_jump(row, theta) for theta in TILTS] for row in FORMULATIONS])
+    return Jump(
+        Series(FORMULATIONS, SHIFTS, sliding),
+        Series(FORMULATIONS, TILTS, jumps),
+        np.array([jump_by_formula(theta) for theta in TILTS]),
+    )
+
+
+def jump_by_formula(theta: float) -> float:
+    """Return the largest jump of the printed algorithm, over the slave's force.
+
+    Eq. 6 gives (1 − ξ) F and ξ F, Box 3 cos θ of them. Left of the node the first area lies over one segment and the
+    second over two, right of it the other way round; both forces share the node in the middle.
+    """
+    depth = DEPTH + np.array([0.25, 0.75]) * np.sin(theta)
+    node = np.cos(theta) / 2
+    lengths = np.array([node + 1.0, 2.0 - node])
+    far_shares = np.cos(theta) / 4 / lengths  # The share of each force that the far node of its segment takes.
+    force = depth / depth.sum()
+    shared = force[1] * (1 - far_shares[1]) - force[0] * (1 - far_shares[0])
+    return float((1 - np.cos(theta)) * max(force[0] * far_shares[0], force[1] * far_shares[1], abs(shared)))
+
+
+def statements(result: Jump) -> tuple[Statement, ...]:
+    """Say how large the jump is."""
+    jumps = [result.jump.near(formulations.VTS_PPT, theta) for theta in (0.1, 0.3)]
+    return (
+        Statement(
+            "Eq. 6 and Box 3",
+            "one segment under the area: Eq. 6; several: Box 3; nothing is said of the change from one to the other",
+            f"nodal forces jump: in the case drawn by {number(jumps[0], 2)} of the slave’s force at θ = 0.1 and by "
+            f"{number(jumps[1], 2)} at 0.3; in others by up to 1 − cos θ of a virtual slave node’s own force, "
+            f"{1 - np.cos(0.1):.2g} and {1 - np.cos(0.3):.2g}",
+            Agreement.DEFECT if max(jumps) > 1e-6 else Agreement.AGREES,
+            "defect-jump",
+        ),
+    )
+
+
+def plot(result: Jump) -> Figure:
+    """Draw the transmitted force beside the node, and the jump over the tilt."""
+    figure = new_figure(TWO_COLUMNS, 3.6)
+    sliding, jump = new_panels(figure, 2)
+    plot_series(sliding, result.sliding, markers=False)
+    sliding.set_xlabel("area’s end past the node\n(slave lengths)")
+    sliding.set_ylabel("master force / slave force (–)")
+    sliding.set_title(f"θ = {SLIDING_TILT:g}")
+    use_round_ticks(sliding)
+    jump.plot(TILTS[1:], result.formula[1:], **REFERENCE_LINE)
+    plot_logarithmic(jump, result.jump)
+    jump.set_xlabel("tilt θ (rad)")
+    jump.set_ylabel("largest jump / slave force (–)")
+    add_legend(figure, FORMULATIONS, reference="formula, printed algorithm", columns=2)
+    return figure
+
+
+def datasets(result: Jump) -> dict[str, xr.Dataset]:
+    """Return forces and jumps."""
+    table = name_variables(FORMULATIONS) | {
+        "tilt": numbers(["tilt"], TILTS, "tilt of the slave", "rad"),
+        "jump": numbers(["formulation", "tilt"], result.jump.values, "largest jump over the slave's force", "1"),
+        "known": numbers(["tilt"], result.formula, "the jump of the printed algorithm, by formula", "1"),
+        "shift": numbers(["shift"], SHIFTS, "end of the area past the node over the slave's length", "1"),
+        "transmitted": numbers(
+            ["formulation", "shift"], result.sliding.values, "force on the master over that on the slave", "1"
+        ),
+    }
+    return {"": xr.Dataset(table, attrs={"tilt_of_transmitted": SLIDING_TILT})}
+
+
+def _master(theta: float, shift: float) -> Sequence[float]:
+    """Return a master with one inner node, `shift` behind the beginning of the second virtual slave node's area."""
+    return (-1.0, np.cos(theta) / 2 + shift, 2.0)
+
+
+def _transmission(formulation: PaperFormulation, theta: float, shift: float) -> float:
+    """Return the size of the force on the master over that on the slave."""
+    _, forces = nodal_forces(formulation, theta, _master(theta, shift))
+    slave, master = (np.linalg.norm(forces[side].sum(axis=0)) for side in (slice(0, 2), slice(2, None)))
+    return float(master / slave)
+
+
+def _jump(formulation: PaperFormulation, theta: float) -> float:
+    """Return the largest jump of a nodal force where two areas meet over a master node, over the slave's force."""
+    before, behind = (nodal_forces(formulation, theta, _master(theta, sign * _NEAR))[1] for sign in (-1, 1))
+    return float(np.linalg.norm(behind - before, axis=1).max() / np.linalg.norm(before[:2].sum(axis=0)))
+
+
+ITEM = Item(
+    name="defect_jump",
+    title="Defect 2: forces jump between Eq. 6 and Box 3",
+    compute=compute,
+    statements=statements,
+    datasets=datasets,
+    figures=(
+        PaperFigure(
+            "defect-jump",
+            OURS,
+            "(a) The force that reaches the master while the end of an area of competence slides past a master node, "
+            "and (b) the largest jump of a nodal force there.",
+            plot,
+        ),
+    ),
+)

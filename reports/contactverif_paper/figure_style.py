@@ -1,0 +1,158 @@
+"""The common style of all figures of the paper: sizes, type, pens, panels and legends. Slow to import.
+
+Figures are one or two columns of a journal wide. Letters stay legible at half size. Curves differ by line and marker,
+so that they read in grey; a formulation has the same pen in every figure. Axes have the limits that the paper prints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from contactverif.contract.arrays import FloatArray
+from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_item import PaperFigure
+from contactverif_reports.draw.scene_curves import choose_pen
+
+ONE_COLUMN, TWO_COLUMNS = 4.2, 7.2  # Widths of a figure in inches.
+LETTERS = 11  # Points: 5.5 at half size.
+REFERENCE_LINE: dict[str, Any] = {"color": "0.75", "linewidth": 2.6, "zorder": 1}  # The style of an exact answer.
+_STYLE: dict[Any, Any] = {
+    "font.size": LETTERS,
+    "axes.labelsize": LETTERS,
+    "axes.titlesize": LETTERS,
+    "xtick.labelsize": LETTERS,
+    "ytick.labelsize": LETTERS,
+    "legend.fontsize": LETTERS,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "legend.columnspacing": 1.4,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "hatch.linewidth": 0.4,
+    "lines.linewidth": 1.2,
+}
+_LOWEST = 1e-17  # A number that is exactly zero is drawn here on a logarithmic axis.
+_ROUND_STEPS = (1, 2, 5, 10)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """A number of each formulation over a parameter.
+
+    Attributes
+    ----------
+    formulations : tuple[PaperFormulation, ...]
+        The rows.
+    at : FloatArray, shape (n_places,)
+        The parameter.
+    values : FloatArray, shape (n_formulations, n_places)
+        The numbers.
+    """
+
+    formulations: tuple[PaperFormulation, ...]
+    at: FloatArray
+    values: FloatArray
+
+    def row(self, formulation: PaperFormulation) -> FloatArray:
+        """Return the numbers (n_places,) of one formulation."""
+        values: FloatArray = self.values[self.formulations.index(formulation)]
+        return values
+
+    def near(self, formulation: PaperFormulation, place: float) -> float:
+        """Return the number of one formulation at the place that is nearest."""
+        return float(self.row(formulation)[np.argmin(np.abs(self.at - place))])
+
+
+def render_figure(figure: PaperFigure, data: Any) -> Figure:
+    """Draw a figure of an item in the common style."""
+    with matplotlib.rc_context(_STYLE):
+        return figure.plot(data)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of that size in inches."""
+    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05))
+
+
+def new_panels(figure: Figure, count: int, **options: Any) -> list[Axes]:
+    """Return `count` panels side by side, with a letter each if there are several."""
+    panels = list(figure.subplots(1, count, squeeze=False, **options)[0])
+    if count > 1:
+        for axes, letter in zip(panels, "abcdef", strict=False):
+            axes.set_title(f"({letter})", loc="left", fontweight="bold")
+    return panels
+
+
+def line_style(formulation: PaperFormulation, n_points: int, **more: Any) -> dict[str, Any]:
+    """Return the arguments of a plot of this formulation; a curve of many points has no markers."""
+    return choose_pen(formulation.pen).look(n_points) | {"markersize": 4.6, "markeredgewidth": 0.9, "zorder": 3} | more
+
+
+def add_legend(
+    figure: Figure,
+    formulations: Sequence[PaperFormulation],
+    *,
+    reference: str = "",
+    columns: int = 3,
+    remarks: Mapping[PaperFormulation, str] = MappingProxyType({}),
+) -> None:
+    """Put a legend below all panels.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    formulations : Sequence[PaperFormulation]
+        The formulations, in order.
+    reference : str
+        The legend of the exact answer; empty if there is none.
+    columns : int
+        The largest number of columns.
+    remarks : Mapping[PaperFormulation, str]
+        {formulation: words behind its legend}.
+    """
+    handles = [
+        Line2D([], [], label=f"{formulation.legend}{remarks.get(formulation, '')}", **line_style(formulation, 1))
+        for formulation in formulations
+    ]
+    if reference:
+        handles.append(Line2D([], [], label=reference, **REFERENCE_LINE))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(columns, len(handles)))
+
+
+def plot_series(axes: Axes, series: Series, *, markers: bool = True) -> None:
+    """Plot each row of the series."""
+    for formulation, values in zip(series.formulations, series.values, strict=True):
+        axes.plot(series.at, values, **line_style(formulation, 1 if markers else 1000))
+
+
+def plot_logarithmic(axes: Axes, series: Series) -> None:
+    """Plot each row over a logarithmic axis; zeros are drawn at its lower end."""
+    for formulation, values in zip(series.formulations, series.values, strict=True):
+        axes.plot(series.at, np.maximum(values, _LOWEST), **line_style(formulation, 1))
+    use_decades(axes)
+
+
+def use_decades(axes: Axes, n_ticks: int = 6) -> None:
+    """Make the vertical axis logarithmic, with few ticks."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(numticks=n_ticks))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def use_round_ticks(axes: Axes, n_ticks: int = 5) -> None:
+    """Give both axes a few round ticks."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(n_ticks, steps=list(_ROUND_STEPS)))

@@ -1,0 +1,250 @@
+"""Computes the force tables of the paper in exact rationals: what each formulation makes of a uniform pressure p = 1.
+
+Formulations compute in floats. On these states (lengths are small integers, the penetration is 1/16, ε̂ |g| = 1) their
+forces are rationals with small denominators up to a few roundings. So the rational is recovered and the rest checked.
+Items `case_a1`, `case_b` and `case_c` use this file.
+
+Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.scenes.named_states import named_case
+from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
+from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.variables import numbers
+
+FORMULATIONS = (
+    formulations.NTS,
+    formulations.NTS_AR,
+    formulations.VTS_ME,
+    formulations.VTS_PPT,
+    formulations.BALANCED,
+    formulations.STS,
+    formulations.MORTAR,
+)
+EXACT = PaperFormulation("exact", "")
+_LARGEST_DENOMINATOR = 60
+_ROUNDINGS = 256  # A force is the sum of a few dozen terms.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forces:
+    """The nodal forces of a uniform pressure p = 1, in rationals; forces per unit of thickness over p.
+
+    Attributes
+    ----------
+    formulation : PaperFormulation
+        Who transmits them.
+    slave, master : tuple[Fraction, ...]
+        On the nodes from left to right, as they are transferred to the other surface.
+    points : tuple[Fraction, ...]
+        At the virtual slave nodes; empty if the formulation has none.
+    rounding : float
+        The largest difference of a computed float from its rational.
+    printed : tuple[Fraction, ...]
+        What the paper prints for the master; empty where it is silent.
+    """
+
+    formulation: PaperFormulation
+    slave: tuple[Fraction, ...]
+    master: tuple[Fraction, ...]
+    points: tuple[Fraction, ...] = ()
+    rounding: float = 0.0
+    printed: tuple[Fraction, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceTable:
+    """The forces of one case: lengths of its segments, the consistent forces, and what each formulation transmits."""
+
+    case: str
+    title: str
+    slave: tuple[float, ...]
+    master: tuple[float, ...]
+    exact: Forces
+    rows: tuple[Forces, ...]
+
+    @property
+    def all_rows(self) -> tuple[Forces, ...]:
+        """The exact forces, and the rows behind them."""
+        return (self.exact, *self.rows)
+
+    @property
+    def rounding(self) -> float:
+        """The largest rounding of all rows."""
+        return max(row.rounding for row in self.rows)
+
+    def row(self, formulation: PaperFormulation) -> Forces:
+        """Return the row of a formulation."""
+        return next(row for row in self.rows if row.formulation == formulation)
+
+
+def force_table(name: str, title: str, exact: str, printed: Mapping[PaperFormulation, str]) -> ForceTable:
+    """Compute the table of one case.
+
+    Parameters
+    ----------
+    name : str
+        Name of the state (`named_states`).
+    title : str
+        What the paper calls it.
+    exact : str
+        The forces on the master that the paper prints as exact, from left to right: "3/2 3 7/2 3 1".
+    printed : Mapping[PaperFormulation, str]
+        The same for each formulation that the paper shows.
+    """
+    case = named_case(name)
+    interface, n_slave = case.interface, case.interface.n_slave_nodes
+    along = case.parameters["along"]
+    weights = uniform_pressure_weights_exact(interface, along)
+    from_left = np.argsort(along[:n_slave]), n_slave + np.argsort(along[n_slave:])
+    exact_slave, exact_master = (tuple(weights[node] for node in side.tolist()) for side in from_left)
+    rows = [_forces(case, row, *from_left, _fractions(printed.get(row, ""))) for row in FORMULATIONS]
+    lengths = [tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:])]
+    return ForceTable(
+        name,
+        title,
+        lengths[0],
+        lengths[1],
+        Forces(EXACT, exact_slave, exact_master, printed=_fractions(exact)),
+        tuple(rows),
+    )
+
+
+def force_statement(table: ForceTable, place: str, claim: str) -> Statement:
+    """Compare all printed fractions of a table with the computed ones."""
+    printed = [row for row in table.rows if row.printed]
+    wrong = [row.formulation.legend for row in table.all_rows if row.printed and row.printed != row.master]
+    result = "the consistent forces are the printed ones"
+    if printed:
+        n_fractions = sum(len(row.printed) for row in printed)
+        result += f", and so are all {n_fractions} fractions of the formulations on the master"
+    if wrong:
+        result = f"other fractions: {', '.join(wrong)}"
+    return Statement(place, f"{table.title}: {claim}", result, Agreement.decide(not wrong))
+
+
+def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple[Fraction, ...], float]:
+    """Return the rationals that the floats are roundings of, and the largest difference.
+
+    Parameters
+    ----------
+    values : Iterable[float] | FloatArray
+        The floats.
+    scale : float
+        The sum of all forces, by which rounding is judged.
+
+    Raises
+    ------
+    ArithmeticError
+        If a float is further from every rational with a small denominator than rounding explains.
+    """
+    floats = [float(value) for value in values]
+    nearest = tuple(Fraction(value).limit_denominator(_LARGEST_DENOMINATOR) for value in floats)
+    error = max((abs(float(Fraction(a) - exact)) for a, exact in zip(floats, nearest, strict=True)), default=0.0)
+    if not error <= _ROUNDINGS * UNIT_ROUNDOFF * scale:
+        raise ArithmeticError(f"forces {floats} are no rationals with denominators up to {_LARGEST_DENOMINATOR}")
+    return nearest, error
+
+
+def force_page_table(table: ForceTable) -> PageTable:
+    """Return the table of the page; consistent forces are bold."""
+    slave, master = (", ".join(f"{length:g}" for length in side) for side in (table.slave, table.master))
+    return PageTable(
+        f"{table.title}: nodal forces over p from left to right; slave segments {slave}; master segments {master}. "
+        f"Bold: the consistent forces. Largest rounding: {table.rounding:.1e}",
+        ("Formulation", "Slave nodes", "Virtual slave nodes", "Master nodes", "Printed for the master"),
+        tuple(
+            (
+                Cell((row.formulation.legend,)),
+                _cell(row.slave, table.exact.slave),
+                _cell(row.points, ()),
+                _cell(row.master, table.exact.master),
+                _printed_cell(row),
+            )
+            for row in table.all_rows
+        ),
+    )
+
+
+def force_dataset(table: ForceTable, figure: str) -> xr.Dataset:
+    """Return the fractions as numerators and denominators (formulation, node)."""
+    variables = name_variables(row.formulation for row in table.all_rows)
+    for name, dim, meaning in (
+        ("slave", "slave_node", "transferred by the slave's nodes"),
+        ("master", "master_node", "transferred by the master's nodes"),
+        ("points", "point", "on the virtual slave nodes"),
+        ("printed", "master_node", "on the master's nodes as the paper prints it"),
+    ):
+        rows = [getattr(row, name) for row in table.all_rows]
+        variables |= _fraction_variables(name, ["formulation", dim], rows, meaning)
+    for side in ("slave", "master"):
+        variables[f"{side}_length"] = numbers(
+            [f"{side}_segment"], getattr(table, side), f"length of the {side}'s segments", schema.LENGTH
+        )
+    rounding = [row.rounding for row in table.all_rows]
+    variables["rounding"] = numbers(
+        ["formulation"], rounding, "largest difference of a force from its rational", schema.LENGTH
+    )
+    comment = "forces of a uniform pressure p = 1, over p, in rationals; the first row is exact; from left to right"
+    return xr.Dataset(variables, attrs={"figure": figure, "comment": comment})
+
+
+def _forces(
+    case: Case, formulation: PaperFormulation, slave: IntArray, master: IntArray, printed: tuple[Fraction, ...]
+) -> Forces:
+    plugin = subject_of(formulation).with_penalty(case.penalty)  # NTS gets it too: ε |g| = 1 at each node.
+    pairing = plugin.pair(case.interface, case.z)
+    forces = -plugin.residual(case.interface, pairing, case.z).reshape(-1, 2)  # They push the slave upwards.
+    scale = float(np.abs(forces).sum())
+    on_slave, slave_rounding = rationals(forces[slave, 1], scale)
+    on_master, master_rounding = rationals(-forces[master, 1], scale)
+    at_points = np.zeros(0)
+    if formulation in formulations.VIRTUAL:
+        points = plugin.contact_points(case.interface, pairing, case.z)
+        at_points = (points.pressure * points.weight)[np.argsort(points.position[:, 0])]
+    on_points, point_rounding = rationals(at_points, scale)
+    rounding = max(slave_rounding, master_rounding, point_rounding)
+    return Forces(formulation, on_slave, on_master, on_points, rounding, printed)
+
+
+def _fractions(text: str) -> tuple[Fraction, ...]:
+    return tuple(Fraction(word) for word in text.split())
+
+
+def _cell(values: Sequence[Fraction], exact: Sequence[Fraction]) -> Cell:
+    return Cell(tuple(map(str, values)) or ("–",), tone="row strong" if values and values == exact else "row")
+
+
+def _printed_cell(row: Forces) -> Cell:
+    if not row.printed:
+        return Cell(("–",), tone="row")
+    same = row.printed == row.master
+    return Cell((*map(str, row.printed), "✓ same" if same else "✗ differs"), tone=f"row {'good' if same else 'bad'}")
+
+
+def _fraction_variables(
+    name: str, dims: Sequence[str], rows: Sequence[tuple[Fraction, ...]], meaning: str
+) -> dict[str, xr.Variable]:
+    """Return numerators and denominators, 0 / 0 where there is nothing."""
+    parts = np.zeros((2, len(rows), max(map(len, rows))), dtype=np.int32)
+    for place, row in enumerate(rows):
+        parts[:, place, : len(row)] = [[x.numerator for x in row], [x.denominator for x in row]]
+    comment = "0 over 0: nothing there"
+    return {
+        f"{name}_numerator": numbers(dims, parts[0], f"force {meaning}: numerator", schema.LENGTH, comment),
+        f"{name}_denominator": numbers(dims, parts[1], f"force {meaning}: denominator", "1", comment),
+    }

@@ -1,0 +1,141 @@
+"""Free ends: what becomes of an area of competence that overhangs the end of the master. The paper is silent.
+
+No case of the paper has such an area, and Boxes 2 and 3 do not say what to do. So what fails here is our reading of a
+silent text, not the paper. Our reading is `free_end=truncate`: at a free end of the master, where several segments are
+involved, the area is cut on the master's side only, and the slave keeps its force.
+
+Source: Zavarise & De Lorenzis (2009), Boxes 2 and 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from contactverif.mechanics import newton
+from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import Rectangle, block
+from contactverif.scenes.uniform_stress import stress_error
+from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.figure_style import TWO_COLUMNS, Series, add_legend, new_figure, new_panels, plot_logarithmic
+from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_reports.netcdf.variables import numbers
+
+FORMULATIONS = (
+    formulations.NTS_AR,
+    formulations.VTS_ME,
+    formulations.VTS_PPT,
+    formulations.BALANCED,
+    formulations.STS,
+    formulations.MORTAR,
+)
+OVERHANGS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])  # Parts of a slave segment.
+_YOUNG, _POISSON, _PRESSURE = 1e4, 0.3, 100.0
+_SEGMENT = 2.0  # The length of a slave segment.
+
+
+def compute(report_progress: Progress) -> Series:
+    """Compute the largest error of a stress over the pressure, over the part of a slave segment that overhangs."""
+    report_progress("free ends")
+    errors = np.array([[_error(formulation, part) for part in OVERHANGS] for formulation in FORMULATIONS])
+    return Series(FORMULATIONS, OVERHANGS, errors)
+
+
+def overhanging(part: float) -> Scene:
+    """Return a slave block that overhangs a narrower master at both ends, by that part of a slave segment.
+
+    The pressure acts on what overhangs of the slave too, so that the exact solution is a uniform stress.
+    """
+    slave_x, layers = np.linspace(-6.0, 6.0, 7), np.linspace(0.0, 4.0, 3)
+    edge = 4.0 - _SEGMENT * part  # It lies inside the slave segment from 2 to 4.
+    master_x = np.linspace(-edge, edge, 6)
+    penalty = 10 * _YOUNG / _SEGMENT
+    upper = block(
+        Rectangle(slave_x, layers, young=_YOUNG, poisson=_POISSON),
+        contact="bottom",
+        pressure=_PRESSURE,
+        lowered=_PRESSURE / penalty,
+        name="slave",
+        contact_range=(-edge, edge),
+    )
+    lower = block(
+        Rectangle(master_x, layers - 4.0, young=_YOUNG, poisson=_POISSON), contact="top", approach=0.0, name="master"
+    )
+    facts = {
+        "along": np.concatenate([slave_x, master_x]),
+        "direction": np.array([1.0, 0.0]),
+        "compliance": np.array([4.0, 4.0]) / upper.oedometric_modulus,
+        "pressure": np.array(_PRESSURE),
+    }
+    return Scene((upper, lower), penalty=penalty, facts=facts)
+
+
+def statements(series: Series) -> tuple[Statement, ...]:
+    """Say what our reading leads to."""
+    largest = float(np.nanmax(series.row(formulations.VTS_PPT)))
+    balanced = float(np.nanmax(series.row(formulations.BALANCED)))
+    return (
+        Statement(
+            "Boxes 2, 3",
+            "nothing is said of an area of competence that overhangs the end of the master",
+            "with our reading (cut at the free end on the master’s side only, free_end=truncate) the patch test fails, "
+            f"with errors of the stress up to {largest:.2g} of the pressure; with vts-ppt-balanced, which takes only "
+            f"what faces the master into the area, errors are {balanced:.1e} at most",
+            Agreement.SILENT,
+            "free-ends",
+        ),
+    )
+
+
+def plot(series: Series) -> Figure:
+    """Draw the errors over the overhang."""
+    figure = new_figure(TWO_COLUMNS, 3.8)
+    (axes,) = new_panels(figure, 1)
+    plot_logarithmic(axes, series)
+    axes.set_xlabel("part of a slave segment that overhangs the master (–)")
+    axes.set_ylabel("largest error of the stress / p (–)")
+    add_legend(figure, FORMULATIONS, columns=3)
+    return figure
+
+
+def datasets(series: Series) -> dict[str, xr.Dataset]:
+    """Return the errors."""
+    table = name_variables(FORMULATIONS) | {
+        "overhang": numbers(["overhang"], OVERHANGS, "part of a slave segment that overhangs", "1"),
+        "stress_error": numbers(
+            ["formulation", "overhang"], series.values, "largest error of a stress over the pressure", "1", fill=np.nan
+        ),
+    }
+    return {"": xr.Dataset(table)}
+
+
+def _error(formulation: PaperFormulation, part: float) -> float:
+    """Return the largest error of a stress over the pressure; NaN where Newton's method ends at no solution."""
+    scene = overhanging(part)
+    trace = newton.solve(scene, subject_of(formulation).for_case(scene.case()))
+    return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
+
+
+ITEM = Item(
+    name="free_ends",
+    title="Free ends of the master: the paper is silent",
+    compute=compute,
+    statements=statements,
+    datasets=datasets,
+    figures=(
+        PaperFigure(
+            "free-ends",
+            OURS,
+            "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. Half a "
+            "segment is an area of competence: nothing is cut there.",
+            plot,
+        ),
+    ),
+    choices={
+        "Free ends of the master": "free_end=truncate: where several segments are involved, the area of competence is "
+        "cut at a free end on the master’s side only; elsewhere Box 3 holds as printed",
+        "Ties at a vertex, feet past a free end, the end of a walk": "see plugins/README.md and the docstrings there",
+    },
+)

@@ -1,0 +1,70 @@
+"""The formulations that the paper compares, under the paper's names, and some of ours beside them.
+
+A formulation has two names here: `legend`, which the paper's figures use, and `name`, which the command line uses. Its
+`pen` is the number of its line style; it is the same in every figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+
+import xarray as xr
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.run.registry import load_formulation
+from contactverif_reports.netcdf.variables import words
+
+
+@dataclass(frozen=True, slots=True)
+class PaperFormulation:
+    """A formulation with its legend, its name on the command line, and the number of its pen."""
+
+    legend: str
+    name: str
+    pen: int = 0
+
+
+NTS = PaperFormulation("NTS", "nts", 3)
+NTS_AR = PaperFormulation("NTS-AR", "nts-ar", 1)
+TWO_PASS = PaperFormulation("two-pass NTS-AR", "two-pass/nts-ar", 2)
+VTS_G = PaperFormulation("VTS-G", "vts-g", 5)
+VTS_ME = PaperFormulation("VTS-ME", "vts-me", 4)
+BASIC = PaperFormulation("VTS-PPT basic", "vts-ppt-basic", 2)
+VTS_PPT = PaperFormulation("VTS-PPT", "vts-ppt", 0)
+BALANCED = PaperFormulation("VTS-PPT balanced (ours)", "vts-ppt-balanced", 2)
+STS = PaperFormulation("segment-to-segment", "sts", 3)
+MORTAR = PaperFormulation("mortar", "mortar", 5)
+DUAL = PaperFormulation("dual mortar", "mortar-dual", 3)
+CHEN_HISADA = PaperFormulation("Chen–Hisada", "chen-hisada", 1)
+REFERENCE_AREAS = PaperFormulation("VTS-ME, reference areas", "vts-me:area=reference", 1)
+
+# The formulations with virtual slave nodes; a figure shows their pressures at these nodes.
+VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
+
+
+@cache
+def subject_of(formulation: PaperFormulation) -> Subject:
+    """Load the formulation.
+
+    Raises
+    ------
+    MisuseError
+        If it does not load.
+    """
+    loaded = load_formulation(formulation.name)
+    if isinstance(loaded, NotLoaded):
+        raise MisuseError("formulation", f"{formulation.name}, not loaded: {loaded.reason}", "one that loads")
+    return loaded
+
+
+def name_variables(formulations: Iterable[PaperFormulation]) -> dict[str, xr.Variable]:
+    """Return the variables `formulation` and `legend` of a dataset with the dimension `formulation`."""
+    rows = list(formulations)
+    return {
+        "formulation": words(["formulation"], [row.name for row in rows], "formulation, as on the command line"),
+        "legend": words(["formulation"], [row.legend for row in rows], "its name in the paper's legends"),
+    }

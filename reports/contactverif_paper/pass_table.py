@@ -1,0 +1,198 @@
+"""The table of who passes the elastic patch test: every formulation on every scene, at the moderate penalty ε̂ = 10 E/h.
+
+Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1, with Figs. 9–12, 17, 18, 21, 22, 32, 33, 35 and 36.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.scenes import catalogue
+from contactverif.scenes.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.paper_formulations import PaperFormulation, name_variables
+from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
+from contactverif_paper.patch_solutions import FAILS, moderate_error
+from contactverif_reports.html.pages import number
+from contactverif_reports.netcdf.variables import codes, numbers, words
+
+FORMULATIONS = (
+    formulations.NTS,
+    formulations.NTS_AR,
+    formulations.TWO_PASS,
+    formulations.VTS_G,
+    formulations.VTS_ME,
+    formulations.BASIC,
+    formulations.VTS_PPT,
+    formulations.BALANCED,
+    formulations.CHEN_HISADA,
+    formulations.STS,
+    formulations.MORTAR,
+    formulations.DUAL,
+)
+SCENES: Mapping[str, str] = {  # {scene: head of its column}
+    "a1": "A1",
+    "a2-uniform": "A2, uniform mesh",
+    "a2-graded": "A2, graded mesh",
+    "b": "B",
+    "example-1": "Example 1",
+    "c": "C",
+    "c-prime": "C′ (ours)",
+    "example-1bis": "Example 1bis",
+}
+PASSES, FAILURE, SILENT = 1, 0, -1
+_NORMAL, _NON_MATCHING = ("a1", "a2-uniform", "a2-graded"), ("b", "c", "example-1", "example-1bis")
+PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says, by scene; else it is silent.
+    formulations.NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
+    formulations.NTS_AR: dict.fromkeys(_NORMAL, PASSES) | dict.fromkeys(_NON_MATCHING, FAILURE),
+    formulations.TWO_PASS: dict.fromkeys(_NON_MATCHING, FAILURE),
+    formulations.VTS_ME: dict.fromkeys(("b", "example-1"), PASSES) | dict.fromkeys(("c", "example-1bis"), FAILURE),
+    formulations.VTS_PPT: dict.fromkeys(("c", "example-1bis"), PASSES),
+    formulations.BASIC: {"c": PASSES},
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PassTable:
+    """The largest error of a stress over the pressure, and what the paper says.
+
+    Attributes
+    ----------
+    errors : FloatArray, shape (n_formulations, n_scenes)
+        The errors; NaN where Newton's method ended at no solution.
+    tolerances : FloatArray, shape (n_scenes,)
+        What roundoff explains.
+    printed : IntArray, shape (n_formulations, n_scenes)
+        PASSES, FAILURE or SILENT.
+    """
+
+    errors: FloatArray
+    tolerances: FloatArray
+    printed: IntArray
+
+    @property
+    def verdicts(self) -> np.ndarray:
+        """The verdicts (n_formulations, n_scenes): pass, fail, between, or no solution."""
+        conditions = [self.errors <= self.tolerances, self.errors > FAILS, np.isnan(self.errors)]
+        return np.select(conditions, ["pass", "fail", "no solution"], "between")
+
+    @property
+    def same(self) -> np.ndarray:
+        """True if the paper says the same (n_formulations, n_scenes); False also where it is silent."""
+        same: np.ndarray = np.where(self.printed == PASSES, self.verdicts == "pass", self.verdicts == "fail")
+        same &= self.printed != SILENT
+        return same
+
+
+def compute(report_progress: Progress) -> PassTable:
+    """Solve every scene with every formulation."""
+    errors = np.full((len(FORMULATIONS), len(SCENES)), np.nan)
+    for row, formulation in enumerate(FORMULATIONS):
+        report_progress(f"patch tests of {formulation.name}")
+        errors[row] = [moderate_error(formulation, scene) for scene in SCENES]
+    printed = [[PRINTED.get(formulation, {}).get(scene, SILENT) for scene in SCENES] for formulation in FORMULATIONS]
+    scenes = [catalogue.make_scene(scene) for scene in SCENES]
+    tolerances = np.array([condition_tolerance(scene, scene.penalty) for scene in scenes])
+    return PassTable(errors, tolerances, np.array(printed))
+
+
+def statements(table: PassTable) -> tuple[Statement, ...]:
+    """Count the verdicts that the paper shares."""
+    spoken = table.printed != SILENT
+    names = list(SCENES)
+    wrong = [
+        f"{FORMULATIONS[row].legend} on {names[column]}" for row, column in np.argwhere(spoken & ~table.same).tolist()
+    ]
+    result = f"{int(table.same.sum())} of {int(spoken.sum())} verdicts are the same"
+    result += f"; others: {', '.join(wrong)}" if wrong else ""
+    return (
+        Statement(
+            "Figs. 9–12, 17, 18, 21, 22, 32, 33, 35, 36",
+            "NTS fails everywhere; NTS-AR passes where each slave segment faces one master segment; VTS-ME passes "
+            "where each area of competence does; VTS-PPT passes C and Example 1bis; two-pass NTS-AR fails",
+            result,
+            Agreement.decide(not wrong),
+        ),
+        Statement(
+            "Sections 4, 5, 7.1",
+            "no numbers are given for errors, materials, supports, heights or penalties of the patch tests",
+            _gap(table),
+            Agreement.SILENT,
+        ),
+    )
+
+
+def _gap(table: PassTable) -> str:
+    between = int((table.verdicts == "between").sum())
+    if between:
+        n_errors = table.errors.size
+        return f"{between} of {n_errors} errors of the stress lie between roundoff and {FAILS:g} at ε̂ = 10 E/h"
+    return f"errors of the stress are at roundoff or above {FAILS:g} at ε̂ = 10 E/h; nothing lies between"
+
+
+def tables(table: PassTable) -> tuple[PageTable, ...]:
+    """Return the table of the page."""
+    return (
+        PageTable(
+            "Elastic patch tests of Sections 4, 5 and 7.1: largest error of a stress over the pressure",
+            ("Formulation", *SCENES.values()),
+            tuple(
+                (
+                    Cell((formulation.legend,)),
+                    *(_cell(table, row, column) for column in range(len(SCENES))),
+                )
+                for row, formulation in enumerate(FORMULATIONS)
+            ),
+        ),
+    )
+
+
+def _cell(table: PassTable, row: int, column: int) -> Cell:
+    word = str(table.verdicts[row, column])
+    text = {"pass": "✓ pass", "fail": "✗ fail"}.get(word, word)
+    if table.printed[row, column] != SILENT:
+        text += " =" if table.same[row, column] else " ≠"
+    tone = {"pass": "good", "fail": "bad"}.get(word, "")
+    return Cell((text,), (number(float(table.errors[row, column]), 2),), f"row {tone}")
+
+
+def datasets(table: PassTable) -> dict[str, xr.Dataset]:
+    """Return errors, tolerances and what the paper says."""
+    dims = ["formulation", "scene"]
+    long_name = "largest error of a stress at a Gauss point over the pressure"
+    no_solution = "NaN: Newton's method ended at no solution"
+    variables = name_variables(FORMULATIONS) | {
+        "scene": words(["scene"], list(SCENES), "scene, as on the command line"),
+        "stress_error": numbers(dims, table.errors, long_name, "1", no_solution, fill=np.nan),
+        "tolerance": numbers(
+            ["scene"], table.tolerances, "what roundoff explains: an error below it passes", "1", CONDITION_TOLERANCE
+        ),
+        "printed": codes(
+            dims, table.printed, {"fails": 0, "passes": 1}, "what the paper says", "missing: nothing", fill=-1
+        ),
+    }
+    comment = f"elastic patch tests at the penalty 10 E/h; an error above {FAILS:g} fails"
+    return {"": xr.Dataset(variables, attrs={"comment": comment})}
+
+
+ITEM = Item(
+    name="pass_table",
+    title="Who passes the elastic patch test",
+    compute=compute,
+    statements=statements,
+    datasets=datasets,
+    tables=tables,
+    text="Largest error of a stress at a Gauss point over the pressure, at ε̂ = 10 E/h. Pass: roundoff, at most "
+    f"{CONDITION_TOLERANCE} with κ = ε̂h/E and the smallest ratio r of two segments. Fail: above {FAILS:g}. “=” stands "
+    "where the paper says the same, “≠” where it says otherwise; neither where it is silent.",
+    choices={
+        "Penalty of the pass/fail table": "ε̂ = 10 E/h with the mean slave segment h; NTS: ε = ε̂ h",
+        "VTS-G": "two Gauss points on each slave segment",
+    },
+    n_steps=len(FORMULATIONS),
+)
