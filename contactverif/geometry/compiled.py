@@ -1,7 +1,7 @@
 """The one place that knows the compiler: a typed `numba.njit`, so that mypy --strict still checks the kernels.
 
-Kernels are compiled at their first call and cached beside their source. `uncompiled` gives the Python function back,
-for coverage and for tests that change a line of it.
+Kernels are compiled at their first call and cached beside their source. `python_function` gives the Python function
+back, for coverage and for tests that change a line of it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numba
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
-def compiled(function: Kernel) -> Kernel:
+def compile_kernel(function: Kernel) -> Kernel:
     """Compile a function for the types of each call; division by zero gives infinity or NaN, as in numpy."""
     return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
 
 
-def uncompiled(function: Kernel) -> Kernel:
+def python_function(function: Kernel) -> Kernel:
     """Return the Python function behind a compiled one, or the function itself if it is not compiled."""
     return cast(Kernel, getattr(function, "py_func", function))

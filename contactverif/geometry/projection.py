@@ -13,7 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 
 Vector = tuple[float, float]
 Tree = tuple[IntArray, FloatArray]
@@ -21,31 +21,31 @@ Tree = tuple[IntArray, FloatArray]
 _LEAF = 4  # The number of segments in a leaf of the tree.
 
 
-@compiled
+@compile_kernel
 def node(x: FloatArray, number: int) -> Vector:
     """Return the position of a node, from x (n_nodes, 2)."""
     return x[number, 0], x[number, 1]
 
 
-@compiled
+@compile_kernel
 def minus(a: Vector, b: Vector) -> Vector:
     """Return a − b."""
     return a[0] - b[0], a[1] - b[1]
 
 
-@compiled
+@compile_kernel
 def dot(a: Vector, b: Vector) -> float:
     """Return a · b, without conjugation."""
     return a[0] * b[0] + a[1] * b[1]
 
 
-@compiled
+@compile_kernel
 def between(a: Vector, b: Vector, c: float) -> Vector:
     """Return the point at c on the segment a b: a at −1, b at +1."""
     return (1 - c) / 2 * a[0] + (1 + c) / 2 * b[0], (1 - c) / 2 * a[1] + (1 + c) / 2 * b[1]
 
 
-@compiled
+@compile_kernel
 def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
     """Return length, tangent and normal of a segment; the normal points out of the body, which lies on the left."""
     d = minus(x2, x1)
@@ -54,7 +54,7 @@ def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
     return length, t, (t[1], -t[0])
 
 
-@compiled
+@compile_kernel
 def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
     """Return the boxes of a binary tree over the segments in a padded chain order.
 
@@ -86,7 +86,7 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
     return boxes
 
 
-@compiled
+@compile_kernel
 def _distance_to_box(p: Vector, box: FloatArray) -> float:
     """Return the squared distance to a box, a little less than exact, so that no tie is lost to roundoff."""
     dx = max(box[0] - p[0], 0.0, p[0] - box[2])
@@ -94,7 +94,7 @@ def _distance_to_box(p: Vector, box: FloatArray) -> float:
     return float((dx * dx + dy * dy) * (1 - 16 * UNIT_ROUNDOFF))
 
 
-@compiled
+@compile_kernel
 def distance_to_segment(p: Vector, x1: Vector, x2: Vector) -> tuple[float, float]:
     """Return the squared distance to the closed segment, and the length by which the foot lies past its end.
 
@@ -113,7 +113,7 @@ def distance_to_segment(p: Vector, x1: Vector, x2: Vector) -> tuple[float, float
     return g * g, 0.0
 
 
-@compiled
+@compile_kernel
 def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArray, boxes: FloatArray) -> int:
     """Return the nearest closed segment to p.
 
@@ -128,8 +128,10 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
         Positions.
     segments : IntArray, shape (n_segments, 2)
         Nodes of the segments.
-    order, boxes : IntArray or FloatArray
-        The tree of `search_tree` at these positions.
+    order : IntArray, shape (n_places,)
+        The padded chain order of `search_tree`.
+    boxes : FloatArray, shape (n_boxes, 4)
+        The boxes of `search_tree` at these positions.
     """
     n_leaves = len(boxes) // 2
     best, best_distance, best_past = -1, np.inf, np.inf
@@ -160,7 +162,7 @@ def nearest_segment(p: Vector, x: FloatArray, segments: IntArray, order: IntArra
     return best
 
 
-@compiled
+@compile_kernel
 def _is_nearer(distance: float, past: float, segment: int, best_distance: float, best_past: float, best: int) -> bool:
     """Return whether a segment comes before the best one so far, by distance, then by `past`, then by number."""
     if distance != best_distance:
@@ -168,7 +170,7 @@ def _is_nearer(distance: float, past: float, segment: int, best_distance: float,
     return past < best_past or (past == best_past and segment < best)
 
 
-@compiled
+@compile_kernel
 def segments_in_strip(
     a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, order: IntArray, boxes: FloatArray
 ) -> list[int]:
@@ -199,7 +201,7 @@ def segments_in_strip(
     return members
 
 
-@compiled
+@compile_kernel
 def _box_in_strip(a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, box: FloatArray) -> bool:
     """Return whether a box may meet the strip; a doubt of some roundings of the coordinates counts as yes."""
     size = max(abs(a[0]), abs(a[1]), abs(b[0]), abs(b[1]), reach)
@@ -220,11 +222,11 @@ def _box_in_strip(a: Vector, n_a: Vector, b: Vector, n_b: Vector, reach: float, 
 
 def search_tree(surface: Surface, x: FloatArray) -> Tree:
     """Return the tree by which `nearest_segment` searches a surface at x (n_nodes, 2); it costs O(n) to make."""
-    order = _padded(surface)
+    order = _pad_chains(surface)
     return order, _box_tree(x, surface.segments, order)
 
 
-def _padded(surface: Surface) -> IntArray:
+def _pad_chains(surface: Surface) -> IntArray:
     """Return the chain order with −1 between chains, so that each chain has a subtree of its own.
 
     So a chain far away costs a search one look at its box, and the subtree of the near chain is what it would be alone.
@@ -244,7 +246,7 @@ def _padded(surface: Surface) -> IntArray:
     return padded
 
 
-@compiled
+@compile_kernel
 def foot_on_surface(p: Vector, x1: Vector, x2: Vector, free_first: bool, free_second: bool, tolerance: float) -> bool:
     """Return whether the foot of p is on the surface, past a free end by at most `tolerance` × the segment's length."""
     length, t, _ = frame(x1, x2)

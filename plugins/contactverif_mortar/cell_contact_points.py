@@ -35,7 +35,7 @@ def at_points(
     segment, master = np.repeat(cells.slave, n_q), np.repeat(cells.master, n_q)
     c = points[:, C, None]
     ends = z[: interface.n_unknowns].reshape(-1, 2)[interface.slave.segments[segment]]  # (n_points, 2, dim)
-    nowhere = np.full(len(points), np.nan)
+    undefined = np.full(len(points), np.nan)
     return ContactPoints(
         slave_segment=segment,
         c=points[:, C],
@@ -47,8 +47,8 @@ def at_points(
         pressure=pressure,
         weight=points[:, WEIGHT],
         active=active,
-        area_from=nowhere,
-        area_to=nowhere,
+        area_from=undefined,
+        area_to=undefined,
     )
 
 
@@ -90,9 +90,9 @@ def at_nodes(
         here = np.flatnonzero(~(cells.cut_high if end else cells.cut_low))  # cells that end at the node
         number = interface.slave.segments[cells.slave[here], end]
         carrier[number], place[number] = cells.slave[here], c
-        ends = at_end.points(interface, cells.where(here), x[None])[0]
+        ends = at_end.points(interface, cells.select(here), x[None])[0]
         master[number], xi[number], normal[number] = cells.master[here], ends[:, XI], -ends[:, NORMAL_X:]
-    nowhere = np.full(n_nodes, np.nan)
+    undefined = np.full(n_nodes, np.nan)
     return ContactPoints(
         slave_segment=carrier,
         c=place,
@@ -104,6 +104,6 @@ def at_nodes(
         pressure=pressure,
         weight=areas,
         active=active,
-        area_from=nowhere,
-        area_to=nowhere,
+        area_from=undefined,
+        area_to=undefined,
     )

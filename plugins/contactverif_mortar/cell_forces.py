@@ -14,12 +14,12 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif_mortar.cell_geometry import D_C, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import NORMAL_X, NORMAL_Y, WEIGHT, XI, C
 
 
-@compiled
+@compile_kernel
 def forces(points: Array, pressure: Array, nodes: IntArray, n_nodes: int) -> Array:
     """Compute nodal forces from pressures at points.
 
@@ -54,7 +54,7 @@ def forces(points: Array, pressure: Array, nodes: IntArray, n_nodes: int) -> Arr
     return totals
 
 
-@compiled
+@compile_kernel
 def _blocks(
     points: FloatArray, gains: FloatArray, pressure: FloatArray, d_pressure: FloatArray, n_q: int
 ) -> FloatArray:
@@ -158,7 +158,7 @@ def influence(
     return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
-def gathered(rows: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[int, int]) -> sparse.coo_array:
+def gather_rows(rows: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[int, int]) -> sparse.coo_array:
     """Add up Δ of numbers of points that belong to the same place, such as a node.
 
     Parameters
@@ -184,8 +184,8 @@ def gathered(rows: FloatArray, places: IntArray, nodes: IntArray, shape: tuple[i
     return sparse.coo_array((values.ravel(), (lines.ravel(), columns.ravel())), shape=shape)
 
 
-@compiled
-def summed(values: Array, places: IntArray, n_places: int) -> Array:
+@compile_kernel
+def sum_by_place(values: Array, places: IntArray, n_places: int) -> Array:
     """Return sums (n_states, n_places) of the values (n_states, n) that belong to the same of the places (n,)."""
     sums = np.zeros((values.shape[0], n_places), dtype=values.dtype)
     for state in range(values.shape[0]):

@@ -26,10 +26,10 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 
-A, B, ONE, TWO, BEFORE, BEHIND = range(6)  # local nodes
+A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes
 D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # The Δ of a point, in this order.
 
 
@@ -43,13 +43,13 @@ class SlaveView(NamedTuple):
     straight: bool  # both ends look along the segment's own normal
 
 
-@compiled
-def turned(n: Vector) -> Vector:
+@compile_kernel
+def turn(n: Vector) -> Vector:
     """Return τ of a normal n: the tangent that belongs to it in `frame`."""
     return -n[1], n[0]
 
 
-@compiled
+@compile_kernel
 def slave_view(x: FloatArray, slave: IntArray, segment: int, before: int, behind: int) -> SlaveView:
     """Return a slave segment with the directions of its ends.
 
@@ -59,14 +59,14 @@ def slave_view(x: FloatArray, slave: IntArray, segment: int, before: int, behind
     _, _, n = frame(x_a, x_b)
     n_a, n_b = n, n
     if before >= 0:
-        n_a = _averaged(x, slave, n, before)
+        n_a = _average_normal(x, slave, n, before)
     if behind >= 0:
-        n_b = _averaged(x, slave, n, behind)
+        n_b = _average_normal(x, slave, n, behind)
     return SlaveView(x_a, x_b, n_a, n_b, before < 0 and behind < 0)
 
 
-@compiled
-def _averaged(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
+@compile_kernel
+def _average_normal(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
     """Return the unit vector along the sum of the normal n and that of another slave segment."""
     _, _, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
     total = (n[0] + n_other[0], n[1] + n_other[1])
@@ -74,36 +74,36 @@ def _averaged(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
     return total[0] / size, total[1] / size
 
 
-@compiled
+@compile_kernel
 def seen_from(x_e: Vector, view: SlaveView) -> float:
     """Return the c from which the point x_e is seen: the root at which it passes from ahead to behind as c grows."""
     x_a, x_b, n_a, n_b, straight = view
     half = ((x_b[0] - x_a[0]) / 2, (x_b[1] - x_a[1]) / 2)
     arm = minus(x_e, between(x_a, x_b, 0.0))
-    tau_0 = turned(between(n_a, n_b, 0.0))
+    tau_0 = turn(between(n_a, n_b, 0.0))
     d, slope = dot(arm, tau_0), dot(half, tau_0)
     if straight:
         return d / slope
-    tau_1 = turned(((n_b[0] - n_a[0]) / 2, (n_b[1] - n_a[1]) / 2))
+    tau_1 = turn(((n_b[0] - n_a[0]) / 2, (n_b[1] - n_a[1]) / 2))
     slope -= dot(arm, tau_1)
     c: float = 2 * d / (slope + np.sqrt(slope * slope + 4 * dot(half, tau_1) * d))
     return c
 
 
-@compiled
+@compile_kernel
 def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[float, float, Vector]:
     """Return ξ, the gap g and the normal n (out of the slave) at c."""
     x_s = between(view.x_a, view.x_b, c)
     nu = between(view.n_a, view.n_b, c)
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
-    tau = turned(n)
+    tau = turn(n)
     xi = dot(minus(x_s, x_1), tau) / dot(minus(x_2, x_1), tau)
     x_m = between(x_1, x_2, 2 * xi - 1)
     return xi, dot(minus(x_m, x_s), n), n
 
 
-@compiled
+@compile_kernel
 def turn_of_ends(
     x: FloatArray, slave: IntArray, segment: int, before: int, behind: int, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
@@ -123,7 +123,7 @@ def turn_of_ends(
         _average_turn(d_omega_b, x, slave, behind, t, n, B, BEHIND)
 
 
-@compiled
+@compile_kernel
 def _average_turn(
     row: FloatArray, x: FloatArray, slave: IntArray, other: int, t: Vector, n: Vector, first: int, second: int
 ) -> None:
@@ -134,7 +134,7 @@ def _average_turn(
     length, t_other, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
     total = (n[0] + n_other[0], n[1] + n_other[1])
     squared = dot(total, total)
-    tau = turned(total)  # longer than one by |n + n′|, hence the square
+    tau = turn(total)  # longer than one by |n + n′|, hence the square
     row *= dot(tau, t) / squared
     share = dot(tau, t_other) / squared / length
     for i in range(2):
@@ -142,7 +142,7 @@ def _average_turn(
         row[second, i] += share * n_other[i]
 
 
-@compiled
+@compile_kernel
 def cut_gains(
     d_c: FloatArray,
     c: float,
@@ -161,11 +161,11 @@ def cut_gains(
     nu = between(n_a, n_b, c)
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
-    tau = turned(n)
+    tau = turn(n)
     height = dot(minus(x_e, between(x_a, x_b, c)), n)
     slope = dot(minus(x_b, x_a), tau) / 2 + height * dot(minus(n_b, n_a), tau) / 2 / size
-    part_a = height * (1 - c) / 2 * dot(tau, turned(n_a)) / size / slope
-    part_b = height * (1 + c) / 2 * dot(tau, turned(n_b)) / size / slope
+    part_a = height * (1 - c) / 2 * dot(tau, turn(n_a)) / size / slope
+    part_b = height * (1 + c) / 2 * dot(tau, turn(n_b)) / size / slope
     for k in range(len(d_c)):
         for i in range(2):
             d_c[k, i] = part_a * d_omega_a[k, i] + part_b * d_omega_b[k, i]
@@ -175,7 +175,7 @@ def cut_gains(
         d_c[B, i] -= (1 + c) / 2 * tau[i] / slope
 
 
-@compiled
+@compile_kernel
 def point_gains(
     gains: FloatArray,
     c: float,
@@ -196,11 +196,11 @@ def point_gains(
     x_a, x_b, n_a, n_b, _ = view
     nu = between(n_a, n_b, c)
     size = np.sqrt(dot(nu, nu))
-    tau = turned(n)
+    tau = turn(n)
     ab, along = minus(x_b, x_a), minus(x_2, x_1)
     length, lean = dot(along, tau), dot(along, n)
-    part_a = (1 - c) / 2 * dot(tau, turned(n_a)) / size
-    part_b = (1 + c) / 2 * dot(tau, turned(n_b)) / size
+    part_a = (1 - c) / 2 * dot(tau, turn(n_a)) / size
+    part_b = (1 + c) / 2 * dot(tau, turn(n_b)) / size
     bend = -dot(minus(n_b, n_a), tau) / 2 / size
     along_tau, along_n = dot(ab, tau) / 2, dot(ab, n) / 2
     shape = ((1 - c) / 2, (1 + c) / 2, -(1 - xi), -xi)

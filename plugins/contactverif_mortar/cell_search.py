@@ -20,9 +20,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node, segments_in_strip
-from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turned
+from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
 
 # The longest overlap, in c ∈ [−1, 1], that counts as none: roundoff could not tell its points apart.
 ROUNDOFF = 4 * UNIT_ROUNDOFF
@@ -39,7 +39,7 @@ def longest_of_chain(surface: Surface, x: FloatArray) -> FloatArray:
     return lengths
 
 
-@compiled
+@compile_kernel
 def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[IntArray, IntArray]:
     """Return with which segment the normals at the two ends of each slave segment are averaged, −1 for none.
 
@@ -58,7 +58,7 @@ def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[Int
     return partners[0], partners[1]
 
 
-@compiled
+@compile_kernel
 def find_cells(
     x: FloatArray,
     slave: IntArray,
@@ -97,7 +97,7 @@ def find_cells(
     return np.array(cell_slave), np.array(cell_master), np.array(cut_low), np.array(cut_high)
 
 
-@compiled
+@compile_kernel
 def _candidates(
     x: FloatArray,
     master: IntArray,
@@ -123,7 +123,7 @@ def _candidates(
     return members[:count], table[:count]
 
 
-@compiled
+@compile_kernel
 def _is_nearest(
     x: FloatArray,
     master: IntArray,
@@ -155,7 +155,7 @@ def _is_nearest(
     return True
 
 
-@compiled
+@compile_kernel
 def overlap(view: SlaveView, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     """Return the lower and upper end on the slave of what it sees of the master segment 1 2; (1, −1) if nothing.
 
@@ -166,7 +166,7 @@ def overlap(view: SlaveView, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     """
     x_a, x_b, n_a, n_b, _ = view
     along = minus(x_2, x_1)
-    tau_a, tau_b = turned(n_a), turned(n_b)
+    tau_a, tau_b = turn(n_a), turn(n_b)
     if dot(along, tau_a) >= 0 or dot(along, tau_b) >= 0:
         return 1.0, -1.0
     if dot(minus(x_1, x_a), tau_a) <= 0 or dot(minus(x_2, x_b), tau_b) >= 0:

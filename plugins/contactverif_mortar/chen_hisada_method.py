@@ -18,7 +18,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
     Tree,
     dot,
@@ -96,13 +96,13 @@ class ChenHisada:
         influence = cell_forces.influence(points, shapes, places, nodes, (z.size, len(active)))
         d_gaps = _node_gap_rows(x, interface.master.segments, pairing["nearest"])  # (n_slave_nodes, 3, 2)
         local = np.column_stack([np.arange(len(active)), interface.master.segments[pairing["nearest"]]])
-        rows = cell_forces.gathered(d_gaps[:, None], np.arange(len(active))[:, None], local, (len(active), z.size))
+        rows = cell_forces.gather_rows(d_gaps[:, None], np.arange(len(active))[:, None], local, (len(active), z.size))
         springs = sparse.diags_array(np.where(active, -self.penalty, 0.0))
         return (derivative.tocsr() + influence.tocsr() @ springs @ rows.tocsr()).tocoo()
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with gaps along the slave's normal and interpolated pressures."""
-        cells = Cells.of(pairing)
+        cells = Cells.from_pairing(pairing)
         x = np.array(z).reshape(1, -1, 2)
         points = self.quadrature.points(interface, cells, x)[0]
         ends = interface.slave.segments[np.repeat(cells.slave, len(self.quadrature))]
@@ -119,11 +119,11 @@ class ChenHisada:
 
 def _carrying(interface: Interface, pairing: Pairing, n_q: int) -> tuple[Cells, IntArray]:
     """Return the cells whose slave segment has an active node, and the slave nodes (n_points, 2) of their points."""
-    cells = Cells.of(pairing).near(pairing["active"], interface)
+    cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
     return cells, interface.slave.segments[np.repeat(cells.slave, n_q)]
 
 
-@compiled
+@compile_kernel
 def _pair_nodes(
     x: FloatArray,
     n_nodes: int,
@@ -147,7 +147,7 @@ def _pair_nodes(
     return nearest, active
 
 
-@compiled
+@compile_kernel
 def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
     """Return the gaps (n_states, n_slave_nodes) of the slave nodes to the lines of their master segments."""
     gaps = np.empty((x.shape[0], len(nearest)), dtype=x.dtype)
@@ -159,7 +159,7 @@ def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
     return gaps
 
 
-@compiled
+@compile_kernel
 def _node_gap_rows(x: FloatArray, master: IntArray, nearest: IntArray) -> FloatArray:
     """Return Δg = n·(Δx_V − (1−ξ)Δx_1 − ξΔx_2) of each slave node, (n_slave_nodes, 3 nodes V, 1, 2, 2)."""
     d_gaps = np.empty((len(nearest), 3, 2))

@@ -21,13 +21,13 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
     D_WEIGHT,
-    ONE,
-    TWO,
+    NODE_1,
+    NODE_2,
     A,
     B,
     SlaveView,
@@ -114,7 +114,7 @@ class Cells:
         return cls(*pairs_and_cuts, before, behind)
 
     @classmethod
-    def of(cls, pairing: Pairing) -> Cells:
+    def from_pairing(cls, pairing: Pairing) -> Cells:
         """Return the cells of a pairing."""
         return cls(*(pairing[entry.name] for entry in fields(cls)))
 
@@ -122,7 +122,7 @@ class Cells:
         """Return the arrays by name, for a pairing."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
-    def where(self, selection: BoolArray | IntArray) -> Cells:
+    def select(self, selection: BoolArray | IntArray) -> Cells:
         """Return some of the cells, selected by mask or number."""
         return Cells(
             self.slave[selection],
@@ -136,7 +136,7 @@ class Cells:
     def near(self, nodes: BoolArray, interface: Interface) -> Cells:
         """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
         first, second = nodes[interface.slave.segments].T
-        return self.where((first | second)[self.slave])
+        return self.select((first | second)[self.slave])
 
     def local_nodes(self, interface: Interface) -> IntArray:
         """Return the nodes (n_cells, n_local): A, B, 1, 2, and with averaged normals those before A and behind B."""
@@ -152,7 +152,7 @@ class Cells:
 
     @property
     def averaged(self) -> bool:
-        """Whether any normals are averaged."""
+        """True if any normals are averaged."""
         return bool((self.before >= 0).any() or (self.behind >= 0).any())
 
 
@@ -221,10 +221,10 @@ class Quadrature:
         )
 
 
-@compiled
+@compile_kernel
 def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
     """Return the lower and the upper end of a cell on the slave, as c, cut by the nodes 2 and 1 of the master."""
-    zero = 0 * view.x_a[0]  # of the type of the positions
+    zero = 0 * view.x_a[0]  # has the type of the positions
     low, high = zero - 1, zero + 1
     if cut_low:
         low = seen_from(x_2, view)
@@ -233,7 +233,7 @@ def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bo
     return low, high
 
 
-@compiled
+@compile_kernel
 def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
     """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
     reference_length, slave, master = segments
@@ -261,7 +261,7 @@ def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
     return points
 
 
-@compiled
+@compile_kernel
 def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: Fields) -> FloatArray:
     """Compute the Δ (n_points, 5, n_local, 2) of the points at positions x (n_nodes, 2)."""
     reference_length, slave, master = segments
@@ -278,9 +278,9 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
         turn_of_ends(x, slave, s, before[s], behind[s], d_omega_a, d_omega_b)
         d_low[:], d_high[:] = 0.0, 0.0
         if cut_low[cell]:
-            cut_gains(d_low, low, TWO, x_2, view, d_omega_a, d_omega_b)
+            cut_gains(d_low, low, NODE_2, x_2, view, d_omega_a, d_omega_b)
         if cut_high[cell]:
-            cut_gains(d_high, high, ONE, x_1, view, d_omega_a, d_omega_b)
+            cut_gains(d_high, high, NODE_1, x_1, view, d_omega_a, d_omega_b)
         length, t_s, _ = frame(view.x_a, view.x_b)
         if not current:
             length = reference_length[s]
@@ -297,7 +297,7 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
     return gains
 
 
-@compiled
+@compile_kernel
 def _place_gains(
     d: FloatArray, d_low: FloatArray, d_high: FloatArray, place: float, weight: float, length: float
 ) -> None:

@@ -76,7 +76,7 @@ class Mortar:
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
-        x, cells, active = np.array(z).reshape(-1, 2), Cells.of(pairing), pairing["active"]
+        x, cells, active = np.array(z).reshape(-1, 2), Cells.from_pairing(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
         pressure = np.where(active, -self.penalty * gaps, 0.0)
         return at_nodes(interface, cells, x, areas, gaps, pressure, active)
@@ -134,7 +134,7 @@ class MortarMultipliers:
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and multiplier, ∫N_j as weight."""
         x, multipliers = split_state(interface, z)
-        cells, active = Cells.of(pairing), pairing["active"]
+        cells, active = Cells.from_pairing(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
         return at_nodes(interface, cells, x, areas, gaps, np.where(active, multipliers, 0.0), active)
 

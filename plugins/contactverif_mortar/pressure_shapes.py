@@ -21,7 +21,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif_mortar.cell_forces import gathered, summed
+from contactverif_mortar.cell_forces import gather_rows, sum_by_place
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT
 from contactverif_mortar.integration_cells import GAP, WEIGHT, C
 
@@ -64,11 +64,11 @@ class Shapes:
         c, w = points[..., C], points[..., WEIGHT]
         first = _first_of_each(segment)
         rough = c[..., first]  # a place in the covered part: so c − c̄ is as exact as c, however short the part
-        extent = summed(w, segment, n_segments)[..., segment]
-        mean = summed(w * (c - rough), segment, n_segments)[..., segment] / extent
+        extent = sum_by_place(w, segment, n_segments)[..., segment]
+        mean = sum_by_place(w * (c - rough), segment, n_segments)[..., segment] / extent
         centred = (c - rough) - mean
         mean = rough + mean
-        variance = summed(w * centred * centred, segment, n_segments)[..., segment] / extent
+        variance = sum_by_place(w * centred * centred, segment, n_segments)[..., segment] / extent
         kappa = (1 - mean) * (1 + mean) / (2 * variance)
         second = (1 + mean) / 2 + kappa * centred
         first_value = (1 - mean) / 2 - kappa * centred
@@ -98,8 +98,8 @@ def integrals(shapes: Shapes, points: Array, ends: IntArray, n_nodes: int) -> tu
     """Return ∫φ_j and ∫φ_j g (n_states, n_nodes) of the slave nodes."""
     weighted = shapes.values * points[..., WEIGHT, None]
     with_gap = weighted * points[..., GAP, None]
-    areas = summed(weighted.reshape(len(points), -1), ends.ravel(), n_nodes)
-    return areas, summed(with_gap.reshape(len(points), -1), ends.ravel(), n_nodes)
+    areas = sum_by_place(weighted.reshape(len(points), -1), ends.ravel(), n_nodes)
+    return areas, sum_by_place(with_gap.reshape(len(points), -1), ends.ravel(), n_nodes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,7 @@ class Rows:
         cell_segment = self.by_cell(self.segment)
         places = np.column_stack([cell_segment, cell_segment + self.n_segments])
         rows = np.stack([d_mean, d_variance], axis=1)
-        return gathered(rows, places, self.nodes, (2 * self.n_segments, self.n_unknowns)).tocsr()
+        return gather_rows(rows, places, self.nodes, (2 * self.n_segments, self.n_unknowns)).tocsr()
 
     def weighted_gaps(self, reference: FloatArray, divisor: FloatArray) -> sparse.csr_array:
         """Return Σ [w φ Δg + (g − G) Δ(w φ)] / divisor, (n_nodes, n_unknowns).
@@ -166,7 +166,7 @@ class Rows:
         signed = above * w[:, None] * [-1.0, 1.0]
         rows += _times(signed * s.slope[0][:, None], self.gains[:, D_C, None])
         places = self.by_cell(self.ends)
-        total = gathered(rows, places, self.nodes, (n_nodes, self.n_unknowns)).tocsr()
+        total = gather_rows(rows, places, self.nodes, (n_nodes, self.n_unknowns)).tocsr()
         if self.dual:
             by = np.stack([signed * s.by_mean[0][:, None], signed * s.by_variance[0][:, None]])  # (2, n_points, 2)
             lines = np.broadcast_to(self.ends, by.shape)

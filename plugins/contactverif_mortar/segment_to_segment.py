@@ -69,7 +69,7 @@ class SegmentToSegment:
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with their own gaps and pressures."""
-        cells = Cells.of(pairing)
+        cells = Cells.from_pairing(pairing)
         points = self.quadrature.points(interface, cells, np.array(z).reshape(1, -1, 2))[0]
         pressure = np.where(pairing["active"], -self.penalty * points[:, GAP], 0.0)
         return at_points(interface, cells, points, z, pressure, pairing["active"])
@@ -79,7 +79,7 @@ def _in_contact(pairing: Pairing, n_q: int) -> tuple[Cells, BoolArray]:
     """Return the cells that have a point in contact, and which of their points are in contact."""
     active = pairing["active"].reshape(-1, n_q)
     mask = np.logical_or.reduce(active, axis=1)
-    return Cells.of(pairing).where(mask), active[mask].reshape(-1)
+    return Cells.from_pairing(pairing).select(mask), active[mask].reshape(-1)
 
 
 def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:

@@ -97,7 +97,7 @@ class Weighting:
 
     def carrying(self, interface: Interface, pairing: Pairing, x: Array) -> Weighted:
         """Do so on the cells whose slave segment has an active node; the others carry no pressure."""
-        return self.at(interface, Cells.of(pairing).near(pairing["active"], interface), x)
+        return self.at(interface, Cells.from_pairing(pairing).near(pairing["active"], interface), x)
 
     def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""

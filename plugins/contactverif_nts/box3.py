@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
@@ -80,7 +80,7 @@ class VirtualSlaveNode(NamedTuple):
     g: float  # the gap, negative in penetration
 
 
-@compiled
+@compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields) -> tuple[Array, Array]:
     """Compute the nodal forces and the constraint rows of Box 3 for a batch of states.
 
@@ -143,7 +143,7 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
     return forces, rows
 
 
-@compiled
+@compile_kernel
 def _fill_idle_rows(
     rows: Array, multipliers: Array, reference: FloatArray, slave: IntArray, active: BoolArray, n: int
 ) -> None:
@@ -153,7 +153,7 @@ def _fill_idle_rows(
             rows[i] = multipliers[i] * segment_length(reference, slave, i // n) / n
 
 
-@compiled
+@compile_kernel
 def _parts(x_f: Vector, x_m: Vector, t: Vector, x_p: Vector, x_q: Vector, area: Area, j: int) -> tuple[float, float]:
     """Return W_f and W_m of master segment j with the nodes f and m."""
     length = dot(minus(x_m, x_f), t)
@@ -166,7 +166,7 @@ def _parts(x_f: Vector, x_m: Vector, t: Vector, x_p: Vector, x_q: Vector, area: 
     return length * ((b - a) - (b * b - a * a) / 2), w_m
 
 
-@compiled
+@compile_kernel
 def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: float, c_q: float) -> VirtualSlaveNode:
     """Return the virtual slave node in the middle of the area of competence [c_q, c_p] of A B, against 1 2."""
     c = (c_p + c_q) / 2
@@ -176,7 +176,7 @@ def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: 
     return VirtualSlaveNode(x_a, x_b, x_1, x_v, x_p, x_q, c, c_p, c_q, l_12, t, normal, g)
 
 
-@compiled
+@compile_kernel
 def length_of_area(x_a: Vector, x_b: Vector, ref_a: Vector, ref_b: Vector, current_area: bool) -> float:
     """Return the length of the slave segment A B that counts for the area, of the type of its current positions."""
     l_ab, _, _ = frame(x_a, x_b)
@@ -186,7 +186,7 @@ def length_of_area(x_a: Vector, x_b: Vector, ref_a: Vector, ref_b: Vector, curre
     return l_ab
 
 
-@compiled
+@compile_kernel
 def area_of_competence(
     x: Array, slave: IntArray, master: IntArray, n: int, i: int, cutting: int, cut_p: int, cut_q: int
 ) -> tuple[float, float]:
@@ -206,13 +206,13 @@ def area_of_competence(
     return c_p, c_q
 
 
-@compiled
+@compile_kernel
 def _cut_at(x_a: Vector, x_b: Vector, x_e: Vector, t: Vector) -> float:
     """Return where the slave segment A B meets the master node e, both projected along t, as c."""
     return dot(minus(x_e, between(x_a, x_b, 0.0)), t) / (dot(minus(x_b, x_a), t) / 2)
 
 
-@compiled
+@compile_kernel
 def segment_length(x: FloatArray, slave: IntArray, segment: int) -> float:
     """Return the length of a slave segment at the positions x (n_nodes, 2)."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))

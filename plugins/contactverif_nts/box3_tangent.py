@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
 from contactverif_nts.box3 import (
     BALANCED,
@@ -35,16 +35,16 @@ from contactverif_nts.eq6 import Fields
 from contactverif_nts.walk import NOT_CUT
 
 # Local nodes: A, B, 1, 2; where the area is cut, the nodes of the segment of the frame and the two that cut; f, m.
-A, B, ONE, TWO, FRAME_1, FRAME_2, CUT_P, CUT_Q, F, M = range(10)
+A, B, NODE_1, NODE_2, FRAME_1, FRAME_2, CUT_P, CUT_Q, F, M = range(10)
 N_UNCUT, N_CORE, N_LOCAL = 4, 8, 10
 NO_MULTIPLIER = -1
 
 
 class Local(NamedTuple):
-    """What all entries of one virtual slave node in the tangent share."""
+    """The numbers that all entries of one virtual slave node share."""
 
     n_core: int  # N_UNCUT, or N_CORE where the area is cut
-    own: int  # row and column of the multiplier, or NO_MULTIPLIER
+    unknown: int  # row and column of the multiplier, or NO_MULTIPLIER
     t: Vector
     normal: Vector
 
@@ -53,10 +53,10 @@ class Pressure(NamedTuple):
     """The pressure on the master segments of one virtual slave node, negative where it presses."""
 
     size: float
-    by_multiplier: float  # what its positive gains for each unit of the multiplier
+    by_multiplier: float  # its derivative by the multiplier, sign reversed
 
 
-@compiled
+@compile_kernel
 def tangent(
     x: FloatArray, multipliers: FloatArray, surfaces: Fields, areas: Fields, options: Fields
 ) -> tuple[IntArray, IntArray, FloatArray]:
@@ -80,42 +80,44 @@ def tangent(
     n, transmission, current_area, penalty = options
     has_multipliers = len(multipliers) > 0
     n_entries = _count_entries(neighbours, first, last, cutting, active, has_multipliers)
-    where, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
+    index, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
     nodes, gains = np.empty(N_LOCAL, dtype=np.int64), np.empty((7, N_CORE, 2))
     d_cp, d_cq, d_omega, d_g, d_xi, d_l, d_pressure = gains
     for i in range(len(active)):
-        own = x.size + i if has_multipliers else NO_MULTIPLIER
+        unknown = x.size + i if has_multipliers else NO_MULTIPLIER
         if not active[i]:
             if has_multipliers:
-                where[0, place], where[1, place], values[place] = own, own, segment_length(reference, slave, i // n) / n
+                index[0, place], index[1, place] = unknown, unknown
+                values[place] = segment_length(reference, slave, i // n) / n
                 place += 1
             continue
         area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
         n_core = _fill_nodes(nodes, slave[i // n], master, area)
-        x_a, x_b, x_1, x_2 = node(x, nodes[A]), node(x, nodes[B]), node(x, nodes[ONE]), node(x, nodes[TWO])
+        x_a, x_b, x_1, x_2 = node(x, nodes[A]), node(x, nodes[B]), node(x, nodes[NODE_1]), node(x, nodes[NODE_2])
         c_p, c_q = area_of_competence(x, slave, master, n, i, area.frame, area.cut_p, area.cut_q)
         l_ab = length_of_area(x_a, x_b, node(reference, nodes[A]), node(reference, nodes[B]), current_area)
         v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q)
         _fill_gains(gains, x, nodes, area, v, current_area)
-        at = Local(n_core, own, v.t, v.normal)
+        at = Local(n_core, unknown, v.t, v.normal)
 
         c, d_c, share = v.c, (d_cp + d_cq) / 2, (v.c_p - v.c_q) / 2
         stiffness, e, d_e = penalty, v.g, d_g  # the pressure is −stiffness × e
         if has_multipliers:
             stiffness, e, d_e = 1.0, -multipliers[i], np.zeros((N_CORE, 2))
             d_row = -(share * (l_ab * d_g + v.g * d_l) + v.g * l_ab * (d_cp - d_cq) / 2)
-            place = _add_constraint(where, values, place, nodes, at, d_row)
-        size = l_ab * share  # what a unit of the pressure pushes with
+            place = _add_constraint(index, values, place, nodes, at, d_row)
+        size = l_ab * share  # the force of a unit pressure
         f_v = stiffness * e * l_ab * share
         d_f = stiffness * share * (l_ab * d_e + e * d_l) + stiffness * e * l_ab * (d_cp - d_cq) / 2
         d_fa, d_fb = (1 - c) / 2 * d_f - f_v / 2 * d_c, (1 + c) / 2 * d_f + f_v / 2 * d_c
-        place = _add_force(where, values, place, nodes, at, A, (1 - c) / 2 * f_v, d_fa, d_omega, (1 - c) / 2 * size)
-        place = _add_force(where, values, place, nodes, at, B, (1 + c) / 2 * f_v, d_fb, d_omega, (1 + c) / 2 * size)
+        place = _add_force(index, values, place, nodes, at, A, (1 - c) / 2 * f_v, d_fa, d_omega, (1 - c) / 2 * size)
+        place = _add_force(index, values, place, nodes, at, B, (1 + c) / 2 * f_v, d_fb, d_omega, (1 + c) / 2 * size)
         if area.first == area.last:
             xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12
             d_f1, d_f2 = -(1 - xi) * d_f + f_v * d_xi, -xi * d_f - f_v * d_xi
-            place = _add_force(where, values, place, nodes, at, ONE, -(1 - xi) * f_v, d_f1, d_omega, -(1 - xi) * size)
-            place = _add_force(where, values, place, nodes, at, TWO, -xi * f_v, d_f2, d_omega, -xi * size)
+            f_1, size_1 = -(1 - xi) * f_v, -(1 - xi) * size
+            place = _add_force(index, values, place, nodes, at, NODE_1, f_1, d_f1, d_omega, size_1)
+            place = _add_force(index, values, place, nodes, at, NODE_2, -xi * f_v, d_f2, d_omega, -xi * size)
             continue
         pressure = Pressure(stiffness * e, 1.0)
         d_pressure[:] = stiffness * d_e
@@ -123,15 +125,15 @@ def tangent(
             s, d_s = _sum_of_parts(v, d_cp, d_cq, d_omega)
             pressure = Pressure(f_v / s, size / s)
             d_pressure[:] = d_f / s - f_v * d_s / (s * s)
-        place = _add_segments(where, values, place, nodes, at, x, master, neighbours, area, v, gains, pressure)
-    return where[0], where[1], values
+        place = _add_segments(index, values, place, nodes, at, x, master, neighbours, area, v, gains, pressure)
+    return index[0], index[1], values
 
 
-@compiled
+@compile_kernel
 def _fill_nodes(nodes: IntArray, ab: IntArray, master: IntArray, area: Area) -> int:
     """Write the local nodes of a virtual slave node, except f and m, into `nodes`; return how many there are."""
     nodes[A], nodes[B] = ab
-    nodes[ONE], nodes[TWO] = master[area.master, 0], master[area.master, 1]
+    nodes[NODE_1], nodes[NODE_2] = master[area.master, 0], master[area.master, 1]
     if area.frame == NOT_CUT:
         return N_UNCUT
     nodes[FRAME_1], nodes[FRAME_2] = master[area.frame, 0], master[area.frame, 1]
@@ -140,7 +142,7 @@ def _fill_nodes(nodes: IntArray, ab: IntArray, master: IntArray, area: Area) -> 
     return N_CORE
 
 
-@compiled
+@compile_kernel
 def _fill_gains(
     gains: FloatArray, x: FloatArray, nodes: IntArray, area: Area, v: VirtualSlaveNode, current_area: bool
 ) -> None:
@@ -154,9 +156,9 @@ def _fill_gains(
     d_c = (d_cp + d_cq) / 2
     ab, xi = minus(v.x_b, v.x_a), dot(minus(v.x_v, v.x_1), v.t) / v.l_12
     for i in range(2):
-        d_omega[ONE, i] = -v.normal[i] / v.l_12  # ω = n·(Δx2 − Δx1)/l
-        d_omega[TWO, i] = v.normal[i] / v.l_12
-        for k, shape in ((A, (1 - v.c) / 2), (B, (1 + v.c) / 2), (ONE, -(1 - xi)), (TWO, -xi)):
+        d_omega[NODE_1, i] = -v.normal[i] / v.l_12  # ω = n·(Δx2 − Δx1)/l
+        d_omega[NODE_2, i] = v.normal[i] / v.l_12
+        for k, shape in ((A, (1 - v.c) / 2), (B, (1 + v.c) / 2), (NODE_1, -(1 - xi)), (NODE_2, -xi)):
             d_g[k, i] = shape * v.normal[i]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
             d_xi[k, i] = shape * v.t[i] / v.l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
     d_g += dot(ab, v.normal) / 2 * d_c  # Δx_V gains (x_B − x_A)/2 Δc_V
@@ -167,7 +169,7 @@ def _fill_gains(
             d_l[A, i], d_l[B, i] = -t_ab[i], t_ab[i]
 
 
-@compiled
+@compile_kernel
 def _add_cut(d_c: FloatArray, x: FloatArray, nodes: IntArray, cutting_node: int, c: float) -> None:
     """Add Δ of the cut end c = c_P or c_Q, in the frame of the segment that cuts.
 
@@ -185,7 +187,7 @@ def _add_cut(d_c: FloatArray, x: FloatArray, nodes: IntArray, cutting_node: int,
         d_c[FRAME_2, i] -= lever * normal[i] / l_12 / half
 
 
-@compiled
+@compile_kernel
 def _sum_of_parts(
     v: VirtualSlaveNode, d_cp: FloatArray, d_cq: FloatArray, d_omega: FloatArray
 ) -> tuple[float, FloatArray]:
@@ -199,9 +201,9 @@ def _sum_of_parts(
     return dot(pq, v.t), d_s
 
 
-@compiled
+@compile_kernel
 def _add_segments(
-    where: IntArray,
+    index: IntArray,
     values: FloatArray,
     place: int,
     nodes: IntArray,
@@ -239,14 +241,14 @@ def _add_segments(
         d_wm = length * (b * d_b - a * d_a) + (b * b - a * a) / 2 * d_length
         d_wf = length * (d_b - d_a - (b * d_b - a * d_a)) + ((b - a) - (b * b - a * a) / 2) * d_length
         d_ff, d_fm = -(w_f * d_p + p * d_wf), -(w_m * d_p + p * d_wm)
-        place = _add_force(where, values, place, nodes, at, F, -p * w_f, d_ff, d_omega, -unit * w_f)
-        place = _add_force(where, values, place, nodes, at, M, -p * w_m, d_fm, d_omega, -unit * w_m)
+        place = _add_force(index, values, place, nodes, at, F, -p * w_f, d_ff, d_omega, -unit * w_f)
+        place = _add_force(index, values, place, nodes, at, M, -p * w_m, d_fm, d_omega, -unit * w_m)
         if j == area.last:
             return place
         j = neighbours[j, 1]
 
 
-@compiled
+@compile_kernel
 def _end_of_part(
     d_end: FloatArray,
     v: VirtualSlaveNode,
@@ -277,21 +279,21 @@ def _end_of_part(
     return end
 
 
-@compiled
+@compile_kernel
 def _add_constraint(
-    where: IntArray, values: FloatArray, place: int, nodes: IntArray, at: Local, d_row: FloatArray
+    index: IntArray, values: FloatArray, place: int, nodes: IntArray, at: Local, d_row: FloatArray
 ) -> int:
     """Enter Δ of the constraint of a multiplier as one row; return the next place."""
     for column in range(at.n_core):
         for j in range(2):
-            where[0, place], where[1, place], values[place] = at.own, 2 * nodes[column] + j, d_row[column, j]
+            index[0, place], index[1, place], values[place] = at.unknown, 2 * nodes[column] + j, d_row[column, j]
             place += 1
     return place
 
 
-@compiled
+@compile_kernel
 def _add_force(
-    where: IntArray,
+    index: IntArray,
     values: FloatArray,
     place: int,
     nodes: IntArray,
@@ -314,17 +316,17 @@ def _add_force(
                 value = at.normal[i] * d_force[column, j]
                 if column < N_CORE:
                     value -= force * at.t[i] * d_omega[column, j]
-                where[0, place] = 2 * nodes[k] + i
-                where[1, place] = 2 * nodes[column] + j
+                index[0, place] = 2 * nodes[k] + i
+                index[1, place] = 2 * nodes[column] + j
                 values[place] = value
                 place += 1
-        if at.own != NO_MULTIPLIER:
-            where[0, place], where[1, place], values[place] = 2 * nodes[k] + i, at.own, -size * at.normal[i]
+        if at.unknown != NO_MULTIPLIER:
+            index[0, place], index[1, place], values[place] = 2 * nodes[k] + i, at.unknown, -size * at.normal[i]
             place += 1
     return place
 
 
-@compiled
+@compile_kernel
 def _count_entries(
     neighbours: IntArray, first: IntArray, last: IntArray, cutting: IntArray, active: BoolArray, has_multipliers: bool
 ) -> int:

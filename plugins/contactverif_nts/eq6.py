@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
     Tree,
     Vector,
@@ -44,7 +44,7 @@ from contactverif.geometry.projection import (
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # The area of a point: 1, or lengths in one of two configurations.
 AREAS = {"current": CURRENT, "reference": REFERENCE}  # The words of the option `area`.
 
-A, B, ONE, TWO, OTHER_A, OTHER_B = range(6)  # Local nodes; the last two belong to the other slave segment.
+A, B, NODE_1, NODE_2, OTHER_A, OTHER_B = range(6)  # Local nodes; the last two belong to the other slave segment.
 N_LOCAL = 6
 ENTRIES = 4 * 2 * N_LOCAL * 2  # The entries of one point in the tangent: rows of A, B, 1 and 2.
 
@@ -65,7 +65,7 @@ class Points(NamedTuple):
 
     segment: IntArray  # the slave segment that carries the point
     other: IntArray  # the other slave segment at a slave node, −1 if there is none
-    slot: IntArray  # which entry of `Options.c` and `Options.weight` is that of the point
+    slot: IntArray  # the entry of `Options.c` and `Options.weight` that belongs to the point
     master: IntArray  # the nearest master segment
     active: BoolArray  # the point is in contact
 
@@ -94,7 +94,7 @@ class Contact(NamedTuple):
     xi: float
 
 
-@compiled
+@compile_kernel
 def pair(
     x: FloatArray,
     multipliers: FloatArray,
@@ -121,19 +121,19 @@ def pair(
         _, _, normal = frame(x_1, x_2)
         on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[i] = m
-        active[i] = pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
+        active[i] = is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
     return nearest, active
 
 
-@compiled
-def pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> bool:
+@compile_kernel
+def is_pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> bool:
     """Return whether point i is in contact by its gap: g ≤ 0, or with multipliers λ − c g ≥ 0, the penalty being c."""
     if len(multipliers) == 0:
         return g <= 0
     return bool(multipliers[i] - penalty * g >= 0)
 
 
-@compiled
+@compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields) -> tuple[Array, Array]:
     """Compute the nodal forces and the constraint rows of Eq. 6 for a batch of states.
 
@@ -168,7 +168,7 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, opt
                     rows[state, i] = multipliers[state, i] * area_0
                 continue
             v = _contact(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
-            area = 1 + 0 * v.g  # of the type of x
+            area = 1 + 0 * v.g  # has the type of x
             if area_from == CURRENT:
                 area = weight * _length(now, slave, s, other[i])
             elif area_from == REFERENCE:
@@ -184,14 +184,14 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, opt
     return forces, rows
 
 
-@compiled
+@compile_kernel
 def push(forces: Array, number: int, size: float, direction: Vector) -> None:
     """Add a force of this size along a direction to the force on a node."""
     forces[number, 0] += size * direction[0]
     forces[number, 1] += size * direction[1]
 
 
-@compiled
+@compile_kernel
 def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
     """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
     x_v = between(node(x, a), node(x, b), c)
@@ -202,7 +202,7 @@ def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Co
     return Contact(a, b, node_1, node_2, c, l_12, t, normal, g, xi)
 
 
-@compiled
+@compile_kernel
 def _length(x: Array, slave: IntArray, segment: int, other: int) -> float:
     """Return the length of a slave segment, plus that of the other one at a slave node where there is one."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
@@ -212,7 +212,7 @@ def _length(x: Array, slave: IntArray, segment: int, other: int) -> float:
     return length
 
 
-@compiled
+@compile_kernel
 def tangent(
     x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
 ) -> tuple[IntArray, IntArray, FloatArray]:
@@ -238,14 +238,14 @@ def tangent(
     places, weights, area_from, penalty = options
     has_multipliers = len(multipliers) > 0
     n_entries = _count_entries(active, has_multipliers)
-    where, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
+    index, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
     nodes, gains = np.empty(N_LOCAL, dtype=np.int64), np.empty((4, N_LOCAL, 2))
     d_omega, d_g, d_xi, d_area = gains
     for i in range(len(active)):
-        s, weight, own = segment[i], weights[slot[i]], x.size + i  # `own`: row and column of the point's multiplier
+        s, weight, unknown = segment[i], weights[slot[i]], x.size + i  # `unknown`: row and column of the multiplier
         if not active[i]:
             if has_multipliers:
-                where[0, place], where[1, place] = own, own
+                index[0, place], index[1, place] = unknown, unknown
                 values[place] = 1.0 if area_from == NODAL else weight * _length(reference, slave, s, other[i])
                 place += 1
             continue
@@ -263,15 +263,15 @@ def tangent(
         if has_multipliers:
             f, d_f = -multipliers[i] * area, -multipliers[i] * d_area
             d_row = -(area * d_g + v.g * d_area)
-            place = _add_constraint(where, values, place, own, nodes, v, area, d_row)
+            place = _add_constraint(index, values, place, unknown, nodes, v, area, d_row)
         else:
             f = penalty * v.g * area
             d_f = penalty * (area * d_g + v.g * d_area)
-        place = _add_forces(where, values, place, nodes, v, f, d_f, d_omega, d_xi)
-    return where[0], where[1], values
+        place = _add_forces(index, values, place, nodes, v, f, d_f, d_omega, d_xi)
+    return index[0], index[1], values
 
 
-@compiled
+@compile_kernel
 def _count_entries(active: BoolArray, has_multipliers: bool) -> int:
     """Return how many entries the tangent has."""
     n_active = np.sum(active)
@@ -281,29 +281,30 @@ def _count_entries(active: BoolArray, has_multipliers: bool) -> int:
     return int(n_entries)
 
 
-@compiled
+@compile_kernel
 def _fill_gains(gains: FloatArray, nodes: IntArray, v: Contact) -> None:
     """Write Δω, Δg, Δξ and zeros for Δ of the area into `gains` (4, n_local, 2), and the local nodes into `nodes`."""
-    nodes[A], nodes[B], nodes[ONE], nodes[TWO], nodes[OTHER_A], nodes[OTHER_B] = v.a, v.b, v.node_1, v.node_2, v.a, v.b
+    nodes[A], nodes[B], nodes[NODE_1], nodes[NODE_2] = v.a, v.b, v.node_1, v.node_2
+    nodes[OTHER_A], nodes[OTHER_B] = v.a, v.b
     gains[:] = 0.0
     d_omega, d_g, d_xi = gains[0], gains[1], gains[2]
     shape = _shapes(v)
     for j in range(2):
-        d_omega[ONE, j] = -v.normal[j] / v.l_12  # ω = n·(Δx2 − Δx1)/l
-        d_omega[TWO, j] = v.normal[j] / v.l_12
+        d_omega[NODE_1, j] = -v.normal[j] / v.l_12  # ω = n·(Δx2 − Δx1)/l
+        d_omega[NODE_2, j] = v.normal[j] / v.l_12
         for k in range(4):
             d_g[k, j] = shape[k] * v.normal[j]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
             d_xi[k, j] = shape[k] * v.t[j] / v.l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
     d_xi += v.g * d_omega / v.l_12
 
 
-@compiled
+@compile_kernel
 def _shapes(v: Contact) -> tuple[float, float, float, float]:
     """Return by how much Δx of A, B, 1 and 2 counts in Δx_V − (1−ξ)Δx1 − ξΔx2."""
     return (1 - v.c) / 2, (1 + v.c) / 2, -(1 - v.xi), -v.xi
 
 
-@compiled
+@compile_kernel
 def _add_stretch(d_area: FloatArray, first: int, x: FloatArray, a: int, b: int, weight: float) -> None:
     """Add weight × Δl_ab to the Δ of an area; a and b are the local nodes `first` and `first` + 1."""
     _, t, _ = frame(node(x, a), node(x, b))
@@ -312,12 +313,12 @@ def _add_stretch(d_area: FloatArray, first: int, x: FloatArray, a: int, b: int, 
         d_area[first + 1, j] += weight * t[j]
 
 
-@compiled
+@compile_kernel
 def _add_constraint(
-    where: IntArray,
+    index: IntArray,
     values: FloatArray,
     place: int,
-    own: int,
+    unknown: int,
     nodes: IntArray,
     v: Contact,
     area: float,
@@ -327,20 +328,20 @@ def _add_constraint(
     shape = _shapes(v)
     for column in range(N_LOCAL):
         for j in range(2):
-            where[0, place], where[1, place] = own, 2 * nodes[column] + j
+            index[0, place], index[1, place] = unknown, 2 * nodes[column] + j
             values[place] = d_row[column, j]
             place += 1
     for k in range(4):
         for j in range(2):
-            where[0, place], where[1, place] = 2 * nodes[k] + j, own
+            index[0, place], index[1, place] = 2 * nodes[k] + j, unknown
             values[place] = -area * shape[k] * v.normal[j]
             place += 1
     return place
 
 
-@compiled
+@compile_kernel
 def _add_forces(
-    where: IntArray,
+    index: IntArray,
     values: FloatArray,
     place: int,
     nodes: IntArray,
@@ -357,12 +358,12 @@ def _add_forces(
             for column in range(N_LOCAL):
                 for j in range(2):
                     value = shape[k] * (d_f[column, j] * v.normal[i] - f * v.t[i] * d_omega[column, j])
-                    if k == ONE:
+                    if k == NODE_1:
                         value += d_xi[column, j] * f * v.normal[i]
-                    elif k == TWO:
+                    elif k == NODE_2:
                         value -= d_xi[column, j] * f * v.normal[i]
-                    where[0, place] = 2 * nodes[k] + i
-                    where[1, place] = 2 * nodes[column] + j
+                    index[0, place] = 2 * nodes[k] + i
+                    index[1, place] = 2 * nodes[column] + j
                     values[place] = value
                     place += 1
     return place

@@ -108,7 +108,7 @@ class PointContact:
         if self.area_from == eq6.NODAL:
             weight = np.ones_like(gap)
         pressure = multipliers if len(multipliers) else -self.penalty * gap
-        nowhere = np.full_like(gap, np.nan)
+        undefined = np.full_like(gap, np.nan)
         return ContactPoints(
             slave_segment=pairing["segment"],
             c=c,
@@ -120,8 +120,8 @@ class PointContact:
             pressure=np.where(pairing["active"], pressure, 0.0),
             weight=weight,
             active=pairing["active"],
-            area_from=nowhere,
-            area_to=nowhere,
+            area_from=undefined,
+            area_to=undefined,
         )
 
     def _points(self, interface: Interface) -> tuple[IntArray, IntArray, IntArray]:

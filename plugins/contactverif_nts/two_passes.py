@@ -171,7 +171,7 @@ def _traits(inner: Traits) -> Traits:
     if inner.enforcement == "penalty" and inner.passes_flat_patch is not None:
         passes, witnesses["patch"] = False, "a1"
     elif inner.enforcement == "multiplier":
-        independent = False  # where two nodes coincide, each has a multiplier for the one gap
+        independent = False  # two nodes in one place have two multipliers for one gap
         witnesses["multipliers"] = "a1"
         if inner.penalty == "nodal" and inner.conserves_force and inner.conserves_moment:
             passes = True

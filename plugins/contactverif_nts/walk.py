@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compiled
+from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
     Tree,
     Vector,
@@ -37,7 +37,7 @@ from contactverif.geometry.projection import (
     nearest_segment,
     node,
 )
-from contactverif_nts.eq6 import Fields, pressed
+from contactverif_nts.eq6 import Fields, is_pressed
 
 TRUNCATE, EXTEND, COVER = 0, 1, 2  # What happens to an area of competence that overhangs a free end.
 FREE_ENDS = {"truncate": TRUNCATE, "extend": EXTEND, "cover": COVER}  # The words of the option `free_end`.
@@ -58,13 +58,13 @@ class Areas(NamedTuple):
     active: BoolArray  # V is in contact
 
 
-@compiled
+@compile_kernel
 def middle_of_part(i: int, n: int) -> float:
     """Return where on its slave segment the virtual slave node i lies, c in [−1, 1]; there are n on each segment."""
     return -1 + (2 * (i % n) + 1) / n
 
 
-@compiled
+@compile_kernel
 def pair(
     x: FloatArray,
     multipliers: FloatArray,
@@ -104,14 +104,14 @@ def pair(
         if c_p <= c_q or dot(minus(x_p, x_1), t) >= dot(minus(x_q, x_1), t):
             continue
         on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[i] = pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
+        active[i] = is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
         first[i], last[i] = _walk(x, x_p, x_q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
             clip_p[i], clip_q[i] = _truncate(x, x_p, x_q, first[i], last[i], t, master, neighbours)
     return partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active
 
 
-@compiled
+@compile_kernel
 def _walk(
     x: FloatArray, x_p: Vector, x_q: Vector, m: int, t: Vector, master: IntArray, neighbours: IntArray
 ) -> tuple[int, int]:
@@ -130,13 +130,13 @@ def _walk(
     return first, last
 
 
-@compiled
+@compile_kernel
 def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) -> float:
     """Return the length of a master segment along t, negative where the segment runs backwards."""
     return dot(minus(node(x, master[segment, 1]), node(x, master[segment, 0])), t)
 
 
-@compiled
+@compile_kernel
 def _truncate(
     x: FloatArray, x_p: Vector, x_q: Vector, first: int, last: int, t: Vector, master: IntArray, neighbours: IntArray
 ) -> tuple[int, int]:
@@ -149,7 +149,7 @@ def _truncate(
     return clip_p, clip_q
 
 
-@compiled
+@compile_kernel
 def _cover(
     x: FloatArray,
     master: IntArray,

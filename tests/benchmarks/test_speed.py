@@ -1,4 +1,4 @@
-"""How long the parts take, and the ratios that are promised. No verdict hangs on a clock: the ratios are printed.
+"""Measure how long the parts of a formulation take, and print the ratios. No verdict depends on a clock.
 
 Run with `tox -e bench`, or `pytest tests/benchmarks --benchmark-only -s`.
 """
@@ -21,24 +21,24 @@ from contactverif_properties.tangent_directional import measure_directional
 NAMES = ("nts", "vts_me", "vts_ppt", "vts_ppt_balanced")
 
 
-def wavy(n_slave: int) -> Case:
-    """A wavy slave pressed into a wavy master of 1.3 times as many segments, all in contact."""
+def make_wavy(n_slave: int) -> Case:
+    """Return a wavy slave pressed into a wavy master of 1.3 times as many segments, all in contact."""
     upper, lower = np.linspace(0, n_slave, n_slave + 1), np.linspace(-0.3, n_slave + 0.4, int(1.3 * n_slave) + 1)
     slave = np.column_stack([upper, -0.2 - 0.05 * np.cos(upper) ** 2])
     interface = Interface.from_chains(slave, np.column_stack([lower, 0.05 * np.sin(lower)])[::-1])
     return Case(interface, interface.nodes.ravel(), penalty=10.0, seed=1)
 
 
-def interleaved(*calls: Callable[[], Any], rounds: int = 9, repeats: int = 20) -> list[float]:
-    """Median seconds of one call of each, taken in turn so that a slow moment hits all of them."""
+def time_in_turns(*calls: Callable[[], Any], rounds: int = 9, repeats: int = 20) -> list[float]:
+    """Return the median seconds of one call of each, measured in turns so that a slow moment hits all of them."""
     times: list[list[float]] = [[] for _ in calls]
     for _ in range(rounds):
-        for call, mine in zip(calls, times, strict=True):
+        for call, durations in zip(calls, times, strict=True):
             start = perf_counter()
             for _ in range(repeats):
                 call()
-            mine.append((perf_counter() - start) / repeats)
-    return [median(mine) for mine in times]
+            durations.append((perf_counter() - start) / repeats)
+    return [median(durations) for durations in times]
 
 
 @pytest.mark.parametrize("n_slave", [10, 100, 1000])
@@ -46,7 +46,7 @@ def interleaved(*calls: Callable[[], Any], rounds: int = 9, repeats: int = 20) -
 @pytest.mark.parametrize("verb", ["pair", "residual", "tangent"])
 def test_verb(benchmark: Any, verb: str, name: str, n_slave: int) -> None:
     benchmark.group = f"{verb}, {n_slave} slave segments"
-    case = wavy(n_slave)
+    case = make_wavy(n_slave)
     formulation = Subject(name, getattr(contactverif_nts, name)).for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     calls = {
@@ -61,16 +61,16 @@ def test_verb(benchmark: Any, verb: str, name: str, n_slave: int) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_directional_check(benchmark: Any, capsys: pytest.CaptureFixture[str], name: str, n_slave: int) -> None:
     benchmark.group = f"tangent.directional, {n_slave} slave segments"
-    case, subject = wavy(n_slave), Subject(name, getattr(contactverif_nts, name))
+    case, subject = make_wavy(n_slave), Subject(name, getattr(contactverif_nts, name))
     formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
 
-    def evaluated() -> Any:
+    def evaluate() -> Any:
         return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
 
-    check, whole, frozen = interleaved(
+    check, whole, frozen = time_in_turns(
         lambda: measure_directional(case, subject),
-        evaluated,
+        evaluate,
         lambda: formulation.residual(case.interface, pairing, case.z),
     )
     benchmark.extra_info |= {"over a residual with its search": check / whole, "over a residual": check / frozen}

@@ -9,7 +9,7 @@ from contactverif import Interface, oracle
 from contactverif.geometry.projection import nearest_segment, search_tree
 
 
-def found(interface: Interface, x: np.ndarray, p: np.ndarray) -> int:
+def find_nearest(interface: Interface, x: np.ndarray, p: np.ndarray) -> int:
     order, boxes = search_tree(interface.master, x)
     return int(nearest_segment((p[0], p[1]), x, interface.master.segments, order, boxes))
 
@@ -24,7 +24,7 @@ def test_the_nearest_segment_is_the_rational_one(seed: int) -> None:
     x = interface.nodes.copy()
     for node in range(11):
         expected = oracle.project_point(interface, x.ravel(), node, -1)
-        here = found(interface, x, x[node])
+        here = find_nearest(interface, x, x[node])
         assert here in expected.tied
         if len(expected.tied) == 1:
             assert here == expected.segment
@@ -34,4 +34,4 @@ def test_ties_at_a_vertex_go_by_the_foot_and_then_by_number() -> None:
     corner = Interface.from_chains([[0, 5], [1, 5]], [[2, 2], [0, 0], [-2, 2]])  # re-entrant seen from above
     x = corner.nodes.copy()
     for p, expected in (([0.5, -1.0], 0), ([-0.5, -1.0], 1), ([0.0, -1.0], 0)):
-        assert found(corner, x, np.array(p)) == expected
+        assert find_nearest(corner, x, np.array(p)) == expected

@@ -20,7 +20,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import Subject
 from contactverif.geometry import projection
-from contactverif.geometry.compiled import uncompiled
+from contactverif.geometry.compiled import python_function
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bulk import assemble_stiffness, body_from_mesh
@@ -457,8 +457,8 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
 
     Counted inside the search itself: its own Python functions run, not compiled, with a counter for a distance.
     """
-    distance, search = uncompiled(projection.distance_to_segment), uncompiled(projection.nearest_segment)
-    pairs = [(module, uncompiled(module.pair)) for module in (eq6, walk)]
+    distance, search = python_function(projection.distance_to_segment), python_function(projection.nearest_segment)
+    pairs = [(module, python_function(module.pair)) for module in (eq6, walk)]
 
     def count(name: str, case: Case) -> Counts:
         evaluated: list[bool] = []

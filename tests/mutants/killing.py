@@ -1,4 +1,4 @@
-"""Which property catches which mutant, and at which of its cases. The cases of a property are drawn once for all."""
+"""Find which property catches which mutant, and at which of its cases. All mutants get the same cases."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ KEY = "kills"  # under which a row of the matrix travels in the report of a test
 
 @cache
 def properties() -> tuple[Property, ...]:
-    """All that are installed, sorted by id."""
-    found = load_properties()
-    assert all(isinstance(one, Property) for one in found), found
-    return tuple(one for one in found if isinstance(one, Property))
+    """Return all installed properties, sorted by id."""
+    loaded = load_properties()
+    assert all(isinstance(question, Property) for question in loaded), loaded
+    return tuple(question for question in loaded if isinstance(question, Property))
 
 
 @cache
 def cases(property_id: str, seed: int = SEED, examples: int = EXAMPLES) -> tuple[Case, ...]:
-    """The planned cases of a property, as a run with that seed draws them."""
-    (question,) = (one for one in properties() if one.id == property_id)
+    """Return the planned cases of a property, as a run with that seed draws them."""
+    (question,) = (question for question in properties() if question.id == property_id)
     return draw_cases(question.cases(None), seed=f"{seed}/{property_id}", examples=examples).cases
 
 
 def caught_at(question: Property, subject: Subject, examples: int) -> int:
-    """The number of the first case that accuses the formulation of what it promised, from 1; 0 if none does."""
+    """Return the number of the first case that accuses the formulation of what it promised, from 1; 0 if none does."""
     if question.applicable(subject.traits) or question.needs - subject.provides:
         return 0
     promised = question.promise(subject.traits) is True
@@ -58,22 +58,35 @@ def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
 
 
 def as_lines(matrix: dict[str, tuple[str, dict[str, int]]]) -> list[str]:
-    """The kill matrix as text, from {mutant: (the property that is meant to catch it, its `kills`)}.
+    """Write the kill matrix as text, from {mutant: (the property that is meant to catch it, its `kills`)}.
 
     A number is the first case that caught the mutant, in brackets where the property is the one that is meant to; a
     bracket without a number is a survivor.
     """
     ids = list(next(iter(matrix.values()))[1])
-    firsts = [one.partition(".")[0] for one in ids]
-    titles = [
-        first if firsts.count(first) == 1 else one.rpartition(".")[2] for one, first in zip(ids, firsts, strict=True)
-    ]
+    titles = _short_titles(ids)
     widths = [max(len(title), 5) for title in titles]
-    wide = max(map(len, matrix))
-    lines = [f"{'':{wide}}  " + "  ".join(f"{title:>{width}}" for title, width in zip(titles, widths, strict=True))]
-    for name, (meant, row) in matrix.items():
-        marks = [f"[{row[one] or ''}]" if one == meant else str(row[one] or "·") for one in ids]
-        lines.append(f"{name:{wide}}  " + "  ".join(f"{m:>{width}}" for m, width in zip(marks, widths, strict=True)))
-    totals = [str(sum(row[one] > 0 for _, row in matrix.values())) for one in ids]
-    lines.append(f"{'caught':{wide}}  " + "  ".join(f"{t:>{width}}" for t, width in zip(totals, widths, strict=True)))
+    margin = max(map(len, matrix))
+
+    def line(name: str, cells: list[str]) -> str:
+        return f"{name:{margin}}  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+
+    lines = [line("", titles)]
+    for name, (intended, row) in matrix.items():
+        lines.append(line(name, [_mark(row[question], bracket=question == intended) for question in ids]))
+    lines.append(line("caught", [str(sum(row[question] > 0 for _, row in matrix.values())) for question in ids]))
     return lines
+
+
+def _short_titles(ids: list[str]) -> list[str]:
+    """Return the first word of each property id, or its last word where several ids share the first."""
+    families = [question.partition(".")[0] for question in ids]
+    return [
+        family if families.count(family) == 1 else question.rpartition(".")[2]
+        for question, family in zip(ids, families, strict=True)
+    ]
+
+
+def _mark(number: int, bracket: bool) -> str:
+    """Return the text of a cell: the number of the first case, or nothing."""
+    return f"[{number or ''}]" if bracket else str(number or "·")

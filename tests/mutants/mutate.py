@@ -45,7 +45,7 @@ def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0,
     package.__path__ = []
     sys.modules[copy] = package
     for name, source in sources.items():
-        source = source.replace(PACKAGE, copy).replace("\n@compiled\n", "\n")
+        source = source.replace(PACKAGE, copy).replace("\n@compile_kernel\n", "\n")
         part = types.ModuleType(f"{copy}.{name}")
         sys.modules[f"{copy}.{name}"] = part
         setattr(package, name, part)

@@ -16,10 +16,14 @@ from contactverif.run.registry import load_formulation, load_properties, propert
 from contactverif.run.runner import judge_case, run
 
 
-def the_property(property_id: str) -> Property:
-    (found,) = load_properties([property_id])
-    assert isinstance(found, Property)
-    return found
+def load_property(property_id: str) -> Property:
+    (question,) = load_properties([property_id])
+    assert isinstance(question, Property)
+    return question
+
+
+def mutant_named(name: str) -> Mutant:
+    return next(mutant for mutant in MUTANTS if mutant.name == name)
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
@@ -32,7 +36,7 @@ def test_the_mutant_is_caught_by_the_property_that_is_meant_to(
 
 
 @pytest.mark.parametrize("mutant", SURVIVORS, ids=lambda mutant: mutant.name)
-def test_what_no_property_asks_after_yet_survives(
+def test_a_mutant_whose_property_is_missing_survives(
     mutant: Mutant, record_property: Callable[[str, object], None]
 ) -> None:
     """Once this fails, the mutant belongs to MUTANTS."""
@@ -41,24 +45,24 @@ def test_what_no_property_asks_after_yet_survives(
     assert not any(row.values()), row
 
 
-def test_a_run_finds_a_mutant_out_and_shrinks_it() -> None:
-    mutant = next(one for one in MUTANTS if one.name == "ξ of the last segment from its other end")
-    found = run([Subject(mutant.name, mutant.make)], [the_property(mutant.caught_by)], profile="ci")
-    (row,) = found.rows
+def test_a_run_accuses_a_mutant_and_shrinks_its_case() -> None:
+    mutant = mutant_named("ξ of the last segment from its other end")
+    result = run([Subject(mutant.name, mutant.make)], [load_property(mutant.caught_by)], profile="ci")
+    (row,) = result.rows
     assert row.unexpected == "promised to pass, but fails"
-    assert not found.passed
+    assert not result.passed
     assert row.shrunk is not None
     assert row.shrunk.verdict is Verdict.FAIL
     interface = row.shrunk.case.interface
     assert len(interface.slave) + len(interface.master) <= 6
 
 
-def test_a_mutant_that_changes_the_mesh_has_nobody_else_accused() -> None:
-    mutant = next(one for one in MUTANTS if one.name == "interface modified")
+def test_a_mutant_that_changes_the_mesh_lets_no_other_formulation_fail() -> None:
+    mutant = mutant_named("interface modified")
     innocent = load_formulation("vts-ppt-balanced:area=reference")
     questions = load_properties(["patch.*", "purity"])
-    found = run([Subject(mutant.name, mutant.make), innocent], questions, examples=40, seed=1)
-    assert {row.formulation for row in found.rows if row.unexpected} == {mutant.name}
+    result = run([Subject(mutant.name, mutant.make), innocent], questions, examples=40, seed=1)
+    assert {row.formulation for row in result.rows if row.unexpected} == {mutant.name}
 
 
 def test_every_property_has_its_mutant() -> None:
@@ -83,13 +87,17 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> 
     subject = load_formulation(name)
     assert isinstance(subject, Subject)
     decided = 0
-    asked = [one for one in properties() if one.promise(subject.traits) is True and not one.applicable(subject.traits)]
-    for question in asked:
+    questions = [
+        question
+        for question in properties()
+        if question.promise(subject.traits) is True and not question.applicable(subject.traits)
+    ]
+    for question in questions:
         for case in cases(question.id, seed, 50):
             outcome = judge_case(question, case, subject)
             assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), (question.id, outcome.reason, case)
             decided += outcome.decided
-    assert decided >= 0.95 * 50 * len(asked)
+    assert decided >= 0.95 * 50 * len(questions)
 
 
 def test_a_mutant_whose_line_is_gone_says_so() -> None:

@@ -135,13 +135,13 @@ def _encodes_numbers(penalty: float) -> Any:
             xi, area = (np.packbits(pairing[name]).view(float) for name in ("xi", "area"))
             for point in np.flatnonzero(pairing["active"]):
                 a, b = interface.slave.segments[pairing["segment"][point]]
-                one, two = interface.master.segments[pairing["master"][point]]
+                node_1, node_2 = interface.master.segments[pairing["master"][point]]
                 c = inner.c[pairing["slot"][point]]
-                t = (x[two] - x[one]) / np.linalg.norm(x[two] - x[one])
+                t = (x[node_2] - x[node_1]) / np.linalg.norm(x[node_2] - x[node_1])
                 normal = np.array([t[1], -t[0]])
                 v = (1 - c) / 2 * x[a] + (1 + c) / 2 * x[b]
-                force = penalty * ((v - x[one]) @ normal) * area[point] * normal
-                shares = ((a, (1 - c) / 2), (b, (1 + c) / 2), (one, xi[point] - 1), (two, -xi[point]))
+                force = penalty * ((v - x[node_1]) @ normal) * area[point] * normal
+                shares = ((a, (1 - c) / 2), (b, (1 + c) / 2), (node_1, xi[point] - 1), (node_2, -xi[point]))
                 for node, share in shares:
                     forces[node] += share * force
             return forces.reshape(-1)
@@ -229,7 +229,7 @@ def _pushes_along_rollers(penalty: float) -> Any:
 
 MUTANTS = (
     line("pulls where the gap is open", UNILATERAL, "eq6",
-         "pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface", "on_surface",
+         "is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface", "on_surface",
          factory="vts_me"),
     line("multiplier that pulls stays active", COMPLEMENTARITY, "eq6",
          "multipliers[i] - penalty * g >= 0", "multipliers[i] - penalty * g >= 0 or multipliers[i] < 0",
@@ -284,7 +284,7 @@ MUTANTS = (
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2",
          "f_v = penalty * pressure * l_ab * (v.c_p - v.c_q) / 2"),
     line("pushes where the gap is open", PATCH, "walk",
-         "pressed(dot(minus(x_v, x_1), normal),", "pressed(-dot(minus(x_v, x_1), normal),"),
+         "is_pressed(dot(minus(x_v, x_1), normal),", "is_pressed(-dot(minus(x_v, x_1), normal),"),
     line("virtual slave nodes at Gauss points", PATCH, "box3",
          "c, zero = middle_of_part(i, n), 0 * x_a[0]", "c, zero = middle_of_part(i, n) * 2 / 3**0.5, 0 * x_a[0]"),
     line("area of competence ends at the virtual slave node", PATCH, "box3",
@@ -296,7 +296,7 @@ MUTANTS = (
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2", "f_v = -pressure * l_ab * (v.c_p - v.c_q) / 2"),
     Mutant("positions in single precision", PATCH, lambda *, penalty: _single_precision(penalty)),
     line("sign of ω in Eq. 6", TANGENT, "eq6",
-         "d_omega[ONE, j] = -v.normal[j] / v.l_12", "d_omega[ONE, j] = v.normal[j] / v.l_12", factory="vts_me"),
+         "d_omega[NODE_1, j] = -v.normal[j] / v.l_12", "d_omega[NODE_1, j] = v.normal[j] / v.l_12", factory="vts_me"),
     line("Δn missing", TANGENT, "box3_tangent",
          "value -= force * at.t[i] * d_omega[column, j]", "pass"),
     line("Δl_AB missing", TANGENT, "box3_tangent",
@@ -316,7 +316,7 @@ MUTANTS = (
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, middle_of_part(i, n) + 1 / n, middle_of_part(i, n) - 1 / n); "
          "v = v._replace(c_p=c_p, c_q=c_q, x_p=between(x_a, x_b, c_p), x_q=between(x_a, x_b, c_q))"),
     line("last point missing in the tangent", TANGENT, "box3_tangent",
-         "for i in range(len(active)):\n        own", "for i in range(len(active) - 1):\n        own"),
+         "for i in range(len(active)):\n        unknown", "for i in range(len(active) - 1):\n        unknown"),
     line("rotation of the frame that cuts missing", TANGENT, "box3_tangent",
          "lever = dot(minus(between(x_a, x_b, c), x_e), normal)", "lever = 0.0"),
     line("lever of the ends of an area missing", TANGENT, "box3_tangent",
@@ -326,8 +326,8 @@ MUTANTS = (
     line("g ω missing in Δξ", TANGENT, "eq6",
          "d_xi += v.g * d_omega / v.l_12", "pass", factory="vts_me"),
     line("rows and columns exchanged", TANGENT, "box3_tangent",
-         "where[0, place] = 2 * nodes[k] + i\n                where[1, place] = 2 * nodes[column] + j",
-         "where[1, place] = 2 * nodes[k] + i\n                where[0, place] = 2 * nodes[column] + j"),
+         "index[0, place] = 2 * nodes[k] + i\n                index[1, place] = 2 * nodes[column] + j",
+         "index[1, place] = 2 * nodes[k] + i\n                index[0, place] = 2 * nodes[column] + j"),
     Mutant("tangent symmetrised", TANGENT, lambda *, penalty: _symmetrises(penalty)),
     line("length without its imaginary part", TANGENT, "box3",
          "l_ab, _, _ = frame(x_a, x_b)\n    if", "l_ab = frame(x_a, x_b)[0].real\n    if"),
@@ -344,7 +344,7 @@ MUTANTS = (
          "l_12, t, normal = frame(x_1, node(x, node_2)); normal = (0 * normal[0], 1.0 + 0 * normal[1])",
          factory="vts_me"),
     line("absolute tolerance for a gap", SCALING, "walk",
-         "pressed(dot(minus(x_v, x_1), normal),", "pressed(dot(minus(x_v, x_1), normal) - 1e-9,"),
+         "is_pressed(dot(minus(x_v, x_1), normal),", "is_pressed(dot(minus(x_v, x_1), normal) - 1e-9,"),
     line("absolute guard against a division by zero", SCALING, "box3",
          "xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12", "xi = dot(minus(v.x_v, v.x_1), v.t) / (v.l_12 + 1e-12)"),
     line("shortest length allowed, absolute", SCALING, "eq6",

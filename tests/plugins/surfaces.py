@@ -13,7 +13,7 @@ from contactverif import Interface
 DEPTH = 1 / 8
 
 
-def bent(seed: int) -> tuple[Interface, Any]:
+def make_bent(seed: int) -> tuple[Interface, Any]:
     """A bent, tilted slave pressed into a bent master, with overhang on either side: the interface and z."""
     random = np.random.default_rng(seed)
     chains = []
@@ -29,7 +29,7 @@ def bent(seed: int) -> tuple[Interface, Any]:
     return interface, x.ravel()
 
 
-def flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.0) -> tuple[Interface, Any]:
+def make_flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.0) -> tuple[Interface, Any]:
     """Segments of these lengths, from left to right; the slave is DEPTH below the master, which begins at `shift`."""
     upper = np.array([0.0, *accumulate(slave)])
     lower = np.array([0.0, *accumulate(master)])[::-1] + shift
@@ -41,7 +41,7 @@ def flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.0) ->
     return interface, x.ravel()
 
 
-def pushed(formulation: Any, interface: Interface, z: Any) -> Any:
+def contact_forces(formulation: Any, interface: Interface, z: Any) -> Any:
     """Forces (n_nodes, 2) by which contact pushes the nodes."""
     residual = formulation.residual(interface, formulation.pair(interface, z), z)
     return -residual[: interface.n_unknowns].reshape(-1, 2)

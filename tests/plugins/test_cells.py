@@ -1,4 +1,4 @@
-"""Which segments make a cell and where it ends: against rationals and brute force, and what must not be touched."""
+"""Cells agree with rational overlaps and with brute force, and bodies that must not be touched make none."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 from contactverif import Interface
 from contactverif.contract.interface import Surface
@@ -17,14 +17,14 @@ from contactverif_mortar.cell_geometry import SlaveView
 from contactverif_mortar.cell_search import overlap
 from contactverif_mortar.integration_cells import GAP, WEIGHT, C, Cells, Quadrature
 
-ONE = Quadrature.gauss(1, current=True)
+MIDPOINT = Quadrature.gauss(1, current=True)
 
 
 def cells_at(interface: Interface, z: Any, averaged: bool = False) -> tuple[Cells, Any]:
     """The cells, and the point in the middle of each, (n_cells, 6)."""
     x = np.array(z).reshape(-1, 2)
     cells = Cells.find(interface, x, averaged)
-    return cells, ONE.points(interface, cells, x[None])[0]
+    return cells, MIDPOINT.points(interface, cells, x[None])[0]
 
 
 def in_two_chains(slave: Any, *masters: Any) -> Interface:
@@ -43,25 +43,25 @@ def test_cells_of_a_flat_interface_are_the_rational_overlaps(seed: int) -> None:
     random = np.random.default_rng(seed)
     slave, master = (random.integers(1, 9, random.integers(1, 8)).tolist() for _ in range(2))
     shift = int(random.integers(-8, 9)) / 2
-    interface, z = flat(slave, master, shift)
+    interface, z = make_flat(slave, master, shift)
     cells, points = cells_at(interface, z)
     places = [Fraction(value) for value in z[::2]]
     exact = {}
     for s, (a, b) in enumerate(interface.slave.segments):
-        for m, (one, two) in enumerate(interface.master.segments):
-            low, high = max(places[a], places[two]), min(places[b], places[one])
+        for m, (node_1, node_2) in enumerate(interface.master.segments):
+            low, high = max(places[a], places[node_2]), min(places[b], places[node_1])
             if low < high:
                 exact[s, m] = high - low
-    found = dict(zip(zip(cells.slave.tolist(), cells.master.tolist(), strict=True), points, strict=True))
-    assert found.keys() == exact.keys()
+    computed = dict(zip(zip(cells.slave.tolist(), cells.master.tolist(), strict=True), points, strict=True))
+    assert computed.keys() == exact.keys()
     for pair, length in exact.items():
-        assert found[pair][WEIGHT] == pytest.approx(float(length), abs=1e-14)
-        assert found[pair][GAP] == -DEPTH
+        assert computed[pair][WEIGHT] == pytest.approx(float(length), abs=1e-14)
+        assert computed[pair][GAP] == -DEPTH
 
 
 def test_the_search_finds_what_brute_force_finds() -> None:
     for seed in range(200):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         x = z.reshape(-1, 2)
         cells, points = cells_at(interface, z)
         assert np.all(np.abs(points[:, C]) < 1)
@@ -87,11 +87,11 @@ def test_the_strip_holds_all_segments_that_have_a_node_in_it() -> None:
         t = (b - a) / np.linalg.norm(b - a)
         turns = [np.array([[np.cos(w), -np.sin(w)], [np.sin(w), np.cos(w)]]) for w in (lean, -lean)]
         n_a, n_b = (turn @ [t[1], -t[0]] for turn in turns)
-        found = segments_in_strip(tuple(a), tuple(n_a), tuple(b), tuple(n_b), 1.5, *search_tree(interface.master, x))
+        computed = segments_in_strip(tuple(a), tuple(n_a), tuple(b), tuple(n_b), 1.5, *search_tree(interface.master, x))
         p = x[interface.master.segments]  # (n_segments, 2, 2)
         near = np.linalg.norm(p - a - np.clip((p - a) @ t, 0, np.linalg.norm(b - a))[..., None] * t, axis=2) < 1.5
         inside = near & ((p - a) @ [-n_a[1], n_a[0]] > 0) & ((p - b) @ [-n_b[1], n_b[0]] < 0)
-        assert set(np.flatnonzero(inside.any(axis=1))) <= set(found)
+        assert set(np.flatnonzero(inside.any(axis=1))) <= set(computed)
 
 
 def test_the_far_side_of_a_ring_is_not_touched() -> None:
@@ -119,7 +119,7 @@ def test_of_two_bodies_one_behind_the_other_the_first_is_touched() -> None:
 
 
 def test_a_penetration_of_two_segments_is_contact_and_a_floor_far_below_is_none() -> None:
-    interface, _ = flat([1.0] * 6, [1.0] * 6)
+    interface, _ = make_flat([1.0] * 6, [1.0] * 6)
     for depth, n_cells in ((2.0, 6), (3.9, 6), (-3.9, 6), (4.1, 0), (-4.1, 0)):
         x = interface.nodes.copy()
         x[:7, 1] = -depth
@@ -131,7 +131,7 @@ def test_what_faces_away_or_stands_edge_on_is_no_cell() -> None:
     for master in ([[0.0, 0.1], [2, 0.1]], [[1.0, 0.5], [1.0, -0.5]], [[1.0, -0.5], [1.0, 0.5]]):
         interface = Interface.from_chains([[0.0, 0], [2, 0]], master)
         assert not len(cells_at(interface, interface.nodes)[0].slave)
-        assert not pushed(sts(penalty=1.0), interface, interface.nodes.ravel()).any()
+        assert not contact_forces(sts(penalty=1.0), interface, interface.nodes.ravel()).any()
 
 
 @pytest.mark.parametrize("make", [sts, mortar, mortar_dual])
@@ -139,19 +139,20 @@ def test_chains_far_away_change_nothing_bitwise(make: Any) -> None:
     random = np.random.default_rng(2)
     formulation = make(penalty=3.0)
     for seed in range(20):
-        near, z = bent(seed)
+        near, z = make_bent(seed)
         x, n = z.reshape(-1, 2), near.n_slave_nodes
         far = np.cumsum(random.uniform(1, 50, (30, 2)), axis=0)[::-1] + [500, 300]
         whole = in_two_chains(x[:n], x[n:], far)
-        both = np.vstack([x, far]).ravel()
-        one, other = formulation.pair(near, z), formulation.pair(whole, both)
-        assert one == other
+        all_positions = np.vstack([x, far]).ravel()
+        first, other = formulation.pair(near, z), formulation.pair(whole, all_positions)
+        assert first == other
         assert np.array_equal(
-            np.append(formulation.residual(near, one, z), np.zeros(60)), formulation.residual(whole, other, both)
+            np.append(formulation.residual(near, first, z), np.zeros(60)),
+            formulation.residual(whole, other, all_positions),
         )
         assert np.array_equal(
-            formulation.tangent(near, one, z).toarray(),
-            formulation.tangent(whole, other, both).toarray()[: z.size, : z.size],
+            formulation.tangent(near, first, z).toarray(),
+            formulation.tangent(whole, other, all_positions).toarray()[: z.size, : z.size],
         )
 
 
@@ -168,7 +169,7 @@ def test_with_averaged_normals_a_cell_ends_where_a_slave_point_sees_the_master_n
     cuts = 0
     ends = Quadrature(np.array([-1.0, 1.0]), np.array([0.5, 0.5]), current=True)
     for seed in range(50):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         cells, _ = cells_at(interface, z, averaged=True)
         points = ends.points(interface, cells, z.reshape(1, -1, 2))[0].reshape(-1, 2, 6)
         for cell, (low, high) in enumerate(points):

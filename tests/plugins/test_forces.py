@@ -1,4 +1,4 @@
-"""What the formulations of the paper transmit: its tables exactly, and what is known of the printed algorithm."""
+"""The formulations transmit the forces of the paper's tables exactly; the printed algorithm has its known defects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, flat, pushed
+from surfaces import DEPTH, contact_forces, make_flat
 
 import contactverif_nts
 from contactverif import Interface, MisuseError
@@ -45,7 +45,7 @@ ON_THE_SLAVE = {"A1": "1 2 1", "B": "1 2 3 4 2", "C": "1 2 3 4 2"}
 EVERY = ("nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_basic", "vts_ppt_balanced")
 
 
-def exactly(text: str) -> list[Fraction]:
+def read_fractions(text: str) -> list[Fraction]:
     return [Fraction(word) for word in text.split()]
 
 
@@ -55,38 +55,38 @@ def exactly(text: str) -> list[Fraction]:
 )
 def test_force_tables_come_out_exactly(case: str, name: str, expected: str) -> None:
     slave, master, _ = TABLE[case]
-    interface, z = flat(slave, master)
-    forces = pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
+    interface, z = make_flat(slave, master)
+    forces = contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
     n_slave = interface.n_slave_nodes
-    found = [Fraction(float(value)).limit_denominator(60) for value in -forces[n_slave:, 1][::-1]]
-    assert found == exactly(expected)
-    assert np.abs([float(value) for value in found] + forces[n_slave:, 1][::-1]).max() < 64 * 2.0**-53
-    on_slave = [1] * n_slave if name == "nts" else exactly(ON_THE_SLAVE[case])
+    computed = [Fraction(float(value)).limit_denominator(60) for value in -forces[n_slave:, 1][::-1]]
+    assert computed == read_fractions(expected)
+    assert np.abs([float(value) for value in computed] + forces[n_slave:, 1][::-1]).max() < 64 * 2.0**-53
+    on_slave = [1] * n_slave if name == "nts" else read_fractions(ON_THE_SLAVE[case])
     assert [Fraction(float(value)) for value in forces[:n_slave, 1]] == on_slave
     assert not forces[:, 0].any()
 
 
 @pytest.mark.parametrize("theta", [0.1, 0.3])
 def test_printed_ppt_loses_one_minus_cosine_of_the_slave_force(theta: float) -> None:
-    interface, z = flat([1.0], [1.3, 1.4], shift=-0.8)
+    interface, z = make_flat([1.0], [1.3, 1.4], shift=-0.8)
     x = z.reshape(-1, 2).copy()
     x[1] = x[0] + [np.cos(theta), -np.sin(theta)]  # penetrates deeper to the right; each area covers both segments
-    forces = pushed(contactverif_nts.vts_ppt(penalty=PENALTY, n=1), interface, x.ravel())
+    forces = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY, n=1), interface, x.ravel())
     pairing = contactverif_nts.vts_ppt(penalty=PENALTY, n=1).pair(interface, x.ravel())
     assert pairing["first"][0] != pairing["last"][0]
     defect = np.linalg.norm(forces.sum(axis=0)) / np.linalg.norm(forces[:2].sum(axis=0))
     assert defect == pytest.approx(1 - np.cos(theta), rel=1e-12)
-    balanced = pushed(contactverif_nts.vts_ppt_balanced(penalty=PENALTY, n=1), interface, x.ravel())
+    balanced = contact_forces(contactverif_nts.vts_ppt_balanced(penalty=PENALTY, n=1), interface, x.ravel())
     assert np.linalg.norm(balanced.sum(axis=0)) < 16 * 2.0**-53
 
 
 def test_free_ends_truncate_extend_and_cover() -> None:
     """Half of the slave's last quarter overhangs; beside it a short last segment of the master."""
-    interface, z = flat([4.0], [3.375, 0.125], shift=0.0)
+    interface, z = make_flat([4.0], [3.375, 0.125], shift=0.0)
     n_slave = interface.n_slave_nodes
-    truncated = pushed(contactverif_nts.vts_ppt(penalty=PENALTY), interface, z)
-    extended = pushed(contactverif_nts.vts_ppt(penalty=PENALTY, free_end="extend"), interface, z)
-    covered = pushed(contactverif_nts.vts_ppt_balanced(penalty=PENALTY), interface, z)
+    truncated = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY), interface, z)
+    extended = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY, free_end="extend"), interface, z)
+    covered = contact_forces(contactverif_nts.vts_ppt_balanced(penalty=PENALTY), interface, z)
     assert truncated[:n_slave, 1].sum() == 4
     assert -truncated[n_slave:, 1].sum() == 3.5
     b = 5.0  # the area of competence ends five lengths of the last segment behind its beginning
@@ -98,35 +98,35 @@ def test_free_ends_truncate_extend_and_cover() -> None:
 
 
 def test_a_slave_wholly_past_the_master_feels_nothing() -> None:
-    interface, z = flat([1.0, 1.0], [1.0], shift=5.0)
+    interface, z = make_flat([1.0, 1.0], [1.0], shift=5.0)
     for name in EVERY:
-        assert not pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z).any()
+        assert not contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z).any()
 
 
 @pytest.mark.parametrize("name", EVERY)
 def test_an_open_gap_gives_no_force_and_exactly_closed_neither(name: str) -> None:
-    interface, z = flat([2, 2], [3, 1])
+    interface, z = make_flat([2, 2], [3, 1])
     for lift in (DEPTH, 2 * DEPTH):
         x = z.reshape(-1, 2).copy()
         x[: interface.n_slave_nodes, 1] += lift
-        assert not pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, x.ravel()).any()
+        assert not contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, x.ravel()).any()
 
 
 @pytest.mark.parametrize("angle", np.linspace(0.1, 6.2, 23))
 @pytest.mark.parametrize("name", EVERY)
 def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: float) -> None:
-    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3])
+    interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
-    turned = pushed(formulation, interface, (z.reshape(-1, 2) @ turn.T).ravel())
-    assert turned @ turn == pytest.approx(pushed(formulation, interface, z), abs=1e-13)
+    turned = contact_forces(formulation, interface, (z.reshape(-1, 2) @ turn.T).ravel())
+    assert turned @ turn == pytest.approx(contact_forces(formulation, interface, z), abs=1e-13)
 
 
 @pytest.mark.parametrize("n_master", [1, 2, 7, 100])
 def test_any_number_of_master_segments_under_one_slave_segment(n_master: int) -> None:
-    interface, z = flat([12.0], [12.0 / n_master] * n_master)
+    interface, z = make_flat([12.0], [12.0 / n_master] * n_master)
     for name in ("vts_ppt", "vts_ppt_balanced"):
-        forces = pushed(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
+        forces = contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
         share = 12 / n_master
         expected = [-share / 2, *[-share] * (n_master - 1), -share / 2]
         assert forces[2:, 1] == pytest.approx(expected, rel=1e-12)
@@ -144,7 +144,7 @@ def test_several_and_closed_chains() -> None:
     assert (interface.master.neighbours >= 0).all()
     for name in ("nts_ar", "vts_me", "vts_ppt", "vts_ppt_balanced"):
         formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
-        forces = pushed(formulation, interface, interface.nodes.ravel())
+        forces = contact_forces(formulation, interface, interface.nodes.ravel())
         assert np.abs(forces.sum(axis=0)).max() < 1e-14
         radial = (forces[:4] * outer).sum(axis=1)
         assert radial == pytest.approx(radial[0])

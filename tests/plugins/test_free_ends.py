@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import bent, flat, pushed
+from surfaces import contact_forces, make_bent, make_flat
 
 from contactverif import Interface, Surface
 from contactverif_nts import vts_ppt, vts_ppt_balanced
@@ -27,7 +27,7 @@ def test_a_foot_past_the_end_of_an_interior_segment_leaves_box_3_as_printed() ->
     pairing = formulation.pair(interface, interface.nodes.ravel())
     assert pairing["active"].all()
     assert (pairing["master"], pairing["first"], pairing["last"]) == (0, 0, 1)
-    forces = pushed(formulation, interface, interface.nodes.ravel())[2:]
+    forces = contact_forces(formulation, interface, interface.nodes.ravel())[2:]
 
     (x_1, x_2, x_3), (x_q, x_p) = np.array(VALLEY), slave
     t = (x_2 - x_1) / np.linalg.norm(x_2 - x_1)
@@ -54,19 +54,19 @@ def test_a_segment_seen_edge_on_is_no_free_end() -> None:
         formulation = vts_ppt(penalty=PENALTY, n=1, free_end=free_end)
         pairing = formulation.pair(interface, interface.nodes.ravel())
         assert (pairing["first"], pairing["last"]) == (0, 1)
-        forces = pushed(formulation, interface, interface.nodes.ravel())
+        forces = contact_forces(formulation, interface, interface.nodes.ravel())
         assert -forces[2:, 1].sum() == pytest.approx(PENALTY * 0.1 * 1.8)
 
 
 def test_at_a_free_end_the_master_loses_what_lies_past_it() -> None:
-    interface, z = flat([4.0], [3.375, 0.125])  # the slave overhangs by 0.5, at g = −1/8
+    interface, z = make_flat([4.0], [3.375, 0.125])  # the slave overhangs by 0.5, at g = −1/8
     for free_end, carried in (("truncate", 3.5), ("extend", 4.0)):
-        forces = pushed(vts_ppt(penalty=PENALTY, free_end=free_end), interface, z)
+        forces = contact_forces(vts_ppt(penalty=PENALTY, free_end=free_end), interface, z)
         assert forces[:2, 1].sum() == 4.0
         assert -forces[2:, 1].sum() == pytest.approx(carried, rel=1e-15)
 
 
-def overhangs(interface: Interface, z: Any, n: int, pairing: Any) -> bool:
+def has_overhang(interface: Interface, z: Any, n: int, pairing: Any) -> bool:
     """Return whether the area of competence of an active virtual slave node reaches past an end of the master chain."""
     x, master = z.reshape(-1, 2), interface.master.segments
     first_node, last_node = x[master[0, 0]], x[master[-1, 1]]
@@ -85,11 +85,11 @@ def overhangs(interface: Interface, z: Any, n: int, pairing: Any) -> bool:
 def test_where_nothing_overhangs_a_free_end_the_option_changes_nothing(make: Any, n: int) -> None:
     compared = differ = 0
     for seed in range(400):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         truncate, extend = (make(penalty=PENALTY, n=n, free_end=word) for word in ("truncate", "extend"))
         pairing = truncate.pair(interface, z)
-        forces = [pushed(formulation, interface, z) for formulation in (truncate, extend)]
-        if overhangs(interface, z, n, pairing):
+        forces = [contact_forces(formulation, interface, z) for formulation in (truncate, extend)]
+        if has_overhang(interface, z, n, pairing):
             differ += not np.array_equal(*forces)
         else:
             compared += bool(pairing["active"].any())
@@ -107,6 +107,9 @@ def test_a_closed_master_has_no_free_end() -> None:
         disk = 1.05 * np.column_stack([np.cos(angle + 0.3), np.sin(angle + 0.3)])
         interface = Interface(np.vstack([disk, hole]), Surface(ring), Surface(ring + 7))
         z = (interface.nodes + random.normal(scale=0.05, size=(14, 2))).ravel()
-        forces = [pushed(vts_ppt(penalty=PENALTY, n=3, free_end=word), interface, z) for word in ("truncate", "extend")]
+        forces = [
+            contact_forces(vts_ppt(penalty=PENALTY, n=3, free_end=word), interface, z)
+            for word in ("truncate", "extend")
+        ]
         assert forces[0].any()
         assert np.array_equal(*forces)

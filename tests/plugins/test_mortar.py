@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 from contactverif import Interface
 from contactverif.contract.subject import Subject
@@ -35,27 +35,27 @@ def dual_at(interface: Interface, z: Any) -> tuple[Any, Any, Any]:
 def assert_biorthogonal(points: Any, psi: Any, scale: float = 1.0) -> None:
     c, w = points[:, C], points[:, WEIGHT]
     standard = np.column_stack([(1 - c) / 2, (1 + c) / 2])
-    found = np.einsum("q,qj,qk->jk", w, psi, standard)
-    assert found == pytest.approx(np.diag(w @ standard), abs=1e-14 * scale * w.sum())
+    computed = np.einsum("q,qj,qk->jk", w, psi, standard)
+    assert computed == pytest.approx(np.diag(w @ standard), abs=1e-14 * scale * w.sum())
 
 
 def test_dual_shapes_are_biorthogonal_on_what_is_covered() -> None:
     checked = partly = 0
     for seed in range(100):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         points, segment, psi = dual_at(interface, z)
         assert psi.sum(axis=1) == pytest.approx(1.0, abs=1e-12)
         for s in np.unique(segment):
-            own = segment == s
-            assert_biorthogonal(points[own], psi[own], scale=np.abs(psi[own]).max())
+            part = segment == s
+            assert_biorthogonal(points[part], psi[part], scale=np.abs(psi[part]).max())
             checked += 1
-            partly += points[own, WEIGHT].sum() < 0.99 * interface.slave.lengths(z.reshape(-1, 2))[s]
+            partly += points[part, WEIGHT].sum() < 0.99 * interface.slave.lengths(z.reshape(-1, 2))[s]
     assert checked > 100
     assert partly > 50
 
 
 def test_on_a_whole_segment_they_are_the_well_known_ones() -> None:
-    points, _, psi = dual_at(*flat([4.0], [1.0, 2.0, 1.0]))
+    points, _, psi = dual_at(*make_flat([4.0], [1.0, 2.0, 1.0]))
     c = points[:, C]
     assert psi == pytest.approx(np.column_stack([(1 - 3 * c) / 2, (1 + 3 * c) / 2]), abs=1e-14)
 
@@ -63,10 +63,10 @@ def test_on_a_whole_segment_they_are_the_well_known_ones() -> None:
 @pytest.mark.parametrize("length", [2.0**-10, 2.0**-20, 2.0**-30, 2.0**-40])
 def test_on_a_sliver_at_an_end_they_are_as_good(length: float) -> None:
     """Covered is [0, δ] of [0, 4]: with N_B ≈ 0 they are (1, 0) + bounded parts."""
-    interface, z = flat([4.0], [3.0], shift=length - 3.0)
+    interface, z = make_flat([4.0], [3.0], shift=length - 3.0)
     points, _, psi = dual_at(interface, z)
     assert np.abs(psi).max() < 4
-    rounding = 2.0**-52 / length  # of the places of the points, which are read from c
+    rounding = 2.0**-52 / length  # rounding of the points' places, which are read from c
     assert_biorthogonal(points, psi, scale=1 + 1e14 * rounding)
     assert np.array_equal(points[:, C] > -1, [True, True])
 
@@ -75,8 +75,8 @@ def test_on_a_sliver_at_an_end_they_are_as_good(length: float) -> None:
 def test_forces_are_as_small_as_a_sliver_down_to_roundoff(make: Callable[..., Any]) -> None:
     for exponent in range(1, 60):
         length = 2.0**-exponent
-        interface, z = flat([4.0], [3.0], shift=length - 3.0)
-        forces = pushed(make(penalty=1 / DEPTH), interface, z)
+        interface, z = make_flat([4.0], [3.0], shift=length - 3.0)
+        forces = contact_forces(make(penalty=1 / DEPTH), interface, z)
         exact = [length - length**2 / 8, length**2 / 8]
         assert forces[:2, 1] == pytest.approx(exact, rel=1e-15 / length + 1e-12, abs=2 * UNCOVERED)
         tangent = make(penalty=8.0).tangent(interface, make(penalty=8.0).pair(interface, z), z)
@@ -86,7 +86,7 @@ def test_forces_are_as_small_as_a_sliver_down_to_roundoff(make: Callable[..., An
 @pytest.mark.parametrize("make", [mortar, mortar_dual])
 def test_the_weighted_gap_of_a_linear_gap_is_what_the_shapes_make_of_it(make: Callable[..., Any]) -> None:
     """On one whole segment with g = a at A and b at B: (2a + b)/3 with standard shapes, a itself with dual ones."""
-    interface, _ = flat([3.0], [1.0, 1.0, 1.0])
+    interface, _ = make_flat([3.0], [1.0, 1.0, 1.0])
     x = interface.nodes.copy()
     x[2:, 1] = 0.25 + 0.125 * x[2:, 0]  # g = −(0.25 + 0.125 x) against a level slave
     formulation = make(penalty=1.0)
@@ -97,7 +97,7 @@ def test_the_weighted_gap_of_a_linear_gap_is_what_the_shapes_make_of_it(make: Ca
 
 def test_a_dual_pressure_moves_no_other_slave_node() -> None:
     for seed in range(30):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         formulation = mortar_dual_lm(penalty=1.0)
         n = interface.n_slave_nodes
         full = np.append(z, np.ones(n))
@@ -110,7 +110,7 @@ def test_a_dual_pressure_moves_no_other_slave_node() -> None:
 @pytest.mark.parametrize("make", [mortar_lm, mortar_dual_lm])
 def test_constraint_rows_are_weighted_gaps_where_active_and_multipliers_where_not(make: Callable[..., Any]) -> None:
     formulation = make(penalty=2.0)
-    interface, z = flat([2, 4, 2], [3, 2], shift=0.0)  # the last node overhangs with all around it
+    interface, z = make_flat([2, 4, 2], [3, 2], shift=0.0)  # the last node overhangs with all around it
     multipliers = np.array([1.0, 2.0, 3.0, 5.0])
     full = np.append(z, multipliers)
     pairing = formulation.pair(interface, full)
@@ -122,7 +122,7 @@ def test_constraint_rows_are_weighted_gaps_where_active_and_multipliers_where_no
 
 def test_a_node_is_active_where_its_multiplier_outweighs_its_gap() -> None:
     formulation = mortar_lm(penalty=2.0)
-    interface, _ = flat([2.0], [3.0], shift=-0.5)
+    interface, _ = make_flat([2.0], [3.0], shift=-0.5)
     x = interface.nodes.copy()
     x[:2, 1] += DEPTH  # open
     for multiplier, active in ((2 * DEPTH, True), (1.9 * DEPTH, False), (-1.0, False)):
@@ -140,8 +140,8 @@ def test_uniform_multipliers_give_the_consistent_forces(make: Callable[..., Any]
         ([2, 2, 4, 4], [3, 3, 3, 3]),
         ([12], [0.5] * 24),
     ):
-        interface, z = flat(slave, master)
-        forces = pushed(make(penalty=1.0), interface, np.append(z, np.ones(interface.n_slave_nodes)))
+        interface, z = make_flat(slave, master)
+        forces = contact_forces(make(penalty=1.0), interface, np.append(z, np.ones(interface.n_slave_nodes)))
         assert np.abs(forces[:, 1]) == pytest.approx(uniform_pressure_weights(interface, z[::2]), abs=1e-14)
 
 
@@ -155,43 +155,45 @@ def test_the_paper_s_scenes_have_uniform_multipliers(make: Callable[..., Any], n
     assert trace.multipliers == pytest.approx(pressure, rel=1e-10)
 
 
-def kinked(n_slave: int, n_master: int) -> Interface:
+def make_kinked(n_slave: int, n_master: int) -> Interface:
     """Two surfaces that lie on each other, with nodes of both at the kinks and none together in between."""
     corners = np.array([[0.0, 0.0], [2, 0], [4, 1], [6, 0.25], [8, 0.25]])
 
-    def parted(n: int) -> Any:
+    def refine(n: int) -> Any:
         share = np.arange(n) / n
         inner = corners[:-1, None] + share[:, None] * np.diff(corners, axis=0)[:, None]
         return np.vstack([inner.reshape(-1, 2), corners[-1:]])
 
-    return Interface.from_chains(parted(n_slave), parted(n_master)[::-1])
+    return Interface.from_chains(refine(n_slave), refine(n_master)[::-1])
 
 
 @pytest.mark.parametrize("make", [mortar_lm, mortar_dual_lm])
 @pytest.mark.parametrize("normals", ["segment", "averaged"])
 def test_a_hydrostatic_pressure_on_a_kinked_surface(make: Callable[..., Any], normals: str) -> None:
     """∫ N p n on both sides; averaged normals are not those of the surface."""
-    interface = kinked(3, 4)
+    interface = make_kinked(3, 4)
     exact = np.zeros((interface.n_nodes, 2))
     for side in (interface.slave, interface.master):
         along = np.diff(interface.nodes[side.segments], axis=1)[:, 0]
         for end in range(2):
             np.add.at(exact, side.segments[:, end], np.column_stack([-along[:, 1], along[:, 0]]) / 2)
     z = np.append(interface.nodes, np.ones(interface.n_slave_nodes))
-    forces = pushed(make(penalty=1.0, normals=normals), interface, z)
+    forces = contact_forces(make(penalty=1.0, normals=normals), interface, z)
     error = np.abs(forces - exact).max() / np.abs(exact).max()
     assert error < 1e-14 if normals == "segment" else error > 0.05
 
 
 def test_averaged_normals_differ_on_bent_surfaces_and_not_on_flat_ones() -> None:
-    interface, z = flat([2, 2, 4], [3, 5])
-    same = [pushed(mortar(penalty=1.0, normals=normals), interface, z) for normals in ("segment", "averaged")]
+    interface, z = make_flat([2, 2, 4], [3, 5])
+    same = [contact_forces(mortar(penalty=1.0, normals=normals), interface, z) for normals in ("segment", "averaged")]
     assert same[0] == pytest.approx(same[1], abs=1e-14)
     differs = 0
     for seed in range(30):
-        interface, z = bent(seed)
-        one, other = (pushed(mortar(penalty=1.0, normals=normals), interface, z) for normals in ("segment", "averaged"))
-        differs += not np.allclose(one, other, rtol=1e-3)
+        interface, z = make_bent(seed)
+        first, other = (
+            contact_forces(mortar(penalty=1.0, normals=normals), interface, z) for normals in ("segment", "averaged")
+        )
+        differs += not np.allclose(first, other, rtol=1e-3)
     assert differs > 15
 
 
@@ -235,7 +237,7 @@ def test_forces_do_not_jump_while_a_slave_slides_over_bent_vertices(formulation:
 
 def test_a_node_that_is_covered_by_roundoff_alone_is_not() -> None:
     for length, covered in ((np.sqrt(16 * UNCOVERED) * 2, True), (np.sqrt(16 * UNCOVERED) / 2, False)):
-        interface, z = flat([4.0], [3.0], shift=length - 3.0)
+        interface, z = make_flat([4.0], [3.0], shift=length - 3.0)
         assert mortar(penalty=1.0).pair(interface, z)["active"].tolist() == [True, covered]
         full = np.append(z, [1.0, 1.0])
         pairing = mortar_lm(penalty=1.0).pair(interface, full)

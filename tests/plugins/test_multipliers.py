@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, bent, flat
-from test_forces import TABLE, exactly
+from surfaces import DEPTH, make_bent, make_flat
+from test_forces import TABLE, read_fractions
 
 import contactverif_nts
 from contactverif import Interface, MisuseError
 from contactverif.contract.subject import Subject
 from contactverif.geometry import projection
-from contactverif.geometry.compiled import uncompiled
+from contactverif.geometry.compiled import python_function
 from contactverif.mechanics.newton import Trace, solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
@@ -41,21 +41,21 @@ SPRINGS = {"nts_lm": "nts", "vts_me_lm": "vts_me", "vts_ppt_lm": "vts_ppt"}
 C = 8.0  # scale of the decision λ − c g ≥ 0
 
 
-def made_of(name: str, **options: Any) -> Any:
+def make(name: str, **options: Any) -> Any:
     return getattr(contactverif_nts, name)(penalty=C, **options)
 
 
 def with_random_multipliers(formulation: Any, seed: int) -> tuple[Interface, Any]:
     """A bent scene, half of its multipliers negative, so that some points let go."""
-    interface, z = bent(seed)
+    interface, z = make_bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)
 
 
 @OF_ALL
 def test_the_tangent_is_the_complex_step(name: str, options: dict[str, Any]) -> None:
-    formulation = made_of(name, **options)
-    held = let_go = cuts = 0
+    formulation = make(name, **options)
+    n_active = n_idle = cuts = 0
     for seed in range(100):
         interface, z = with_random_multipliers(formulation, seed)
         pairing = formulation.pair(interface, z)
@@ -63,17 +63,17 @@ def test_the_tangent_is_the_complex_step(name: str, options: dict[str, Any]) -> 
         h = 2.0**-100
         moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
         assert np.abs(moved.imag.T / h - tangent).max() <= 1e-14 * np.abs(tangent).max()
-        held += int(pairing["active"].sum())
-        let_go += int((~pairing["active"]).sum())
+        n_active += int(pairing["active"].sum())
+        n_idle += int((~pairing["active"]).sum())
         cuts += "cut_p" in pairing and bool((pairing["frame"] >= 0).any())
-    assert held > 100
-    assert let_go > 100
+    assert n_active > 100
+    assert n_idle > 100
     assert cuts > 50 or options.get("free_end") != "cover"
 
 
 @OF_ALL
 def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]) -> None:
-    formulation = made_of(name, **options)
+    formulation = make(name, **options)
     worst = {"symmetric": 0.0, "force": 0.0, "moment": 0.0}
     for seed in range(50):
         interface, z = with_random_multipliers(formulation, seed)
@@ -99,13 +99,13 @@ def test_a_multiplier_that_is_the_pressure_of_the_spring_does_what_the_spring_do
     name: str, options: dict[str, Any]
 ) -> None:
     """On bent surfaces λ = −ε̂ g gives the forces of the penalty method; rows are −area × g."""
-    formulation = made_of(name, **options)
+    formulation = make(name, **options)
     balanced = "_balanced" if "transmission" in options else ""
     others = {option: value for option, value in options.items() if option != "transmission"}
-    spring = made_of(SPRINGS[name] + balanced, **others)
+    spring = make(SPRINGS[name] + balanced, **others)
     in_contact = 0
     for seed in range(50):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         points = spring.contact_points(interface, spring.pair(interface, z), z)
         state = np.append(z, -C * points.gap)
         pairing = formulation.pair(interface, state)
@@ -116,18 +116,18 @@ def test_a_multiplier_that_is_the_pressure_of_the_spring_does_what_the_spring_do
         assert forces == pytest.approx(exact, rel=1e-13, abs=1e-14)
         active = pairing["active"]
         assert rows[active] == pytest.approx((-points.weight * points.gap)[active], rel=1e-13)
-        found = formulation.contact_points(interface, pairing, state)
-        assert np.array_equal(found.pressure, points.pressure)
+        computed = formulation.contact_points(interface, pairing, state)
+        assert np.array_equal(computed.pressure, points.pressure)
         in_contact += int(active.sum())
     assert in_contact > 50
 
 
 @OF_ALL
 def test_a_point_that_lets_go_has_its_multiplier_for_a_row(name: str, options: dict[str, Any]) -> None:
-    formulation = made_of(name, **options)
-    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3], shift=40.0)  # nothing faces anything
+    formulation = make(name, **options)
+    interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3], shift=40.0)  # nothing faces anything
     multipliers = np.arange(1.0, 1 + formulation.n_multipliers(interface))
-    state = np.append(z * 2, multipliers)  # and areas are those of the reference
+    state = np.append(z * 2, multipliers)  # areas are those of the reference
     pairing = formulation.pair(interface, state)
     forces, rows = np.split(formulation.residual(interface, pairing, state), [interface.n_unknowns])
     assert not forces.any()
@@ -151,8 +151,8 @@ def test_a_point_that_lets_go_has_its_multiplier_for_a_row(name: str, options: d
 )
 @pytest.mark.parametrize("name", SPRINGS)
 def test_who_is_active(name: str, penetration: float, multiplier: float, active: bool) -> None:
-    formulation = made_of(name)
-    interface, z = flat([2, 2], [3, 1])
+    formulation = make(name)
+    interface, z = make_flat([2, 2], [3, 1])
     x = z.reshape(-1, 2).copy()
     x[: interface.n_slave_nodes, 1] = -penetration
     state = np.append(x, np.full(formulation.n_multipliers(interface), multiplier))
@@ -170,48 +170,51 @@ def test_who_is_active(name: str, penetration: float, multiplier: float, active:
 )
 def test_uniform_multipliers_transmit_the_forces_of_the_tables(case: str, name: str, expected: str) -> None:
     slave, master, _ = TABLE[case]
-    formulation = made_of(name)
-    interface, z = flat(slave, master)
+    formulation = make(name)
+    interface, z = make_flat(slave, master)
     state = np.append(z, np.ones(formulation.n_multipliers(interface)))
     answer = -formulation.residual(interface, formulation.pair(interface, state), state)
     forces = answer[: interface.n_unknowns].reshape(-1, 2)
-    found = [Fraction(float(value)).limit_denominator(60) for value in -forces[interface.n_slave_nodes :, 1][::-1]]
-    assert found == exactly(expected)
+    computed = [Fraction(float(value)).limit_denominator(60) for value in -forces[interface.n_slave_nodes :, 1][::-1]]
+    assert computed == read_fractions(expected)
     assert not forces[:, 0].any()
 
 
 def test_they_are_counted() -> None:
-    interface, _ = flat([2, 2, 4, 4], [3, 3, 3, 3])
-    assert made_of("nts_lm").n_multipliers(interface) == 5
-    assert made_of("vts_me_lm", n=3).n_multipliers(interface) == 12
-    assert made_of("vts_ppt_lm").n_multipliers(interface) == 8
-    assert all(made_of(name).n_multipliers(interface) == 0 for name in SPRINGS.values())
+    interface, _ = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
+    assert make("nts_lm").n_multipliers(interface) == 5
+    assert make("vts_me_lm", n=3).n_multipliers(interface) == 12
+    assert make("vts_ppt_lm").n_multipliers(interface) == 8
+    assert all(make(name).n_multipliers(interface) == 0 for name in SPRINGS.values())
 
 
 @OF_ALL
 def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    formulation = made_of(name, **options)
+    formulation = make(name, **options)
     scenes = [with_random_multipliers(formulation, seed) for seed in range(4)]
 
     def answers() -> list[Any]:
-        found = []
+        computed = []
         for interface, z in scenes:
             pairing = formulation.pair(interface, z)
-            found += [formulation.residual(interface, pairing, z), formulation.tangent(interface, pairing, z).toarray()]
-        return found
+            computed += [
+                formulation.residual(interface, pairing, z),
+                formulation.tangent(interface, pairing, z).toarray(),
+            ]
+        return computed
 
     compiled = answers()
     for module in (projection, eq6, walk, box3, box3_tangent):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
-                monkeypatch.setattr(module, attribute, uncompiled(value))
-    for one, other in zip(compiled, answers(), strict=True):
-        assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
+                monkeypatch.setattr(module, attribute, python_function(value))
+    for first, other in zip(compiled, answers(), strict=True):
+        assert first == pytest.approx(other, rel=1e-12, abs=1e-12)
 
 
 @OF_ALL
 def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
-    formulation = made_of(name, **options)
+    formulation = make(name, **options)
     interface, z = with_random_multipliers(formulation, 3)
     pairing = formulation.pair(interface, z)
     states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
@@ -232,7 +235,7 @@ def test_options_are_those_of_the_springs() -> None:
 # Solved: on which scenes the stress is right, to roundoff or not at all, and what the multipliers are there.
 
 PRESSURE = 100.0
-ROUNDOFF = 1e-11  # of a stress or a multiplier over the pressure, on meshes whose segments differ little
+ROUNDOFF = 1e-11  # The largest error of a stress or a multiplier over the pressure, on even meshes.
 RIGHT = {
     "nts_lm": {"a1", "a2-uniform", "a2-graded"},
     "vts_me_lm": {"a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1"},
@@ -241,7 +244,7 @@ RIGHT = {
 SCENES = sorted(RIGHT["vts_ppt_lm"])
 
 
-def solved(name: str, scene: Scene, *, penalty: float | None = None, **options: Any) -> Trace:
+def solve_scene(name: str, scene: Scene, *, penalty: float | None = None, **options: Any) -> Trace:
     subject = Subject(name, lambda *, penalty: getattr(contactverif_nts, name)(penalty=penalty, **options))
     return solve(scene, subject.for_case(scene.case()) if penalty is None else subject.with_penalty(penalty))
 
@@ -254,7 +257,7 @@ def error_of(trace: Trace) -> float:
 @pytest.mark.parametrize("scene_name", SCENES)
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_finds_the_uniform_stress(name: str, scene_name: str) -> None:
-    trace = solved(name, make_scene(scene_name, pressure=PRESSURE))
+    trace = solve_scene(name, make_scene(scene_name, pressure=PRESSURE))
     assert trace.converged
     if scene_name in RIGHT[name]:
         assert error_of(trace) < ROUNDOFF
@@ -268,7 +271,7 @@ def spread_of(trace: Trace) -> tuple[float, float]:
 
 
 def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
-    on_c, on_c_prime = (solved("vts_me_lm", make_scene(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
+    on_c, on_c_prime = (solve_scene("vts_me_lm", make_scene(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
     assert spread_of(on_c) == pytest.approx((0, 2), abs=ROUNDOFF)
     assert spread_of(on_c_prime) == pytest.approx((13 / 45, 77 / 45), abs=ROUNDOFF)
     assert on_c.deficiency == on_c_prime.deficiency == 0  # so that there are no others
@@ -276,7 +279,7 @@ def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
 
 @pytest.mark.parametrize("scene_name", ["b", "c", "c-prime", "example-1", "example-1bis"])
 def test_multipliers_of_vts_ppt_are_uniform_and_found_in_one_step(scene_name: str) -> None:
-    trace = solved("vts_ppt_lm", make_scene(scene_name, pressure=PRESSURE))
+    trace = solve_scene("vts_ppt_lm", make_scene(scene_name, pressure=PRESSURE))
     assert spread_of(trace) == pytest.approx((1, 1), abs=ROUNDOFF)
     assert trace.n_iterations == 1
 
@@ -293,7 +296,7 @@ def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: di
         Rectangle([0, 4, 8], heights - 4, young=1e4, poisson=0.3),
         pressure=PRESSURE,
     )
-    trace = solved(name, blocks, penalty=1e4, **options)
+    trace = solve_scene(name, blocks, penalty=1e4, **options)
     assert trace.converged
     assert trace.deficiency == deficiency
     assert error_of(trace) < ROUNDOFF
@@ -302,5 +305,5 @@ def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: di
 @pytest.mark.parametrize("name", RIGHT)
 def test_the_scale_of_the_decision_changes_no_solution(name: str) -> None:
     scenes = make_scene("b", pressure=PRESSURE)
-    soft, hard = (solved(name, scenes, penalty=scale) for scale in (1e2, 1e7))
+    soft, hard = (solve_scene(name, scenes, penalty=scale) for scale in (1e2, 1e7))
     assert soft.u[-1] == pytest.approx(hard.u[-1], rel=1e-11, abs=1e-13)

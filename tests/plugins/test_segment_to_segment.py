@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 import contactverif_mortar
 from contactverif import Interface, MisuseError
 from contactverif.contract.subject import Subject
 from contactverif.geometry import projection
-from contactverif.geometry.compiled import uncompiled
+from contactverif.geometry.compiled import python_function
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
@@ -45,13 +45,13 @@ def ids(methods: list[tuple[str, dict[str, str]]]) -> list[str]:
     return [f"{name}{options or ''}" for name, options in methods]
 
 
-def made(name: str, options: dict[str, str], penalty: float = 8.0) -> Any:
+def make(name: str, options: dict[str, str], penalty: float = 8.0) -> Any:
     return getattr(contactverif_mortar, name)(penalty=penalty, **options)
 
 
-def pressed(formulation: Any, seed: int) -> tuple[Interface, Any]:
+def make_state(formulation: Any, seed: int) -> tuple[Interface, Any]:
     """Bent surfaces, and multipliers behind the positions where the formulation has any."""
-    interface, z = bent(seed)
+    interface, z = make_bent(seed)
     if hasattr(formulation, "n_multipliers"):
         multipliers = np.random.default_rng(seed).uniform(0, 3, formulation.n_multipliers(interface))
         z = np.append(z, multipliers)
@@ -63,13 +63,13 @@ def pressed(formulation: Any, seed: int) -> tuple[Interface, Any]:
 def test_a_uniform_pressure_is_transmitted_as_in_rationals(case: str, name: str, options: dict[str, str]) -> None:
     flat_case = named_case(case)
     interface, z = flat_case.interface, flat_case.z
-    forces = pushed(made(name, options, flat_case.penalty), interface, z)
+    forces = contact_forces(make(name, options, flat_case.penalty), interface, z)
     exact = uniform_pressure_weights_exact(interface, flat_case.parameters["along"])
     signs = np.where(np.arange(interface.n_nodes) < interface.n_slave_nodes, 1, -1)
     assert forces[:, 1] * signs == pytest.approx([float(value) for value in exact], abs=64 * 2.0**-53)
     if case != "c-prime":  # 3.2 is none of the binary numbers
-        found = [Fraction(value).limit_denominator(60) for value in (forces[:, 1] * signs).tolist()]
-        assert found == exact
+        computed = [Fraction(value).limit_denominator(60) for value in (forces[:, 1] * signs).tolist()]
+        assert computed == exact
     assert not forces[:, 0].any()
 
 
@@ -80,17 +80,17 @@ def test_so_it_is_on_random_meshes_and_with_many_segments_under_one(name: str, o
     meshes += [([12.0], [0.125] * 96), ([0.125] * 96, [12.0]), ([5.0, 2.0**-18, 3.0], [2.0**-17, 20.0])]
     for slave, master in meshes:
         master = [*master, max(sum(slave) - sum(master), 1.0)]  # the slave overhangs nowhere
-        interface, z = flat(slave, master)
+        interface, z = make_flat(slave, master)
         exact = uniform_pressure_weights_exact(interface, z[::2])
-        forces = pushed(made(name, options, 1 / DEPTH), interface, z)
+        forces = contact_forces(make(name, options, 1 / DEPTH), interface, z)
         assert np.abs(forces[:, 1]) == pytest.approx([float(value) for value in exact], abs=1e-13)
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_the_tangent_is_the_complex_step(name: str, options: dict[str, str]) -> None:
-    formulation, in_contact = made(name, options), 0
+    formulation, in_contact = make(name, options), 0
     for seed in range(100):
-        interface, z = pressed(formulation, seed)
+        interface, z = make_state(formulation, seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         h = 2.0**-100
@@ -102,15 +102,15 @@ def test_the_tangent_is_the_complex_step(name: str, options: dict[str, str]) -> 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_conserving_and_unsymmetric_as_declared(name: str, options: dict[str, str]) -> None:
-    formulation, unsymmetric = made(name, options), 0.0
+    formulation, unsymmetric = make(name, options), 0.0
     for seed in range(50):
-        interface, z = pressed(formulation, seed)
+        interface, z = make_state(formulation, seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         if not pairing["active"].any():
             continue
         unsymmetric = max(unsymmetric, np.abs(tangent - tangent.T).max() / np.abs(tangent).max())
-        x, forces = z[: interface.n_unknowns].reshape(-1, 2), pushed(formulation, interface, z)
+        x, forces = z[: interface.n_unknowns].reshape(-1, 2), contact_forces(formulation, interface, z)
         size = np.abs(forces).sum()
         assert np.abs(forces.sum(axis=0)).max() <= 1e-14 * size
         assert abs((x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()) <= 1e-13 * size
@@ -122,8 +122,8 @@ def test_conserving_and_unsymmetric_as_declared(name: str, options: dict[str, st
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, str]) -> None:
-    formulation = made(name, options)
-    interface, z = pressed(formulation, 3)
+    formulation = make(name, options)
+    interface, z = make_state(formulation, 3)
     pairing = formulation.pair(interface, z)
     states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
     batch = formulation.residual(interface, pairing, states)
@@ -135,30 +135,33 @@ def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, str]) -> None:
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_uncompiled_kernels_agree(name: str, options: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    formulation = made(name, options)
-    scenes = [pressed(formulation, seed) for seed in range(4)]
+    formulation = make(name, options)
+    scenes = [make_state(formulation, seed) for seed in range(4)]
 
     def answers() -> list[Any]:
-        found = []
+        computed = []
         for interface, z in scenes:
             pairing = formulation.pair(interface, z)
-            found += [formulation.residual(interface, pairing, z), formulation.tangent(interface, pairing, z).toarray()]
-        return found
+            computed += [
+                formulation.residual(interface, pairing, z),
+                formulation.tangent(interface, pairing, z).toarray(),
+            ]
+        return computed
 
     compiled = answers()
     for module in (projection, *KERNEL_MODULES):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
-                monkeypatch.setattr(module, attribute, uncompiled(value))
-    for one, other in zip(compiled, answers(), strict=True):
-        assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
+                monkeypatch.setattr(module, attribute, python_function(value))
+    for first, other in zip(compiled, answers(), strict=True):
+        assert first == pytest.approx(other, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_no_contact_is_no_force_and_no_error(name: str, options: dict[str, str]) -> None:
-    formulation = made(name, options)
+    formulation = make(name, options)
     for lift in (0.01, 100.0):
-        interface, z = flat([2, 2], [3, 1])
+        interface, z = make_flat([2, 2], [3, 1])
         x = interface.nodes.copy()
         x[:3, 1] += lift
         n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
@@ -174,8 +177,8 @@ def test_no_contact_is_no_force_and_no_error(name: str, options: dict[str, str])
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_surfaces_that_touch_exactly_are_in_contact(name: str, options: dict[str, str]) -> None:
-    formulation = made(name, options)
-    interface, _ = flat([2, 2], [3, 1])
+    formulation = make(name, options)
+    interface, _ = make_flat([2, 2], [3, 1])
     n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
     assert formulation.pair(interface, np.append(interface.nodes, np.zeros(n)))["active"].all()
 
@@ -211,8 +214,8 @@ def dead_zone(make: Any, degrees: float) -> float:
 
 @pytest.mark.parametrize("name", ["sts", "mortar", "mortar_dual"])
 def test_a_half_covered_slave_pushes_with_what_is_covered(name: str) -> None:
-    interface, z = flat([1, 4, 3], [0.5, 2], shift=2.0)  # the master covers [2, 4.5] of [0, 8]
-    forces = pushed(made(name, {}, 1 / DEPTH), interface, z)
+    interface, z = make_flat([1, 4, 3], [0.5, 2], shift=2.0)  # the master covers [2, 4.5] of [0, 8]
+    forces = contact_forces(make(name, {}, 1 / DEPTH), interface, z)
     # ∫N over [2, 4.5] on the segment [1, 5], and on the master's own.
     exact = [0, 2.5 * (5 - 3.25) / 4, 2.5 * (3.25 - 1) / 4, 0, -1, -1.25, -0.25]
     assert forces[:, 1] == pytest.approx(exact, abs=1e-15)
@@ -220,9 +223,9 @@ def test_a_half_covered_slave_pushes_with_what_is_covered(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
 def test_contact_points_add_up_to_the_forces(name: str, options: dict[str, str]) -> None:
-    formulation = made(name, options)
+    formulation = make(name, options)
     for seed in range(20):
-        interface, z = pressed(formulation, seed)
+        interface, z = make_state(formulation, seed)
         pairing = formulation.pair(interface, z)
         points = formulation.contact_points(interface, pairing, z)
         assert np.all(points.weight >= 0)
@@ -231,7 +234,7 @@ def test_contact_points_add_up_to_the_forces(name: str, options: dict[str, str])
             assert len(points.gap) == interface.n_slave_nodes
             continue
         pushes = (points.pressure * points.weight)[:, None] * points.normal
-        slave = pushed(formulation, interface, z)[: interface.n_slave_nodes].sum(axis=0)
+        slave = contact_forces(formulation, interface, z)[: interface.n_slave_nodes].sum(axis=0)
         assert pushes.sum(axis=0) == pytest.approx(slave, abs=1e-14)
 
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import bent
+from surfaces import make_bent
 
 import contactverif_nts
 from contactverif.geometry import projection
-from contactverif.geometry.compiled import uncompiled
+from contactverif.geometry.compiled import python_function
 from contactverif_nts import box3, box3_tangent, eq6, walk
 
 METHODS = [
@@ -37,7 +37,7 @@ def test_the_tangent_is_the_complex_step(name: str, options: dict[str, Any]) -> 
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
     in_contact = cuts = 0
     for seed in range(100):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         h = 2.0**-100
@@ -55,7 +55,7 @@ def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
     worst = {"symmetric": 0.0, "force": 0.0, "moment": 0.0}
     for seed in range(50):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
         forces = formulation.residual(interface, pairing, z).reshape(-1, 2)
@@ -76,28 +76,31 @@ def test_symmetric_and_conserving_as_declared(name: str, options: dict[str, Any]
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
 def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
-    scenes = [bent(seed) for seed in range(4)]
+    scenes = [make_bent(seed) for seed in range(4)]
 
     def answers() -> list[Any]:
-        found = []
+        computed = []
         for interface, z in scenes:
             pairing = formulation.pair(interface, z)
-            found += [formulation.residual(interface, pairing, z), formulation.tangent(interface, pairing, z).toarray()]
-        return found
+            computed += [
+                formulation.residual(interface, pairing, z),
+                formulation.tangent(interface, pairing, z).toarray(),
+            ]
+        return computed
 
     compiled = answers()
     for module in (projection, eq6, walk, box3, box3_tangent):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
-                monkeypatch.setattr(module, attribute, uncompiled(value))
-    for one, other in zip(compiled, answers(), strict=True):
-        assert one == pytest.approx(other, rel=1e-12, abs=1e-12)
+                monkeypatch.setattr(module, attribute, python_function(value))
+    for first, other in zip(compiled, answers(), strict=True):
+        assert first == pytest.approx(other, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=IDS)
 def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
     formulation = getattr(contactverif_nts, name)(penalty=8.0, **options)
-    interface, z = bent(3)
+    interface, z = make_bent(3)
     pairing = formulation.pair(interface, z)
     states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
     batch = formulation.residual(interface, pairing, states)
@@ -110,7 +113,7 @@ def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, Any]) -> None:
 def test_basic_has_the_residual_of_the_printed_one_and_the_tangent_of_vts_me() -> None:
     differs = 0
     for seed in range(50):
-        interface, z = bent(seed)
+        interface, z = make_bent(seed)
         printed, basic, me = (
             make(penalty=8.0)
             for make in (contactverif_nts.vts_ppt, contactverif_nts.vts_ppt_basic, contactverif_nts.vts_me)

@@ -1,4 +1,4 @@
-"""Two passes of a formulation: what they are, what they do not provide, and what becomes of the patch test."""
+"""Two passes are a sum, provide what the formulation provides, and pass the patch test with nodal multipliers only."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, bent, flat, pushed
+from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from test_forces import PENALTY
 
 import contactverif_nts
@@ -26,7 +26,7 @@ from contactverif_nts import two_pass
 INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]
 
 
-def both(name: str, **options: Any) -> Any:
+def make_two_pass(name: str, **options: Any) -> Any:
     def inner(*, penalty: float) -> Any:
         return getattr(contactverif_nts, name)(penalty=penalty, **options)
 
@@ -35,13 +35,13 @@ def both(name: str, **options: Any) -> Any:
 
 def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
     """A bent scene, with random multipliers where there are any."""
-    interface, z = bent(seed)
+    interface, z = make_bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)
 
 
-def exchanged(formulation: Any, interface: Interface) -> Any:
-    """Where the unknowns of `interface.swap_roles()` are among those of the interface, multipliers too."""
+def swapped_places(formulation: Any, interface: Interface) -> Any:
+    """Return the places of the unknowns of `interface.swap_roles()` in z, multipliers included."""
     there, n = 2 * interface.n_slave_nodes, interface.n_unknowns
     total = formulation.n_multipliers(interface)
     first = formulation._inner.n_multipliers(interface)
@@ -50,15 +50,16 @@ def exchanged(formulation: Any, interface: Interface) -> Any:
 
 @pytest.mark.parametrize("name", INNERS)
 def test_it_is_the_sum_of_both_passes(name: str) -> None:
-    formulation, one = both(name), getattr(contactverif_nts, name)(penalty=PENALTY)
+    formulation, inner = make_two_pass(name), getattr(contactverif_nts, name)(penalty=PENALTY)
     for seed in range(20):
         interface, z = state(formulation, seed)
         swapped, n, there = interface.swap_roles(), interface.n_unknowns, 2 * interface.n_slave_nodes
-        first = one.n_multipliers(interface)
+        first = inner.n_multipliers(interface)
         x, multipliers = z[:n], z[n:]
         states = np.append(x, multipliers[:first]), np.concatenate([x[there:], x[:there], multipliers[first:]])
         parts = [
-            one.residual(side, one.pair(side, own), own) for side, own in zip((interface, swapped), states, strict=True)
+            inner.residual(side, inner.pair(side, part), part)
+            for side, part in zip((interface, swapped), states, strict=True)
         ]
         forces = parts[0][:n] + np.roll(parts[1][:n], there)
         expected = np.concatenate([forces, parts[0][n:], parts[1][n:]])
@@ -67,10 +68,10 @@ def test_it_is_the_sum_of_both_passes(name: str) -> None:
 
 @pytest.mark.parametrize("name", INNERS)
 def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
-    formulation, in_contact = both(name), 0
+    formulation, in_contact = make_two_pass(name), 0
     for seed in range(50):
         interface, z = state(formulation, seed)
-        places, swapped = exchanged(formulation, interface), interface.swap_roles()
+        places, swapped = swapped_places(formulation, interface), interface.swap_roles()
         pairing, other = formulation.pair(interface, z), formulation.pair(swapped, z[places])
         forces = formulation.residual(interface, pairing, z)
         assert np.array_equal(formulation.residual(swapped, other, z[places]), forces[places])
@@ -83,7 +84,7 @@ def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
 
 @pytest.mark.parametrize("name", INNERS)
 def test_the_tangent_is_the_complex_step(name: str) -> None:
-    formulation = both(name)
+    formulation = make_two_pass(name)
     for seed in range(50):
         interface, z = state(formulation, seed)
         pairing = formulation.pair(interface, z)
@@ -95,7 +96,7 @@ def test_the_tangent_is_the_complex_step(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["nts_ar", "vts_ppt_balanced", "nts_lm"])
 def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> None:
-    formulation = both(name)
+    formulation = make_two_pass(name)
     for seed in range(20):
         interface, z = state(formulation, seed)
         pairing = formulation.pair(interface, z)
@@ -111,12 +112,12 @@ def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> Non
 
 
 def test_names_of_a_pairing_say_whose_they_are() -> None:
-    formulation = both("vts_ppt")
+    formulation = make_two_pass("vts_ppt")
     interface, z = state(formulation, 0)
     pairing = formulation.pair(interface, z)
-    own = contactverif_nts.vts_ppt(penalty=PENALTY).pair(interface, z)
-    assert {name.partition(".")[2] for name in pairing} == set(own)
-    assert np.array_equal(pairing["pass_1.first"], own["first"])
+    part = contactverif_nts.vts_ppt(penalty=PENALTY).pair(interface, z)
+    assert {name.partition(".")[2] for name in pairing} == set(part)
+    assert np.array_equal(pairing["pass_1.first"], part["first"])
     assert len(pairing["pass_2.first"]) == 2 * len(interface.master)
 
 
@@ -136,7 +137,7 @@ class Springs:
         return forces
 
 
-def wrapped(**parts: Any) -> Subject:
+def wrap(**parts: Any) -> Subject:
     inner: Callable[..., Any] = lambda *, penalty: Springs(penalty, **parts)  # noqa: E731
     return Subject("springs", lambda *, penalty: two_pass(penalty=penalty, inner=inner))
 
@@ -148,7 +149,7 @@ def dense_tangent(interface: Any, pairing: Any, z: Any) -> Any:
 
 
 def test_the_least_plugin_in_two_passes() -> None:
-    subject, (interface, z) = wrapped(), flat([2, 2], [3, 1])
+    subject, (interface, z) = wrap(), make_flat([2, 2], [3, 1])
     assert subject.provides == frozenset()
     assert subject.traits == Traits(batched=True)
     formulation = subject.with_penalty(3.0)
@@ -160,9 +161,9 @@ def test_the_least_plugin_in_two_passes() -> None:
 
 
 def test_parts_that_a_stranger_does_provide() -> None:
-    subject = wrapped(tangent=dense_tangent, pair=lambda interface, z: {"a": np.arange(len(interface.slave))})
+    subject = wrap(tangent=dense_tangent, pair=lambda interface, z: {"a": np.arange(len(interface.slave))})
     assert subject.provides == {"tangent", "pair"}
-    interface, z = flat([2, 2, 1], [3, 2])
+    interface, z = make_flat([2, 2, 1], [3, 2])
     formulation = subject.with_penalty(3.0)
     pairing = formulation.pair(interface, z)
     assert pairing is not None
@@ -172,7 +173,7 @@ def test_parts_that_a_stranger_does_provide() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parts", "said"),
+    ("parts", "message"),
     [
         ({"residual": lambda interface, pairing, z: np.float64(0)}, "residual: returned a float64"),
         ({"residual": lambda interface, pairing, z: z.astype(np.float32)}, "residual: returned dtype float32"),
@@ -182,32 +183,40 @@ def test_parts_that_a_stranger_does_provide() -> None:
         ({"pair": lambda interface, z: {"a": np.array([99])}}, "pair: 'a' holds 99"),
     ],
 )
-def test_what_a_stranger_breaks_is_said_of_it(parts: dict[str, Any], said: str) -> None:
-    interface, z = flat([2, 2], [3, 1])
-    formulation = wrapped(**parts).with_penalty(3.0)
-    with pytest.raises(ContractError, match=said):
+def test_what_a_stranger_breaks_is_said_of_it(parts: dict[str, Any], message: str) -> None:
+    interface, z = make_flat([2, 2], [3, 1])
+    formulation = wrap(**parts).with_penalty(3.0)
+    with pytest.raises(ContractError, match=message):
         formulation.residual(interface, formulation.pair(interface, z), z)
 
 
 def test_what_it_promises() -> None:
-    def promised(name: str) -> Traits:
-        traits: Traits = both(name).traits
+    def traits_of(name: str) -> Traits:
+        traits: Traits = make_two_pass(name).traits
         return traits
 
-    springs = promised("nts_ar")
-    one: Traits = contactverif_nts.nts_ar(penalty=1.0).traits
-    kept = ("tangent", "symmetric", "conserves_force", "conserves_moment", "penalty", "takes_complex", "enforcement")
-    assert all(getattr(springs, name) == getattr(one, name) for name in kept)
+    springs = traits_of("nts_ar")
+    inner: Traits = contactverif_nts.nts_ar(penalty=1.0).traits
+    unchanged = (
+        "tangent",
+        "symmetric",
+        "conserves_force",
+        "conserves_moment",
+        "penalty",
+        "takes_complex",
+        "enforcement",
+    )
+    assert all(getattr(springs, name) == getattr(inner, name) for name in unchanged)
     assert (springs.passes_flat_patch, springs.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
-    assert promised("vts_ppt").passes_flat_patch is False  # springs that act twice
-    assert promised("vts_ppt").witness("balance.force") == "tilted"
-    assert promised("nts_lm").passes_flat_patch is True
-    assert promised("nts_lm").independent_multipliers is False
-    assert promised("vts_ppt_lm").passes_flat_patch is None  # λ of which pass?
+    assert traits_of("vts_ppt").passes_flat_patch is False  # springs that act twice
+    assert traits_of("vts_ppt").witness("balance.force") == "tilted"
+    assert traits_of("nts_lm").passes_flat_patch is True
+    assert traits_of("nts_lm").independent_multipliers is False
+    assert traits_of("vts_ppt_lm").passes_flat_patch is None  # λ of which pass?
 
 
 def test_by_name_with_options_and_nested() -> None:
-    interface, z = flat([2, 2, 4, 4], [3, 3, 3, 3])
+    interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
     for name in ("two-pass/nts-ar:area=reference", "two-pass/two-pass/nts-ar:area=reference"):
         subject = load_formulation(name)
         assert isinstance(subject, Subject)
@@ -219,8 +228,8 @@ def test_by_name_with_options_and_nested() -> None:
 
 
 def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
-    interface, z = flat([2, 1, 4], [2, 1, 4])
-    forces = pushed(both("nts_ar"), interface, z)
+    interface, z = make_flat([2, 1, 4], [2, 1, 4])
+    forces = contact_forces(make_two_pass("nts_ar"), interface, z)
     assert forces[:4, 1].tolist() == [2, 3, 5, 4]
     assert forces[4:, 1].tolist() == [-4, -5, -3, -2]
     assert DEPTH * PENALTY == 1
@@ -228,11 +237,11 @@ def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
 
 # Solved
 
-ROUNDOFF = 1e-11  # of a stress over the pressure, on meshes whose segments differ little
+ROUNDOFF = 1e-11  # The largest error of a stress over the pressure, on meshes whose segments differ little.
 FAILS = 1e-2
 
 
-def solved(name: str, scenes: Scene) -> Trace:
+def solve_scene(name: str, scenes: Scene) -> Trace:
     subject = load_formulation(name)
     assert isinstance(subject, Subject)
     trace = solve(scenes, subject.for_case(scenes.case()))
@@ -248,7 +257,7 @@ def error_of(trace: Trace) -> float:
 @pytest.mark.parametrize("scene_name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1bis"])
 @pytest.mark.parametrize("name", ["two-pass/nts", "two-pass/nts-ar"])
 def test_springs_in_two_passes_fail(name: str, scene_name: str) -> None:
-    assert error_of(solved(name, make_scene(scene_name))) > FAILS
+    assert error_of(solve_scene(name, make_scene(scene_name))) > FAILS
 
 
 def blocks(slave: list[float], master: list[float]) -> Scene:
@@ -269,12 +278,12 @@ STAGGERED = blocks([-3, -1, 1, 3], [-6, -4, -2, 0, 2, 4, 6])
 
 @pytest.mark.parametrize("scenes", [MATCHING, STAGGERED], ids=["matching", "staggered"])
 def test_they_pass_where_roles_are_symmetric(scenes: Scene) -> None:
-    assert error_of(solved("two-pass/nts-ar", scenes)) < ROUNDOFF
-    assert error_of(solved("nts-ar", STAGGERED)) > FAILS
+    assert error_of(solve_scene("two-pass/nts-ar", scenes)) < ROUNDOFF
+    assert error_of(solve_scene("nts-ar", STAGGERED)) > FAILS
 
 
 def test_elsewhere_they_lock_which_is_not_passing() -> None:
-    errors = [error_of(solved("two-pass/nts-ar", make_scene("c", penalty=penalty))) for penalty in (1e6, 1e7, 1e8)]
+    errors = [error_of(solve_scene("two-pass/nts-ar", make_scene("c", penalty=penalty))) for penalty in (1e6, 1e7, 1e8)]
     assert np.diff(np.log10(errors)) == pytest.approx(-1, abs=0.1)
 
 
@@ -284,12 +293,12 @@ def test_elsewhere_they_lock_which_is_not_passing() -> None:
 def test_nodal_multipliers_in_two_passes_pass_and_are_too_many_where_nodes_coincide(
     scene_name: str, deficiency: int
 ) -> None:
-    trace = solved("two-pass/nts-lm", make_scene(scene_name))
+    trace = solve_scene("two-pass/nts-lm", make_scene(scene_name))
     assert error_of(trace) < ROUNDOFF
     assert trace.deficiency == deficiency
 
 
 def test_on_matching_meshes_half_of_them_are_too_many() -> None:
-    trace = solved("two-pass/nts-lm", MATCHING)
+    trace = solve_scene("two-pass/nts-lm", MATCHING)
     assert error_of(trace) < ROUNDOFF
     assert (len(trace.multipliers), trace.deficiency) == (8, 4)
