@@ -46,7 +46,7 @@ def _scene(name: str, width: int) -> Iterator[Text]:
     yield _wrap(entry.summary, width)
     yield _wrap(f"source: {SOURCE}, {entry.source}" if entry.source else "source: this project", width)
     pressure = f"; pressure {BLOCKS[name].pressure:g}" if name in BLOCKS else ""
-    yield _wrap(f"our choice: {entry.chosen}{pressure}", width)
+    yield _wrap(f"our choice: {entry.assumptions}{pressure}", width)
     if name not in BLOCKS:
         options = (f"{option} {_default_in_words(default)}".strip() for option, default in options_of(name).items())
         yield _wrap(f"options: {', '.join(options)}", width)

@@ -18,7 +18,7 @@ from contactverif.contract.errors import MisuseError
 
 @dataclass(frozen=True, slots=True)
 class Placing:
-    """Where a drawing lies in the plane: a point (x, y) of it goes to scale × (x along `axis`, y across it, + `shift`).
+    """The place of a drawing: its point (x, y) goes to scale × (x along `axis`, y across it, + `shift`).
 
     Attributes
     ----------

@@ -1,8 +1,14 @@
-"""The scenes that have a name: those of the reference paper, and one of ours. Data, with source and what we chose.
+"""The scenes that have a name on the command line: those of the reference paper, and one of ours.
 
-Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7. Lengths along the interface are the paper's where it
-prints them (A1, B, C). It prints no heights, materials, lateral supports or dimensions of A2 and of Examples 1 and
-1bis, and little of the meshes of Example 2: those are chosen, and `chosen` says so.
+The lengths along the interface are the paper's where it prints them (A1, B, C). It prints no heights, materials,
+lateral supports or lengths of the elements of A2 and of Examples 1 and 1bis, and little of the meshes of Example 2.
+Those are assumptions, and the attribute `assumptions` of each scene says so.
+
+Rule for the next editor: this file is data. A new scene is one entry of `BLOCKS` or `SCENES`, with its source.
+
+References
+----------
+Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Sections 4, 5 and 7.
 """
 
 from __future__ import annotations
@@ -12,7 +18,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import cos, inf, isfinite, radians, sin
+from math import cos, inf, radians, sin
 from typing import Any, Literal
 
 import numpy as np
@@ -26,46 +32,46 @@ from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.disk import DiskProblem, disk_on_foundation
 
-MODERATE_PENALTY = 10.0  # ε̂ h / E
+MODERATE_PENALTY = 10.0  # The dimensionless penalty ε̂ h / E of a scene, unless one is given.
 _MATERIAL = "E = 1e4, ν = 0.3 in both; rollers at all sides; heights; two layers of cells"
-_QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # exact (cos, sin)
+_QUARTER_TURNS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # The exact (cos, sin).
 
 
 @dataclass(frozen=True, slots=True)
 class NamedScene:
-    """What there is to say of a scene.
+    """The description of a scene.
 
     Attributes
     ----------
     summary : str
-        What it is, in one line.
+        What the scene shows, in one line.
     source : str
-        Where in the paper; empty if it is ours.
-    chosen : str
-        What the paper does not print; of a scene of ours, why it is as it is.
+        The place in the paper; empty if the scene is ours.
+    assumptions : str
+        What the paper does not print; for a scene of ours, why it is as it is.
     """
 
     summary: str
     source: str
-    chosen: str
+    assumptions: str
 
 
 @dataclass(frozen=True, slots=True)
 class NamedBlocks(NamedScene):
-    """A drawing of two blocks, upright, in the paper's units; the pressure between them is uniform.
+    """The description of two blocks, upright, in the paper's units. The pressure between them is uniform.
 
     Attributes
     ----------
     slave, master : Sequence[float]
-        Lengths of the segments from left to right.
+        The lengths of the segments from left to right.
     slave_from, master_from : float
-        Where they begin.
+        The x at which the segments begin.
     height : float
-        Of each block.
+        The height of each block.
     pressure : float
-        On top.
+        The pressure on top.
     rigid_master : bool
-        A rigid floor.
+        True if the master is a rigid floor.
     """
 
     slave: Sequence[float]
@@ -169,67 +175,101 @@ SCENES: Mapping[str, NamedScene] = {
 
 
 def load_scene_case(text: str) -> Case:
-    """The scene that the text names, with its options, as a case.
+    """Return the scene that the text names as a case; see `load_scene`.
 
     Raises
     ------
     MisuseError
-        As `load_scene`.
+        If the name, an option or a value does not exist.
     """
     return load_scene(text, "scene").case()
 
 
 def load_scene(text: str, argument: str = "--scene") -> Scene:
-    """The scene that the text names, with its options: `c`, `c:refine=2,penalty=1e4`.
+    """Return a scene by its name on the command line, with options.
+
+    Parameters
+    ----------
+    text : str
+        The name and its options, such as ``"c"`` or ``"c:refine=2,penalty=1e4"``.
+    argument : str
+        The beginning of error messages.
+
+    Returns
+    -------
+    Scene
+        The scene.
 
     Raises
     ------
     MisuseError
-        For a name, an option or a value that is none.
+        If the name, an option or a value does not exist; the message suggests the nearest ones.
+
+    Examples
+    --------
+    Case test C of the reference paper, with a mesh twice as fine:
+
+    >>> from contactverif import load_scene
+    >>> scene = load_scene("c:refine=2")
+    >>> len(scene.interface.slave), scene.facts["pressure"].item()
+    (8, 100.0)
     """
     name, options = parse_name(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
     if name not in SCENES:
         raise unknown_name_error(argument, name, SCENES)
-    own = options_of(name)
+    defaults = options_of(name)
     for option, value in options.items():
-        if option not in own:
-            error = unknown_name_error(f"{argument}: option of {text!r}", option, own)
-            raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(own)}")
-        if needed := _refused(name, option, value):
+        if option not in defaults:
+            error = unknown_name_error(f"{argument}: option of {text!r}", option, defaults)
+            raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(defaults)}")
+        if needed := _needed(name, option, value):
             raise MisuseError(f"{argument}: {option} of {text!r}", repr(value), needed)
     return make_scene(name, **options)
 
 
 def make_scene(name: str, **options: Any) -> Scene:
-    """The scene of that name; `options_of` says which options it has, `blocks` and `disk` what they mean.
+    """Return a scene by its name, with options as keywords.
+
+    Parameters
+    ----------
+    name : str
+        A key of `SCENES`.
+    **options : Any
+        The options: `options_of` lists them, `make_blocks` and `make_disk` describe them.
+
+    Returns
+    -------
+    Scene
+        The scene.
 
     Raises
     ------
     MisuseError
-        For a name or an option that is none, and for a value that cannot be.
+        If the name, an option or a value does not exist.
     """
     if name not in SCENES:
         raise unknown_name_error("scene", name, SCENES)
-    own = options_of(name)
+    defaults = options_of(name)
     for option, value in options.items():
-        if option not in own:
-            raise unknown_name_error(f"option of scene {name}", option, own)
-        left_open = value is None and own[option] is None
-        if not left_open and (needed := _refused(name, option, value)):
+        if option not in defaults:
+            raise unknown_name_error(f"option of scene {name}", option, defaults)
+        is_default = value is None and defaults[option] is None
+        if not is_default and (needed := _needed(name, option, value)):
             raise MisuseError(f"{option} of scene {name}", repr(value), needed)
     return _maker(name)(**options)
 
 
 def options_of(name: str) -> Mapping[str, Any]:
-    """The options of a scene with their defaults; None is what the scene itself says."""
+    """Return the options of a scene with their defaults; None means the scene's own value."""
     return {option: entry.default for option, entry in inspect.signature(_maker(name)).parameters.items()}
 
 
 def _maker(name: str) -> Callable[..., Scene]:
-    return partial(blocks, name) if name in BLOCKS else disk
+    """Return the function that makes the scene of that name from its options."""
+    return partial(make_blocks, name) if name in BLOCKS else make_disk
 
 
-def disk(
+def make_disk(
     *,
     refine: int = 1,
     penalty: float = 1e9,
@@ -239,34 +279,41 @@ def disk(
     force: float = 1e6,
     lowered: float | None = None,
 ) -> Scene:
-    """The disk on its foundation, in the paper's units.
+    """Return the disk on its foundation of Example 2, in the paper's units.
 
     Parameters
     ----------
     refine : int
-        Parts that each side of each cell is divided into.
+        The number of parts that each side of each cell is divided into.
     penalty : float
-        Ε̂.
-    young, poisson : float
-        E of the disk, ν of both.
+        The distributed stiffness ε̂.
+    young : float
+        Young's modulus E of the disk.
     ratio : float
         E of the foundation over E of the disk.
+    poisson : float
+        Poisson's ratio of both bodies.
     force : float
-        On top of the disk, per unit of thickness.
+        The force on top of the disk, per unit of thickness.
     lowered : float | None
-        How deep the disk is pushed in the first guess; by default so deep that the contact is about as wide as
-        in the solution.
+        The depth to which the disk is pushed in the first guess. By default the contact is then about as wide as in the
+        solution.
+
+    Returns
+    -------
+    Scene
+        The disk (slave) on the foundation (master).
 
     Raises
     ------
     MisuseError
-        For a force so large or a penalty so soft that the contact is wider than the meshes are fine.
+        If the force is so large, or the penalty so soft, that the contact is wider than the fine part of the meshes.
     """
     problem = DiskProblem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
     return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
 
 
-def blocks(
+def make_blocks(
     name: str,
     *,
     refine: int = 1,
@@ -279,26 +326,35 @@ def blocks(
     sides: Literal["rollers", "free"] = "rollers",
     lowered: float | None = None,
 ) -> Scene:
-    """The pair of blocks of that name.
+    """Return a scene of two blocks by its name.
 
     Parameters
     ----------
+    name : str
+        A key of `BLOCKS`.
     refine : int
-        Parts that each segment and each layer is divided into.
+        The number of parts that each segment and each layer is divided into.
     penalty : float | None
-        Ε̂; 10 E/h with the mean slave segment h by default.
-    young, poisson : float
-        E of the slave, ν of both.
+        The distributed stiffness ε̂; by default 10 E/h with the mean slave segment h.
+    young : float
+        Young's modulus E of the slave.
     ratio : float
         E of the master over E of the slave.
+    poisson : float
+        Poisson's ratio of both blocks.
     pressure : float | None
-        On top; the scene's own by default.
+        The pressure on top; by default that of the description.
     degrees : float
-        By which all of it is turned, counter-clockwise.
+        The angle by which the whole scene is rotated, counter-clockwise.
     sides : Literal['rollers', 'free']
-        On rollers, or free to strain, so that the contact area changes.
+        The support of the vertical sides. Free sides strain, so that the contact area changes.
     lowered : float | None
-        How deep the slave is pushed in the first guess, 0 to begin where they touch; p/ε̂ by default.
+        The depth to which the slave is pushed in the first guess: 0 begins where the blocks touch. By default p/ε̂.
+
+    Returns
+    -------
+    Scene
+        The two blocks.
     """
     drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure
@@ -309,7 +365,7 @@ def blocks(
     layers = np.linspace(0.0, drawing.height, 2 * refine + 1)
     mean_segment = float(np.mean(drawing.slave)) / refine
     angle = radians(degrees)
-    axis = _QUARTERS.get(degrees % 360, (cos(angle), sin(angle)))  # type: ignore[call-overload]
+    axis = _QUARTER_TURNS.get(degrees % 360, (cos(angle), sin(angle)))  # type: ignore[call-overload]
     return two_blocks(
         Rectangle(slave_x, layers, young=young, poisson=poisson),
         Rectangle(master_x, layers - drawing.height, young=ratio * young, poisson=poisson),
@@ -323,34 +379,41 @@ def blocks(
     )
 
 
-def _refused(name: str, option: str, value: Any) -> str:
-    """Empty, or what the option needs instead of the value."""
+def _needed(name: str, option: str, value: Any) -> str:
+    """Return what the option of a scene needs instead of the value; empty if the value is right."""
     if option == "sides":
         return "" if value in ("rollers", "free") else "rollers or free"
     if option == "refine":
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
         finest = _FINEST if name in BLOCKS else _FINEST_DISK
-        return "" if whole and 1 <= value <= finest else f"a whole number from 1 to {finest}"
+        return "" if _is_whole(value) and 1 <= value <= finest else f"a whole number from 1 to {finest}"
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return "a number"
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number that no float can hold
-        number = inf
+    low, high, needed = -inf, inf, "a finite number"
     if option == "poisson":
-        return "" if -1 < number < 0.5 else "Poisson's ratio above −1 and below 0.5"
-    if option in _ABOVE_ZERO:
-        return "" if 0 < number < inf else "a number > 0"
-    return "" if isfinite(number) else "a finite number"
+        low, high, needed = -1.0, 0.5, "Poisson's ratio above −1 and below 0.5"
+    elif option in _ABOVE_ZERO:
+        low, needed = 0.0, "a number > 0"
+    return "" if low < _as_float(value) < high else needed
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _as_float(value: Any) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # No float can hold so large a whole number.
+        return inf
 
 
 OPTIONS = tuple(dict.fromkeys(option for name in SCENES for option in options_of(name)))
 _ABOVE_ZERO = ("penalty", "young", "ratio", "pressure", "force")
-_FINEST, _FINEST_DISK = 64, 4  # that disk has 65,000 cells
+_FINEST, _FINEST_DISK = 64, 4  # The finest disk has 65,000 cells.
 
 
 def _grid(start: float, lengths: Sequence[float], refine: int) -> FloatArray:
-    """Ascending coordinates of a side; the printed nodes are exact whatever the refinement."""
+    """Return the ascending coordinates of a side; the printed nodes are exact at every refinement."""
     coarse = start + np.concatenate([[0.0], np.cumsum(lengths)])
     parts = [np.linspace(a, b, refine, endpoint=False) for a, b in itertools.pairwise(coarse)]
     return np.concatenate([*parts, coarse[-1:]])

@@ -1,15 +1,20 @@
-"""Example 2 of the reference paper: an elastic disk pressed on an elastic foundation, contact that has an edge.
+"""Example 2 of the reference paper: an elastic disk pressed on an elastic foundation, a contact that has an edge.
 
-Given (Zavarise & De Lorenzis, 2009, Section 7.2): R = 10, E = 1e8 and ν = 0 of the disk, a concentrated force 1e6 on
-its top, E = 1e9 of the foundation, its 160 × 30 elements, a "very fine mesh close to the contact zone", ε̂ = 1e9.
-Chosen: plane strain (with ν = 0 there is no other); the whole disk, which moves up and down only on its axis; the
+The paper states: R = 10, E = 1e8 and ν = 0 of the disk, a concentrated force 1e6 on its top, E = 1e9 of the foundation,
+its 160 × 30 elements, a "very fine mesh close to the contact zone", and ε̂ = 1e9.
+
+Assumptions: plane strain (with ν = 0 there is no other); the whole disk, which moves up and down only on its axis; the
 foundation 2R wide and R deep, clamped below, free at its sides. With the half-width a = 0.374 of the contact after
-Hertz: 61 elements of the foundation are equally wide over |x| ≤ 1.6 a = 0.6, the segments of the disk are equally long
-over |x| ≤ 2 a, five of the foundation's for four of them, so that the meshes do not match. Contact starts open, and
-without contact nothing holds the disk: the first guess lowers it.
+Hertz, 61 elements of the foundation are equally wide over |x| ≤ 1.6 a = 0.6, and the segments of the disk are equally
+long over |x| ≤ 2 a: five of the foundation's for four of the disk's, so that the meshes do not match. Contact starts
+open, and without contact nothing holds the disk; so the first guess lowers it.
 
-The middle of an element of the foundation, not a node, is in the middle: a slave node that symmetry keeps on a master
-node is where the force of a node-to-segment formulation jumps.
+Rule for the next editor: the middle of an element of the foundation, not a node, lies in the middle of the contact. The
+force of a node-to-segment formulation jumps at a slave node that symmetry keeps on a master node.
+
+References
+----------
+Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Section 7.2.
 """
 
 from __future__ import annotations
@@ -27,36 +32,40 @@ from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.scenes.hertz import WinklerContact, half_width, layer_half_width, solve_winkler_contact
 
-UNIFORM = 1.6  # half-widths of the contact: where the foundation's elements are equally wide
-ELEMENTS = (60, 50, 30)  # of the foundation: where they are uniform (and one), on either side of that (and one less),
-# and in depth
-FINE = 2.0  # half-widths: where the disk's segments are equally long; its contact boundary
-SEGMENTS = (60, 20, 18)  # of the disk: there, in a quarter of the disk beside that, and in layers
-REACH = 2.5  # half-widths: the foundation's contact boundary
-WIDEST = 0.9  # of the disk's contact boundary may be in contact
-SLOPES = (5e-3, 0.2)  # a/R that the meshes are made for; Hertz' answer is for small ones
-_SQUARE = 0.45  # half the side of the square in the middle of the unit disk that the mesh is drawn in
-_CORNER = pi / 4  # the blocks below, above, left and right of that square see it under twice this angle
+# Lengths in half-widths of the contact after Hertz.
+UNIFORM = 1.6  # The foundation's elements are equally wide up to this distance from the middle.
+FINE = 2.0  # The disk's segments are equally long up to this distance; they are its contact boundary.
+REACH = 2.5  # The foundation's contact boundary ends at this distance.
+
+# The numbers of elements of the foundation: in the uniform part (and one more), on either side of it (and one less),
+# and in depth.
+ELEMENTS = (60, 50, 30)
+# The numbers of segments of the disk: in the fine part, in a quarter of the disk beside it, and in layers.
+SEGMENTS = (60, 20, 18)
+WIDEST = 0.9  # The largest share of the disk's contact boundary that may be in contact.
+SLOPES = (5e-3, 0.2)  # The range of a/R that the meshes are made for. Hertz' answer holds for small ones.
+_SQUARE = 0.45  # Half the side of the square in the middle of the unit disk that the mesh is drawn in.
+_CORNER = pi / 4  # The blocks below, above, left and right of that square see it under twice this angle.
 
 
 @dataclass(frozen=True, slots=True)
 class DiskProblem:
-    """What is pressed on what; the paper's numbers unless said otherwise.
+    """The data of a disk that is pressed on a foundation; by default the paper's.
 
     Attributes
     ----------
     radius : float
-        R, a length.
+        The radius R of the disk, a length.
     young : tuple[float, float]
-        Of disk and foundation, force per length squared.
+        Young's moduli of disk and foundation, force per length squared.
     poisson : float
-        Of both.
+        Poisson's ratio of both bodies.
     force : float
-        F on top of the disk, per unit of thickness.
+        The force F on top of the disk, per unit of thickness.
     penalty : float
-        Ε̂, force per length of the interface, per length of penetration.
+        The distributed stiffness ε̂, force per length per length of penetration.
     width, depth : float
-        Of the foundation, lengths; 2R and R by default.
+        The width and the depth of the foundation, lengths; 2R and R by default.
     """
 
     radius: float = 10.0
@@ -73,35 +82,35 @@ class DiskProblem:
 
     @property
     def stiffness(self) -> float:
-        """E*, of both bodies together: 1/E* = Σ (1 − ν²)/E."""
+        """The stiffness E* of both bodies together, 1/E* = Σ (1 − ν²)/E, force per length squared."""
         return 1 / sum((1 - self.poisson**2) / young for young in self.young)
 
     @property
     def half_width(self) -> float:
-        """Of the contact area after Hertz, a length."""
+        """The half-width of the contact after Hertz, a length."""
         return half_width(self.force, self.radius, self.stiffness)
 
     @property
     def layer_half_width(self) -> float:
-        """Of the contact if the penalty's layer alone gave way."""
+        """The half-width of the contact if the penalty's layer alone gave way, a length."""
         return layer_half_width(self.force, self.radius, self.penalty)
 
     def winkler_contact(self) -> WinklerContact:
-        """The contact after Hertz with the penalty as a Winkler layer, which a penalty method tends to."""
+        """Return the contact after Hertz with the penalty as a Winkler layer, to which a penalty method converges."""
         return solve_winkler_contact(self.force, self.radius, self.stiffness, self.penalty)
 
 
 def disk_on_foundation(
     problem: DiskProblem = DiskProblem(), *, refine: int = 1, lowered: float | None = None, name: str = ""
 ) -> Scene:
-    """The disk, slave, on the foundation, master; they touch in the origin.
+    """Return the scene of the disk (slave) on the foundation (master); they touch in the origin.
 
     Parameters
     ----------
     refine : int
-        Parts that each side of each cell is divided into.
+        The number of parts that each side of each cell is divided into.
     lowered : float | None
-        Of the first guess, how deep the disk is pushed; by default a²/2R with the half-width a that Hertz on a
+        The depth to which the disk is pushed in the first guess; by default a²/2R with the half-width a that Hertz on a
         Winkler layer has, so that what is in contact hardly changes afterwards.
 
     Raises
@@ -112,14 +121,14 @@ def disk_on_foundation(
     a = problem.half_width
     low, high = SLOPES[0] * problem.radius, SLOPES[1] * problem.radius
     if not low <= a <= high:
-        found = f"{problem.force:g}, with which Hertz' contact is {2 * a:.3g} wide"
-        raise MisuseError("force", found, f"a contact from {2 * low:.3g} to {2 * high:.3g} wide")
+        actual = f"{problem.force:g}, with which Hertz' contact is {2 * a:.3g} wide"
+        raise MisuseError("force", actual, f"a contact from {2 * low:.3g} to {2 * high:.3g} wide")
     widest = WIDEST * FINE * a
     wide = problem.layer_half_width
     wide = problem.winkler_contact().half_width if wide <= widest else wide
     if wide > widest:
-        found = f"{problem.penalty:g}, with which the contact is {2 * wide:.3g} wide"
-        raise MisuseError("penalty", found, f"a stiffer one: the meshes are made for at most {2 * widest:.3g}")
+        actual = f"{problem.penalty:g}, with which the contact is {2 * wide:.3g} wide"
+        raise MisuseError("penalty", actual, f"a stiffer one: the meshes are made for at most {2 * widest:.3g}")
     if lowered is None:
         lowered = wide**2 / (2 * problem.radius)
     bodies = disk(problem, refine, lowered), foundation(problem, refine)
@@ -127,18 +136,18 @@ def disk_on_foundation(
 
 
 def foundation(problem: DiskProblem, refine: int = 1) -> Body:
-    """The foundation, whose surface is y = 0; what may touch is |x| ≤ 2.5 a."""
+    """Return the foundation, whose surface is y = 0; its contact boundary is |x| ≤ 2.5 a."""
     a = problem.half_width
     inner, outer, deep = ELEMENTS
     size = 2 * UNIFORM * a / inner
     middle = (np.arange(inner // 2 * refine + 1) + 0.5) * size / refine
     left, right = (
-        middle[-1] + graded(problem.width / 2 - middle[-1], size, outer, outer * refine - fewer)[1:] for fewer in (0, 1)
+        middle[-1] + grade(problem.width / 2 - middle[-1], size, outer, outer * refine - fewer)[1:] for fewer in (0, 1)
     )
     whole = block(
         Rectangle(
             np.concatenate([-left[::-1], -middle[::-1], middle, right]),
-            -graded(problem.depth, size, deep, deep * refine)[::-1],
+            -grade(problem.depth, size, deep, deep * refine)[::-1],
             young=problem.young[1],
             poisson=problem.poisson,
         ),
@@ -152,7 +161,7 @@ def foundation(problem: DiskProblem, refine: int = 1) -> Body:
 
 
 def disk(problem: DiskProblem, refine: int = 1, lowered: float = 0.0) -> Body:
-    """The disk, which stands on the origin, loaded on top; what may touch is |x| ≤ 2 a."""
+    """Return the disk, which stands on the origin and is loaded on top; its contact boundary is |x| ≤ 2 a."""
     nodes, cells, contact = disk_mesh(problem.radius, FINE * problem.half_width, refine)
     load = np.zeros(nodes.shape)
     load[np.argmax(nodes[:, 1]), 1] = -problem.force
@@ -170,7 +179,7 @@ def disk(problem: DiskProblem, refine: int = 1, lowered: float = 0.0) -> Body:
 
 
 def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, IntArray, IntArray]:
-    """Nodes (n_nodes, 2), cells (n_cells, 4) and contact edges (n_segments, 2) of a disk that stands on the origin.
+    """Return nodes (n_nodes, 2), cells (n_cells, 4) and contact edges (n_segments, 2) of a disk on the origin.
 
     A square in the middle of the unit disk and four blocks around it, pulled towards the lowest point by the conformal
     map z → (z − iα) / (1 + iαz). That keeps angles, so that cells are as well shaped as where the mesh is even, and as
@@ -181,17 +190,17 @@ def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, 
     fine : float
         Segments within |x| ≤ fine are equally long, and are the contact edges; so are those of the block above.
     refine : int
-        Parts that each side of each cell is divided into.
+        The number of parts that each side of each cell is divided into.
     """
     columns, rows, _ = (count * refine for count in SEGMENTS)
     arc = asin(fine / radius)
-    shrink = tan(arc / 2) / tan(_CORNER / 2)  # of lengths at the lowest point, (1 − α)/(1 + α)
-    rest = pi - 2 * atan(shrink / tan(_CORNER / 2))  # what the block above sees of the circle, to either side
-    below, above = (  # angles from the lowest and the highest point, before the map
-        _mirrored(2 * np.arctan(factor * np.tan(np.linspace(0, seen, columns // 2 + 1) / 2)))
-        for factor, seen in ((1 / shrink, arc), (shrink, rest))
+    shrink = tan(arc / 2) / tan(_CORNER / 2)  # The factor of lengths at the lowest point, (1 − α)/(1 + α).
+    rest = pi - 2 * atan(shrink / tan(_CORNER / 2))  # The angle of the circle above the square, to either side.
+    below, above = (  # Angles from the lowest and the highest point, before the map.
+        _mirror(2 * np.arctan(factor * np.tan(np.linspace(0, angle, columns // 2 + 1) / 2)))
+        for factor, angle in ((1 / shrink, arc), (shrink, rest))
     )
-    beside = _mirrored(np.linspace(0, _CORNER, rows // 2 + 1))
+    beside = _mirror(np.linspace(0, _CORNER, rows // 2 + 1))
     points, cells, lowest = _unit_disk(below, beside, above, refine)
     pull, z = (1 - shrink) / (1 + shrink), points @ np.array([1, 1j])
     pulled = (z - 1j * pull) / (1 + 1j * pull * z)
@@ -202,7 +211,7 @@ def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, 
 def _unit_disk(
     below: FloatArray, beside: FloatArray, above: FloatArray, refine: int
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Nodes, cells, and the nodes of the lower quarter of the circle from left to right.
+    """Return nodes, cells, and the nodes of the lower quarter of the circle from left to right.
 
     `below`, `beside` and `above` are angles from −π/4 to π/4 from the directions down, right (and left), and up.
     """
@@ -219,7 +228,7 @@ def _unit_disk(
         ]
     )
     first, room = 2 * _CORNER / SEGMENTS[0], 1 - _SQUARE  # a layer at the contact, as thick as a segment is long
-    outwards = 1 - graded(room, first, SEGMENTS[2], SEGMENTS[2] * refine)[-2::-1, None, None] / room
+    outwards = 1 - grade(room, first, SEGMENTS[2], SEGMENTS[2] * refine)[-2::-1, None, None] / room
     rings = square[walk] + outwards * (circle - square[walk])  # (n_layers, n_around, 2)
     loops = np.vstack([walk, len(square) + np.arange(rings[..., 0].size).reshape(len(rings), -1)])
     following = np.roll(loops, -1, axis=1)
@@ -229,15 +238,15 @@ def _unit_disk(
     return np.vstack([square, rings.reshape(-1, 2)]), cells, loops[-1, : len(below)]
 
 
-def graded(length: float, first: float, parts: int, steps: int) -> FloatArray:
-    """Ascending coordinates (steps + 1,) from 0 to the length, each step longer than the one before.
+def grade(length: float, first: float, parts: int, steps: int) -> FloatArray:
+    """Return ascending coordinates (steps + 1,) from 0 to the length, each step longer than the one before.
 
     As many steps as parts begin with one that is `first` long; more or fewer follow the same law.
 
     Raises
     ------
     MisuseError
-        If parts as long as the first are too many for the length.
+        If so many parts, each as long as the first, do not fit into the length.
     """
     if not first * parts < length:
         raise MisuseError("graded: length", f"{length:g}", f"more than {parts} parts of {first:g}")
@@ -245,12 +254,12 @@ def graded(length: float, first: float, parts: int, steps: int) -> FloatArray:
     def excess(growth: float) -> float:
         return length * expm1(growth / parts) / expm1(growth) - first
 
-    growth = brentq(excess, 1e-9, 700.0)  # of the parts, e^growth from first to last; expm1 overflows beyond 709
+    growth = brentq(excess, 1e-9, 700.0)  # The parts grow by e^growth from first to last. expm1 overflows beyond 709.
     places = np.arange(steps + 1) / steps
     coordinates: FloatArray = length * np.expm1(growth * places) / expm1(growth)
     return coordinates
 
 
-def _mirrored(half: FloatArray) -> FloatArray:
-    """−half backwards, then half, which begins with 0: symmetrical to the last bit."""
+def _mirror(half: FloatArray) -> FloatArray:
+    """Return −half backwards, then half, which begins with 0; the result is symmetrical to the last bit."""
     return np.concatenate([-half[:0:-1], half])

@@ -27,12 +27,22 @@ _FLAT: dict[str, tuple[Sequence[float], Sequence[float]]] = {
 
 
 def named_case(name: str) -> Case:
-    """The case of that name.
+    """Return the interface state of that name.
+
+    Parameters
+    ----------
+    name : str
+        One of `NAMED`, such as ``"c"``.
+
+    Returns
+    -------
+    Case
+        The case, which solves no bodies.
 
     Raises
     ------
     MisuseError
-        If there is none; says which names are near.
+        If there is no such case; the message suggests the nearest names.
     """
     if name in _FLAT:
         return _flat(name, *_FLAT[name])
@@ -43,7 +53,7 @@ def named_case(name: str) -> Case:
 
 
 def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
-    """Lengths from left to right; master nodes are numbered from right to left."""
+    """Return a flat case from lengths from left to right; master nodes are numbered from right to left."""
     slave_x, master_x = _places(slave), _places(master)[::-1]
     interface = Interface.from_chains(_points(slave_x), _points(master_x))
     z = np.vstack([_points(slave_x, -_PENETRATION), _points(master_x)]).reshape(-1)
@@ -55,8 +65,8 @@ def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
     return Case(interface, z, 1 / _PENETRATION, parameters, name=name)
 
 
-def _tilted() -> Case:
-    """One slave segment of length 25/8 at cos θ = 24/25; the area of either quarter point covers two master segments.
+def _tilt_segment() -> Case:
+    """Return one slave segment of length 25/8 at cos θ = 24/25; the area of either quarter point covers two master segments.
 
     What VTS-PPT as printed transmits lacks 1 − cos θ = 0.04 of the slave force.
     """
@@ -66,8 +76,8 @@ def _tilted() -> Case:
     return Case(interface, np.vstack([slave, master]).reshape(-1), 16.0, {"cosine": np.array(0.96)}, name="tilted")
 
 
-def _offset_c() -> Case:
-    """c-prime off its kinks: moved by 1/14, over a longer master, with a penetration that varies."""
+def _offset_case_c() -> Case:
+    """Return c-prime off its kinks: moved by 1/14, over a longer master, with a penetration that varies."""
     slave_x = _places([2, 2, 4, 4]) + 1 / 14
     heights = -np.array([5, 7, 4, 6, 3]) / 64 - 1 / 448
     master = _points(_places([3, 3, 3, 3.2, 2.8, 3])[::-1] - 3)
@@ -84,5 +94,5 @@ def _points(x: Sequence[float] | FloatArray, height: float = 0.0) -> FloatArray:
     return np.column_stack([x, np.full(len(x), height)])
 
 
-_OTHERS: dict[str, Callable[[], Case]] = {"tilted": _tilted, "offset-c": _offset_c}
+_OTHERS: dict[str, Callable[[], Case]] = {"tilted": _tilt_segment, "offset-c": _offset_case_c}
 NAMED: tuple[str, ...] = (*_FLAT, *_OTHERS)

@@ -1,4 +1,4 @@
-"""Flat interfaces under uniform penetration: what the patch test is asked on.
+"""Flat interfaces under uniform penetration, for the patch test.
 
 Each slave chain lies wholly over one master chain; ends may coincide. Meshes match or not, neighbours' lengths differ
 by up to 2^20, and up to 100 master segments lie under one slave segment.
@@ -22,11 +22,11 @@ from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
 
-MOST_MASTER_SEGMENTS = 100  # in one chain
+MOST_MASTER_SEGMENTS = 100  # The most master segments in one chain.
 _DEPTHS = st.integers(1, 8)  # quarters
-_SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # how far the slave has come from its reference
-_REPEATS = st.sampled_from([1] * 15 + [2, 4, 12])  # of the slave lengths, for long chains
-_REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # master lengths × 2^-this
+_SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # The distance that the slave has slid from its reference.
+_REPEATS = st.sampled_from([1] * 15 + [2, 4, 12])  # The slave lengths are repeated so often, for long chains.
+_REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # The master lengths are multiplied by 2^-this.
 
 
 @overload
@@ -34,7 +34,7 @@ def flat_cases(interface: None = None) -> SearchStrategy[Case]: ...
 @overload
 def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Uniform penetration; every slave point projects inside the master.
+    """Return cases of uniform penetration; every slave point projects inside the master.
 
     Parameters
     ----------
@@ -43,7 +43,8 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
 
     Returns
     -------
-    Strategy of cases with the parameters "penetration" (|g| > 0, a length), "along" (n_nodes,) (coordinate of each
+    SearchStrategy[Case] | None
+        Cases with the parameters "penetration" (|g| > 0, a length), "along" (n_nodes,) (coordinate of each
     node along the line, the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's
     first to its last node). None if the interface is not flat, or its slave is not over its master.
     """
@@ -70,8 +71,8 @@ def _flat_cases(draw: DrawFn) -> Case:
 def _panels() -> SearchStrategy[list[tuple[FloatArray, FloatArray]]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang = st.integers(0, 3)
-    one = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
-    return st.one_of(st.lists(one, min_size=1, max_size=1), st.lists(one, min_size=1, max_size=2))
+    side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
+    return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
 def _places(
@@ -83,7 +84,7 @@ def _places(
     right: int,
     sevenths: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Ascending x of the nodes of a slave chain and of a master chain that goes beyond it by `left` and `right`.
+    """Return the ascending x of the nodes of a slave chain and of a master chain that goes beyond it by `left` and `right`.
 
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.

@@ -35,14 +35,14 @@ from contactverif.strategies.parts import (
 )
 from contactverif.strategies.rings import Ring, rings
 
-_ON = st.integers(0, 7)  # 0 is no offset
-_WALL = 5  # one step in six
+_ON = st.integers(0, 7)  # Zero means no offset.
+_WALL = 5  # The kind of a step that is a wall: one step in six.
 _BENDS = st.sampled_from([0.0, 0.125, 0.25, 0.5, 1.0, 0.03125])  # steepness of the master's steps
 _TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # slope of a slave segment, at most 45°
 
 
 def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """States of any kind; one in eight exactly on the lattice, the others off it by some sevenths.
+    """Return states of any kind; one in eight exactly on the lattice, the others off it by some sevenths.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 
 
 def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """As `general_cases`, always with the offset by sevenths: for derivatives, which mean nothing at a kink."""
+    """Return cases as `general_cases` does, always off the lattice: for derivatives, which mean nothing at a kink."""
     return _general_cases(smooth=True) if interface is None else given_interface.states(interface, smooth=True)
 
 
@@ -78,7 +78,7 @@ class Broken:
     Attributes
     ----------
     steps : Sequence[tuple[float, int, int]]
-        Of the master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
+        The master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
     bend : float
         The steepness of a rise of 1; walls are steep anyway.
     slave : Sequence[float]
@@ -103,7 +103,7 @@ class Broken:
     upright: bool = False
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
-        """The panel; nodes moved off the lattice by these numerators, 0 for none."""
+        """Return the panel, its nodes moved off the lattice by these numerators, 0 for none."""
         line = self._master(offsets)
         x = self.start + np.concatenate([[0.0], np.cumsum(self.slave)])
         length = min(shortest(line), min(self.slave))
@@ -118,7 +118,7 @@ class Broken:
         return Panel(np.column_stack([x, heights]), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
-        """Points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
+        """Return points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
 
         With an offset walls lean and bends are uneven, so that nothing is seen exactly edge-on.
         """
@@ -135,8 +135,8 @@ class Broken:
 
 
 @cache
-def _broken() -> SearchStrategy[Broken]:
-    """Flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
+def _broken_lines() -> SearchStrategy[Broken]:
+    """Return flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
     flat = lengths().map(lambda along: [(length, 0, 0) for length in along])
     bent = st.lists(
         st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
@@ -151,7 +151,7 @@ def _broken() -> SearchStrategy[Broken]:
 
 
 def _ledge(floor: Sequence[float], slave: Sequence[float], rise: int, quarters: Sequence[int], unit: float) -> Broken:
-    """A floor whose free end is an upright wall, and a slave that begins on it with a long segment beyond the wall.
+    """Return a floor whose free end is an upright wall, and a slave that begins on it with a long segment beyond the wall.
 
     The area of competence of that segment's first quarter point goes past the wall: a walk ends edge-on.
     """
@@ -162,10 +162,10 @@ def _ledge(floor: Sequence[float], slave: Sequence[float], rise: int, quarters: 
 
 @cache
 def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
-    """One or two panels; ledges, which are kinks, only if not smooth."""
-    shapes: list[SearchStrategy[Broken | Ring]] = [_broken(), _broken(), _broken(), rings(), rings()]
+    """Return one or two panels; ledges, which are kinks, only if not smooth."""
+    shapes: list[SearchStrategy[Broken | Ring]] = [_broken_lines(), _broken_lines(), _broken_lines(), rings(), rings()]
     if not smooth:
         plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
         shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
-    one = st.one_of(*shapes)
-    return st.one_of(st.lists(one, min_size=1, max_size=1), st.lists(one, min_size=1, max_size=2))
+    panel = st.one_of(*shapes)
+    return st.one_of(st.lists(panel, min_size=1, max_size=1), st.lists(panel, min_size=1, max_size=2))

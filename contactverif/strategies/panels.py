@@ -36,25 +36,25 @@ class Panel:
 
     @property
     def shortest_segment(self) -> float:
-        """Of the reference, both sides."""
+        """The length of the shortest reference segment of both sides."""
         return min(shortest(self.reference), shortest(self.master))
 
 
 def on_lattice(values: FloatArray) -> FloatArray:
-    """The nearest multiples of 2^-20."""
+    """Return the nearest multiples of 2^-20."""
     rounded: FloatArray = np.round(values * 2.0**20) * 2.0**-20
     return rounded
 
 
 def shortest(points: FloatArray) -> float:
-    """The shortest of the segments between consecutive points (n, 2)."""
+    """Return the length of the shortest of the segments between consecutive points (n, 2)."""
     return float(np.hypot(*np.diff(points, axis=0).T).min())
 
 
 def assemble_panels(
     panels: Sequence[Panel], motion: Motion, shuffle: int = 0
 ) -> tuple[Interface, FloatArray, FloatArray]:
-    """The panels in a row, far apart.
+    """Assemble panels to an interface and its state, in a row, far apart.
 
     Parameters
     ----------
@@ -84,10 +84,10 @@ def assemble_panels(
 
 
 def _offsets(panels: Sequence[Panel]) -> list[FloatArray]:
-    """Shifts in x that keep panels apart by four widths or more, powers of two."""
+    """Return shifts in x that keep panels apart by four widths or more, powers of two."""
     offsets, reached = [np.zeros(2)], 0.0
     for before, panel in pairwise(panels):
-        width = max(np.ptp(np.vstack([one.slave, one.master])[:, 0]) for one in (before, panel))
+        width = max(np.ptp(np.vstack([side.slave, side.master])[:, 0]) for side in (before, panel))
         reached += 8 * 2.0 ** ceil(log2(width))
         offsets.append(np.array([reached, 0.0]))
     return offsets

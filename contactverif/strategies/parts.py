@@ -28,7 +28,7 @@ _QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (c
 
 @cache
 def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]]:
-    """Lengths of 1 to `most` consecutive segments: 1 to 8; one list in five has neighbours' ratios up to 7 × 2^20."""
+    """Return lengths of 1 to `most` consecutive segments: 1 to 8; one list in five has neighbours' ratios up to 7 × 2^20."""
     if most < 1:
         raise MisuseError("most", f"{most}", "at least one segment")
     plain = st.lists(st.integers(1, 8).map(float), min_size=1, max_size=most)
@@ -40,25 +40,25 @@ def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]
 
 @cache
 def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
-    """Penetrations in quarters of some unit, to be repeat_cyclically out in turn to the nodes; below 0 is open."""
+    """Return penetrations in quarters of some unit, to be repeat_cyclically out in turn to the nodes; below 0 is open."""
     return st.lists(st.integers(lowest, 8), min_size=1, max_size=most)
 
 
 @cache
 def depth_units(*, finest: int = 8) -> SearchStrategy[float]:
-    """2^-e, e = 0 … `finest`: what the depths are multiplied by, besides the shortest segment."""
+    """Return 2^-e, e = 0 … `finest`: the factor of the depths, besides the shortest segment."""
     return st.integers(0, finest).map(lambda e: 2.0**-e)
 
 
 @cache
 def penalties() -> SearchStrategy[float]:
-    """Distributed stiffness: a small integer × 2^k."""
+    """Return penalties, distributed stiffnesses: a small integer × 2^k."""
     return st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-8, 24))
 
 
 @cache
 def seeds() -> SearchStrategy[int]:
-    """Of what a property draws at random for a case."""
+    """Return seeds of what a property draws at random for a case."""
     return st.integers(0, 2**16)
 
 
@@ -69,11 +69,11 @@ class Motion:
     Attributes
     ----------
     degrees : int
-        Of the rotation Q, counter-clockwise; quarter turns are exact.
+        The angle of the rotation Q, counter-clockwise; quarter turns are exact.
     shift : tuple[int, int]
-        In units of the lattice.
+        The translation in units of the lattice.
     exponent : int
-        k.
+        The exponent k.
     """
 
     degrees: int = 0
@@ -82,12 +82,12 @@ class Motion:
 
     @property
     def scale(self) -> float:
-        """2^k."""
+        """The factor 2^k of all lengths."""
         return ldexp(1.0, self.exponent)
 
     @property
     def cos_sin(self) -> tuple[np.longdouble, np.longdouble]:
-        """Of the angle, in extended precision where the machine has it."""
+        """Cosine and sine of the angle, in extended precision if the machine has it."""
         if self.degrees in _QUARTER_TURNS:
             cos, sin = _QUARTER_TURNS[self.degrees]
             return np.longdouble(cos), np.longdouble(sin)
@@ -96,11 +96,11 @@ class Motion:
 
     @property
     def direction(self) -> FloatArray:
-        """Where the lattice's x-axis goes, a unit vector (2,)."""
+        """The unit vector (2,) that the lattice's x-axis becomes."""
         return np.array(self.cos_sin, dtype=np.float64)
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Points (n, 2) moved; each coordinate is rounded once, from extended precision."""
+        """Return the points (n, 2), moved; each coordinate is rounded once, from extended precision."""
         cos, sin = self.cos_sin
         x, y = points.astype(np.longdouble).T
         moved = np.column_stack([cos * x - sin * y + self.shift[0], sin * x + cos * y + self.shift[1]])
@@ -113,7 +113,7 @@ REST = Motion()
 
 @cache
 def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> SearchStrategy[Motion]:
-    """Rest or any rigid motion; only quarter turns if `exact`. Translations up to `furthest`, scales 2^±`exponents`."""
+    """Return rest or any rigid motion; only quarter turns if `exact`. Translations up to `furthest`, scales 2^±`exponents`."""
     degrees = st.sampled_from([0, 90, 180, 270]) if exact else st.integers(0, 359)
     place = st.integers(-furthest, furthest)
     exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
@@ -121,16 +121,16 @@ def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> 
 
 
 def shifts(offsets: Sequence[int], count: int) -> FloatArray:
-    """Shifts (count, 2) of slave nodes, along and across, of 0 to 1/16."""
+    """Return shifts (count, 2) of slave nodes, along and across, of 0 to 1/16."""
     return repeat_cyclically(offsets, 2 * count).reshape(-1, 2) / [7.0, 11.0] / 16
 
 
 def repeat_cyclically(values: Sequence[int], count: int) -> FloatArray:
-    """`count` floats, the values in turn."""
+    """Return `count` floats, the values in turn."""
     return np.resize(np.asarray(values, dtype=np.float64), count)
 
 
 @cache
 def shuffles() -> SearchStrategy[int]:
-    """Every other mesh is numbered in walking order, 0; the others at random."""
+    """Return shuffles: every other mesh is numbered in walking order, 0; the others at random."""
     return st.one_of(st.just(0), st.integers(0, 255))

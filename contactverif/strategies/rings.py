@@ -40,7 +40,7 @@ class Ring:
     unit: float
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
-        """The panel; slave nodes moved off the lattice by these numerators, 0 for none."""
+        """Return the panel, its slave nodes moved off the lattice by these numerators, 0 for none."""
         warp = 1 + offsets[0] / 13 / 8  # no two segments at right angles, so that nothing is seen exactly edge-on
         master = self._points(self.master, not self.inner_slave, warp)
         reference = self._points(self.slave, self.inner_slave, 1.0)
@@ -53,7 +53,7 @@ class Ring:
         return Panel(slave, master, reference, closed=self.degrees == 360)
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
-        """Points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
+        """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
         shares = np.concatenate([[0.0], np.cumsum(weights)]) / sum(weights)
         angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
         points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
@@ -61,7 +61,7 @@ class Ring:
 
 
 def rings() -> SearchStrategy[Ring]:
-    """Arcs of 60° to 180°, and closed rings."""
+    """Return arcs of 60° to 180°, and closed rings."""
     weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
     degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
     depth = st.one_of(depths(), depths(lowest=-6))

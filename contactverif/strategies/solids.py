@@ -26,13 +26,13 @@ from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
 INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
-POSITIONS = 200  # of a punch that slides over one master segment
+POSITIONS = 200  # The number of positions of a punch that slides over one master segment.
 _LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
 _POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
 _TILTS = (1, 2, 3, 4, 5, 6, 13, 16, 20, 26)  # thirteenths of the approach: from 13 on contact ends within the interface
 _STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
-_OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # left and right; −1: the master overhangs
-_PARTS = 8  # of a slave segment, at which a master may end
+_OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # Left and right; −1: the master overhangs.
+_PARTS = 8  # A master may end at this many parts of a slave segment.
 _PART = st.sampled_from([4, 2, 6, 1, 3, 5, 7])
 _WIDER = st.integers(1, 4)
 _MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
@@ -45,43 +45,43 @@ def _widths() -> SearchStrategy[list[float]]:
     return st.one_of(plain, plain, plain, plain, wide)
 
 
-def block_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
-    """Two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
+def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
 
     Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
     """
-    return _two_blocks() if given is None else _uniform(given, overhang=False)
+    return _two_blocks() if scene is None else _uniform(scene, overhang=False)
 
 
-def variant_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
-    """The patch test's variants: each case has the parameter "variant", an index into VARIANTS.
+def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return the patch test's variants: each case has the parameter "variant", an index into VARIANTS.
 
     Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
     """
-    return _variants() if given is None else _uniform(given, overhang=False)
+    return _variants() if scene is None else _uniform(scene, overhang=False)
 
 
-def dead_zone_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
-    """A random block that overhangs its master inside a slave segment, on one side or both, under a uniform pressure.
+def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return a random block that overhangs its master inside a slave segment, on one side or both, under a uniform pressure.
 
     Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
     """
-    return _dead_zones() if given is None else _uniform(given, overhang=True)
+    return _dead_zones() if scene is None else _uniform(scene, overhang=True)
 
 
-def solid_cases(given: Case | None = None) -> SearchStrategy[Case] | None:
-    """A tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink.
+def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return a tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink.
 
     Given a scene, that scene alone.
     """
-    if given is None:
-        return _tilted()
-    return st.just(given) if has_bodies(given) else None
+    if scene is None:
+        return _tilted_blocks()
+    return st.just(scene) if has_bodies(scene) else None
 
 
-def _uniform(given: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
-    fits = has_bodies(given) and is_uniform(given) and overhangs(given) == overhang
-    return st.just(given) if fits else None
+def _uniform(scene: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
+    fits = has_bodies(scene) and is_uniform(scene) and overhangs(scene) == overhang
+    return st.just(scene) if fits else None
 
 
 @st.composite
@@ -130,7 +130,7 @@ def _dead_zones(draw: DrawFn) -> Case:
     segments = np.diff(x)
     first = draw(st.integers(0, len(segments) - 1)) if left > 0 else 0
     last = draw(st.integers(first, len(segments) - 1)) if right > 0 else len(segments) - 1
-    parts = 2 * _PARTS if first == last else _PARTS  # of a segment; both ends of the master may lie in the same one
+    parts = 2 * _PARTS if first == last else _PARTS  # Both ends of the master may lie in the same segment.
     begin = x[first] + (draw(_PART) / parts * segments[first] if left > 0 else left * draw(_WIDER))
     end = x[last + 1] - (draw(_PART) / parts * segments[last] if right > 0 else right * draw(_WIDER))
     master = draw(_widths())
@@ -145,7 +145,7 @@ def _dead_zones(draw: DrawFn) -> Case:
 
 
 @st.composite
-def _tilted(draw: DrawFn) -> Case:
+def _tilted_blocks(draw: DrawFn) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
@@ -203,5 +203,5 @@ def _grid(segments: Sequence[float]) -> FloatArray:
 
 
 def _cut(segments: Sequence[float], end: float) -> FloatArray:
-    """Grid lines from 0 to `end`: what the segments do not cover is one more, and what is too much is cut."""
+    """Return grid lines from 0 to `end`: what the segments do not cover is one more, and what is too much is cut."""
     return np.array([0.0, *takewhile(lambda x: x < end, accumulate(segments)), end])

@@ -17,13 +17,15 @@ from contactverif.contract.case import Case
 from contactverif.strategies.panels import Panel, assemble_panels
 from contactverif.strategies.parts import depth_units, motions, penalties, repeat_cyclically, seeds
 
-_RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # of a vertex above its neighbours, per length
-_QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # penetrations; 0 is a gap of exactly zero
-_SEGMENT = st.tuples(st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3))  # length, quarter under a master node
+_RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # The rise of a vertex above its neighbours, per length.
+_QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # Penetrations; 0 is a gap of exactly zero.
+_SEGMENT = st.tuples(
+    st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3)
+)  # The length, and the quarter under a master node.
 
 
 def tie_cases() -> SearchStrategy[Case]:
-    """Random meshes that stand exactly on a kink, many of them on several."""
+    """Return random meshes that stand exactly on a kink, many of them on several."""
     return _tie_cases()
 
 
@@ -38,7 +40,7 @@ def _tie_cases(draw: DrawFn) -> Case:
 def _facing(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> Panel:
-    """Master nodes under all slave nodes and under one quarter point or middle of some slave segments (0: of none)."""
+    """Return a panel with master nodes under all slave nodes and under one quarter point or middle of some slave segments (0: of none)."""
     slave_x, master_x = [0.0], [0.0]
     for length, quarter in segments:
         if quarter:
@@ -52,7 +54,7 @@ def _facing(
 def _on_bisector(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> Panel:
-    """A symmetric roof or valley of two segments; a node, or the quarter of the first slave segment, on its bisector.
+    """Return a symmetric roof or valley of two segments; a node, or the quarter of the first slave segment, on its bisector.
 
     The slave is level, so that the bisector, which is upright, is met at right angles.
     """
@@ -65,16 +67,16 @@ def _on_bisector(
 
 
 def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
-    """Slave nodes at x, sunk below the broken line (n, 2)."""
+    """Return a panel with slave nodes at x, sunk below the broken line (n, 2)."""
     heights = np.interp(x, *line.T)
     slave = np.column_stack([x, heights - repeat_cyclically(quarters, len(x)) / 4 * unit])
     return Panel(slave, line[::-1], np.column_stack([x, heights]))
 
 
-_DRAWN = (
+_ARGUMENTS = (
     st.lists(_SEGMENT, min_size=1, max_size=5),
     st.lists(_RISES, min_size=1, max_size=4),
     _QUARTERS,
     depth_units(),
 )
-_PANELS = st.one_of(st.builds(_facing, *_DRAWN), st.builds(_on_bisector, *_DRAWN))
+_PANELS = st.one_of(st.builds(_facing, *_ARGUMENTS), st.builds(_on_bisector, *_ARGUMENTS))

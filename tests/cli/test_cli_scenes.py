@@ -66,7 +66,7 @@ def test_scenes_lists_all_with_drawings_and_fits(ask: Ask, columns: int) -> None
     for name, entry in SCENES.items():
         words = " ".join(blocks[name].split())
         source = f"Zavarise & De Lorenzis (2009), {entry.source}" if entry.source else "this project"
-        for words_of_scene in (entry.summary, f"source: {source}", entry.chosen):
+        for words_of_scene in (entry.summary, f"source: {source}", entry.assumptions):
             assert words_of_scene in words
         if not isinstance(entry, NamedBlocks):
             assert {"▒", "░", "↓"} <= set(blocks[name])

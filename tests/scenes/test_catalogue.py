@@ -77,7 +77,7 @@ def test_what_is_known_of_a_scene(name: str) -> None:
     assert scene.name == name
     assert drawing.summary
     assert drawing.source
-    assert drawing.chosen
+    assert drawing.assumptions
     assert coordinates(scene) == printed(name)
     slave, master = coordinates(scene)
     assert master[0] <= slave[0]

@@ -17,7 +17,7 @@ from contactverif.mechanics.newton import End
 from contactverif.mechanics.scene import Scene
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import make_scene
-from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, graded
+from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, PaperFormulation
 
@@ -119,14 +119,14 @@ def test_finer_meshes_are_finer_everywhere() -> None:
 
 
 def test_graded_grids() -> None:
-    grid = graded(10.0, 0.02, 30, 30)
+    grid = grade(10.0, 0.02, 30, 30)
     steps = np.diff(grid)
     assert (grid[0], grid[-1], len(grid)) == (0, 10, 31)
     assert steps[0] == pytest.approx(0.02, rel=1e-9)
     assert np.ptp(steps[1:] / steps[:-1]) <= 1e-9
-    assert np.abs(graded(10.0, 0.02, 30, 60)[::2] - grid).max() <= 64 * UNIT_ROUNDOFF * 10
+    assert np.abs(grade(10.0, 0.02, 30, 60)[::2] - grid).max() <= 64 * UNIT_ROUNDOFF * 10
     with pytest.raises(MisuseError, match=r"found 0\.5; needed more than 30 parts of 0\.02"):
-        graded(0.5, 0.02, 30, 30)
+        grade(0.5, 0.02, 30, 30)
 
 
 def test_a_contact_that_the_meshes_are_not_made_for() -> None:
