@@ -66,7 +66,9 @@ def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
 
 
 def _tilt_segment() -> Case:
-    """Return one slave segment of length 25/8 at cos θ = 24/25; the area of either quarter point covers two master segments.
+    """Return one slave segment of length 25/8 at cos θ = 24/25.
+
+    The area of either quarter point covers two master segments.
 
     What VTS-PPT as printed transmits lacks 1 − cos θ = 0.04 of the slave force.
     """

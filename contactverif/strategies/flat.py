@@ -84,7 +84,9 @@ def _places(
     right: int,
     sevenths: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the ascending x of the nodes of a slave chain and of a master chain that goes beyond it by `left` and `right`.
+    """Return the ascending x of the nodes of a slave chain and of a master chain that covers it.
+
+    The master goes beyond the slave by `left` and `right`.
 
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.

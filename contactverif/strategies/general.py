@@ -88,7 +88,7 @@ class Broken:
     tilt : float
         Slope of the slave against the master, turned about its middle, flatter for long chains.
     quarters, unit : Sequence[int] or float
-        Penetrations: quarters/4 × unit × the shortest segment, repeat_cyclically to the slave nodes in turn.
+        Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
     upright : bool
         Walls do not lean.
     """
@@ -151,7 +151,9 @@ def _broken_lines() -> SearchStrategy[Broken]:
 
 
 def _ledge(floor: Sequence[float], slave: Sequence[float], rise: int, quarters: Sequence[int], unit: float) -> Broken:
-    """Return a floor whose free end is an upright wall, and a slave that begins on it with a long segment beyond the wall.
+    """Return a floor whose free end is an upright wall.
+
+    The slave begins on it with a long segment beyond the wall.
 
     The area of competence of that segment's first quarter point goes past the wall: a walk ends edge-on.
     """

@@ -28,7 +28,10 @@ _QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (c
 
 @cache
 def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]]:
-    """Return lengths of 1 to `most` consecutive segments: 1 to 8; one list in five has neighbours' ratios up to 7 × 2^20."""
+    """Return lengths of 1 to `most` consecutive segments: 1 to 8.
+
+    One list in five has neighbours' ratios up to 7 × 2^20.
+    """
     if most < 1:
         raise MisuseError("most", f"{most}", "at least one segment")
     plain = st.lists(st.integers(1, 8).map(float), min_size=1, max_size=most)
@@ -40,7 +43,10 @@ def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]
 
 @cache
 def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
-    """Return penetrations in quarters of some unit, to be repeat_cyclically out in turn to the nodes; below 0 is open."""
+    """Return penetrations in quarters of some unit, to be dealt out in turn to the nodes.
+
+    A negative penetration is an opening.
+    """
     return st.lists(st.integers(lowest, 8), min_size=1, max_size=most)
 
 
@@ -113,7 +119,10 @@ REST = Motion()
 
 @cache
 def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> SearchStrategy[Motion]:
-    """Return rest or any rigid motion; only quarter turns if `exact`. Translations up to `furthest`, scales 2^±`exponents`."""
+    """Return rest or any rigid motion; only quarter turns if `exact`.
+
+    Translations up to `furthest`, scales 2^±`exponents`.
+    """
     degrees = st.sampled_from([0, 90, 180, 270]) if exact else st.integers(0, 359)
     place = st.integers(-furthest, furthest)
     exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))

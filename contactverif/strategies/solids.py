@@ -62,7 +62,9 @@ def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
 
 
 def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return a random block that overhangs its master inside a slave segment, on one side or both, under a uniform pressure.
+    """Return a random block that overhangs its master inside a slave segment, on one side or both.
+
+    The pressure is uniform.
 
     Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
     """

@@ -40,7 +40,10 @@ def _tie_cases(draw: DrawFn) -> Case:
 def _facing(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> Panel:
-    """Return a panel with master nodes under all slave nodes and under one quarter point or middle of some slave segments (0: of none)."""
+    """Return a panel with master nodes under all slave nodes.
+
+    Under some slave segments one quarter point or the middle has a master node too (0: none).
+    """
     slave_x, master_x = [0.0], [0.0]
     for length, quarter in segments:
         if quarter:
@@ -54,7 +57,9 @@ def _facing(
 def _on_bisector(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> Panel:
-    """Return a symmetric roof or valley of two segments; a node, or the quarter of the first slave segment, on its bisector.
+    """Return a symmetric roof or valley of two segments.
+
+    A node, or the quarter of the first slave segment, lies on its bisector.
 
     The slave is level, so that the bisector, which is upright, is met at right angles.
     """
