@@ -12,7 +12,7 @@ result = verify(
     examples=20,
     seed=1,
 )
-verdicts = {(row.formulation, row.question.id): str(row.verdict) for row in result.rows}
+verdicts = {(row.formulation, row.property_id): str(row.verdict) for row in result.rows}
 property_ids = sorted({property_id for _, property_id in verdicts})
 
 print(f"{'property':26}" + "".join(f"{name:10}" for name in names))

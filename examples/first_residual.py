@@ -38,4 +38,4 @@ print(forces.reshape(-1, 2))
 
 # The harness asks all of its properties; here are three of them.
 for row in verify([subject], load_properties(["balance.*", "patch.flat.transmission"]), examples=20, seed=1).rows:
-    print(f"{row.question.id}: {row.verdict}")
+    print(f"{row.property_id}: {row.verdict}")

@@ -34,4 +34,4 @@ result = verify(
     seed=1,
 )
 for row in result.rows:
-    print(f"{row.formulation:8} {row.question.id:24} {row.verdict}")
+    print(f"{row.formulation:8} {row.property_id:24} {row.verdict}")

@@ -48,7 +48,7 @@ SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verif
 def judge_all(property_id: str) -> Mapping[str, Row]:
     """Return the row of each formulation over the same 100 random cases, with the smallest mesh of those that fail."""
     result = run([load_subject(name) for name in FAILS], [load_property(property_id)], examples=100, seed=SEED)
-    assert result.passed
+    assert result.promises_kept
     return {row.formulation: row for row in result.rows}
 
 
@@ -204,12 +204,12 @@ def test_a_promise_that_is_not_true_is_found_out(
 ) -> None:
     result = run([with_promises(make, **promises)], [load_property(property_id)], examples=30, seed=SEED)
     assert result.rows[0].unexpected == unexpected
-    assert not result.passed
+    assert not result.promises_kept
 
 
 def test_a_promise_that_is_true_is_kept() -> None:
     result = run([with_promises(contactverif_nts.vts_ppt)], load_properties(), examples=10, seed=SEED)
-    assert result.passed
+    assert result.promises_kept
 
 
 def test_what_promises_nothing_is_never_accused() -> None:
@@ -221,13 +221,13 @@ def test_what_promises_nothing_is_never_accused() -> None:
         examples=30,
         seed=SEED,
     )
-    verdicts = {row.question.id: row.verdict for row in result.rows}
+    verdicts = {row.property_id: row.verdict for row in result.rows}
     assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == {
         FORCE,
         MOMENT,
         DEAD_ZONE,
     } | INEXACT
-    assert result.passed
+    assert result.promises_kept
 
 
 def test_a_cut_that_begins_exactly_here_is_a_kink_and_no_broken_pairing() -> None:
@@ -260,8 +260,8 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
             return np.zeros((z.size, z.size))
 
     result = run([Subject("nothing", lambda *, penalty: Nothing())], load_properties(), profile="ci", examples=20)
-    assert not result.passed
-    judged = {row.question.id: row.verdict for row in result.rows}
+    assert not result.promises_kept
+    judged = {row.property_id: row.verdict for row in result.rows}
     assert {judged.pop(name) for name in (*PATCHES, "unilateral")} == {Verdict.FAIL}
     assert {judged.pop(name) for name in (RESULTANT, RANK, COMPLEMENTARITY)} == {Verdict.NOT_APPLICABLE}
     assert set(judged.values()) == {Verdict.NOT_JUDGED}

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import typer
 
 from contactverif.cli.case_pictures import draw_outcome
-from contactverif.cli.comparison_tables import DRAWN, SideBySide, last_line, mesh
+from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
+from contactverif.cli.console import show, show_as_it_is
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.progress import Bar
-from contactverif.cli.run_tables import show, show_as_it_is
 from contactverif.cli.shared_options import SamplingOptions
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
@@ -22,12 +23,11 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
-from contactverif.studies.comparison_study import Study, compared
+from contactverif.studies.comparison_study import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing
 from contactverif_reports.html.comparison_page import Drawing, comparison_page
 from contactverif_reports.html.pages import write_page
-from contactverif_reports.netcdf.schema import case_id
 from contactverif_reports.netcdf.write import write
 
 
@@ -43,6 +43,10 @@ class Contest:
     def subjects(self) -> dict[str, Subject]:
         """{name: formulation} of the reference and of all candidates that load."""
         return {item.name: item for item in (self.reference, *self.candidates) if isinstance(item, Subject)}
+
+    def question(self, differing: Differing) -> Property:
+        """Return the property on which two of them differ."""
+        return next(item for item in self.properties if isinstance(item, Property) and item.id == differing.info.id)
 
 
 def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]) -> Contest:
@@ -91,7 +95,7 @@ def compare_formulations(
         Whether every candidate keeps its promises.
     """
     with Bar() as bar:
-        study = compared(
+        study = run_comparison(
             contest.reference,
             contest.candidates,
             contest.properties,
@@ -112,20 +116,20 @@ def compare_formulations(
     _show_meshes(study, contest, folder, on_a_page=PAGE in files.paths)
     files.announce()
     show(last_line(study.comparison))
-    return study.comparison.kept
+    return study.comparison.promises_kept
 
 
 def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *, on_a_page: bool) -> None:
     """Print the meshes that tell most, and draw all of them into the folder, if there is one."""
     for place, differing in enumerate(study.differing):
-        if place < DRAWN:
-            show_as_it_is(mesh(differing, contest.reference.name))
+        if place < MOST_MESHES:
+            show_as_it_is(mesh_text(differing, contest.reference.name))
         if folder is not None:
             for name in _draw_pictures(differing, contest, folder):
                 typer.echo(f"    picture: {folder.name / name}")
-    rest = study.differing[DRAWN:]
+    rest = study.differing[MOST_MESHES:]
     if rest and folder is None and not on_a_page:
-        ids = ", ".join(differing.question.id for differing in rest)
+        ids = ", ".join(differing.info.id for differing in rest)
         show(f"\nThey also differ on {ids}: --out FILE.html or --pictures FOLDER draws those meshes.")
 
 
@@ -134,7 +138,8 @@ def _page_drawing(differing: Differing, contest: Contest) -> Drawing:
     candidate, reference = contest.subjects[differing.formulation], contest.reference
     if has_bodies(differing.case):
         return Drawing(solved=solve_scene(differing.case, [candidate, reference]))
-    exact = differing.question.exact(differing.case) if differing.question.exact is not None else None
+    exact_forces = contest.question(differing).exact
+    exact = None if exact_forces is None else exact_forces(differing.case)
     return Drawing(forces_on(differing.case, candidate), forces_on(differing.case, reference), exact)
 
 
@@ -145,13 +150,13 @@ def _draw_pictures(differing: Differing, contest: Contest, folder: PictureFolder
         from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
 
         scene = solve_scene(differing.case, [candidate, reference])
-        name = f"{case_id(candidate.name, differing.question.id)}.png"
+        name = f"{case_id(candidate.name, differing.info.id)}.png"
         if scene.solutions:
-            draw_scene(scene, folder.path / name, title=f"{differing.question.id}, case {differing.number}")
+            draw_scene(scene, folder.path / name, title=f"{differing.info.id}, case {differing.number}")
         return [name] if scene.solutions else []
     names = []
     for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
-        name = f"{case_id(subject.name, differing.question.id)}.png"
-        draw_outcome(subject, differing.question, outcome, folder.path / name, argument="--pictures")
+        name = f"{case_id(subject.name, differing.info.id)}.png"
+        draw_outcome(subject, contest.question(differing), outcome, folder.path / name, argument="--pictures")
         names.append(name)
     return names

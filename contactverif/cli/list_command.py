@@ -22,7 +22,8 @@ def list_installed(
       contactverif list
       contactverif list --traits
     """
-    from contactverif.cli.run_tables import formulations_table, properties_table, show
+    from contactverif.cli.console import show
+    from contactverif.cli.listing_tables import formulations_table, properties_table
     from contactverif.run.registry import load_formulations, load_properties
 
     show(formulations_table(load_formulations(), every_trait=traits))

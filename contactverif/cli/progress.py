@@ -52,7 +52,7 @@ class Bar:
 
     def show_progress(self, step: runner.Progress) -> None:
         """Show how far a run is; the runner calls this after every case."""
-        self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.done, step.planned)
+        self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.count, step.planned)
 
     def update(self, description: str, n_finished: int, n_planned: int) -> None:
         """Show how many of the planned steps are finished, and what comes next.

@@ -41,7 +41,8 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
     from contactverif.cli.case_pictures import draw_outcome
-    from contactverif.cli.run_tables import replayed, show
+    from contactverif.cli.console import show
+    from contactverif.cli.counterexample_text import ending_lines, replay_table
     from contactverif.contract.property import Verdict
     from contactverif.run.one_case import judged, the_formulation, the_property
     from contactverif_reports.draw import as_text
@@ -52,13 +53,15 @@ def replay(
         ids = case_ids(report)
         typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
-    stored = read_case(report, case)
-    subject = the_formulation(formulation or stored.formulation)
-    question = the_property(stored.property_id)
-    outcome = judged(question, stored.case, subject)
+    example = read_case(report, case)
+    subject = the_formulation(formulation or example.formulation)
+    question = the_property(example.property_id)
+    outcome = judged(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written
         draw_outcome(subject, question, outcome, picture, argument="--out")
-    typer.echo(as_text(stored.case))
-    show(replayed(stored, subject.name, outcome))
+    typer.echo(as_text(example.case))
+    show(replay_table(example, subject.name, outcome))
+    for line in ending_lines(outcome):
+        typer.echo(line)
     files.announce()
     raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)

@@ -31,17 +31,18 @@ def report(
       contactverif report vts-ppt.nc
       contactverif report vts-ppt.nc --out vts-ppt.html
     """
-    from contactverif.cli.run_tables import StoredTable, show, stored_summary
-    from contactverif_reports.netcdf.stored import read_report
+    from contactverif.cli.console import show
+    from contactverif.cli.run_tables import RunTable, summary
+    from contactverif_reports.netcdf.read import read_run
 
     files = OutputFiles.check(out, (PAGE,))
     if not files.paths:
-        stored = read_report(path)
-        show(StoredTable(stored))
-        show(stored_summary(stored))
+        run = read_run(path)
+        show(RunTable(run))
+        show(summary(run))
         return
     from contactverif_reports.html.pages import write_page
     from contactverif_reports.html.report_page import report_page
 
-    write_page(files.paths[PAGE], report_page(read_report(path)), "--out")
+    write_page(files.paths[PAGE], report_page(read_run(path), path), "--out")
     files.announce()

@@ -10,9 +10,10 @@ import typer
 from rich.table import Table
 
 from contactverif.cli.case_pictures import draw_outcome
+from contactverif.cli.console import plain_table, show
 from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
-from contactverif.cli.run_tables import plain_table, show
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import judged, the_formulation, the_property
@@ -21,7 +22,7 @@ from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw import as_text
 from contactverif_reports.draw.solved_scene import SolvedScene
-from contactverif_reports.netcdf.read import StoredCase, read_case
+from contactverif_reports.netcdf.read import read_case
 
 _WIDEST = 80  # The largest number of columns of a remark.
 
@@ -75,7 +76,7 @@ def _check_alone(scene: str, report: Path | None, case_id: str | None) -> None:
             raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
 
 
-def _read_stored(report: Path | None, case_id: str | None) -> StoredCase:
+def _read_stored(report: Path | None, case_id: str | None) -> Counterexample:
     """Read the counterexample that the user names."""
     if report is None and case_id is None:
         raise MisuseError("--scene", "nothing to draw", "--scene NAME, or REPORT --case ID")
@@ -101,7 +102,7 @@ def solutions_table(scene: SolvedScene) -> Table:
     return table
 
 
-def _draw_stored(stored: StoredCase, names: Sequence[str], files: OutputFiles) -> None:
+def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFiles) -> None:
     """Draw a case without bodies, as `replay --out` draws it."""
     if SOLVED_SCENE in files.names:
         raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")

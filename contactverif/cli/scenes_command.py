@@ -16,7 +16,7 @@ def scenes() -> None:
       contactverif draw --scene b -f vts-me -f vts-ppt --out b.png
       contactverif verify vts-ppt --scene c-prime:refine=4 -p 'patch.*'
     """
+    from contactverif.cli.console import show
     from contactverif.cli.gallery import Gallery
-    from contactverif.cli.run_tables import show
 
     show(Gallery())

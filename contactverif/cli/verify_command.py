@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +13,9 @@ from contactverif.cli.shared_options import PlaceOptions, PropertyGlobs, Samplin
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
-    from contactverif.contract.result import NotLoaded, Row, Run
+    from contactverif.contract.counterexample import Counterexample
+    from contactverif.contract.property import Property
+    from contactverif.contract.result import NotLoaded, Run
     from contactverif.contract.subject import Subject
 
 
@@ -60,8 +61,10 @@ def verify(
       contactverif verify mine --mesh punch.msh --slave punch --master base
       contactverif verify vts-me --scene c -p 'patch.*'
     """
+    from contactverif.cli.console import show
+    from contactverif.cli.counterexample_text import how_to_keep
     from contactverif.cli.progress import Bar
-    from contactverif.cli.run_tables import RunTable, how_to_keep, show, summary
+    from contactverif.cli.run_tables import RunTable, summary
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import run
 
@@ -87,62 +90,60 @@ def verify(
         )
     write_results(result, files)  # before anything is shown, so that nothing that was judged is lost
     show(RunTable(result))
-    _show_counterexamples(result, subjects, files, folder)
+    _show_counterexamples(result, subjects, questions, files, folder)
     files.announce()
     if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
     show(summary(result))
-    raise typer.Exit(0 if result.passed else 1)
+    raise typer.Exit(0 if result.promises_kept else 1)
 
 
 def write_results(result: Run, files: OutputFiles) -> None:
     """Write the report and the page that the user wants."""
-    from contactverif_reports.netcdf.write import write
+    if REPORT in files.paths:
+        from contactverif_reports.netcdf.write import write
 
-    report, page = files.paths.get(REPORT), files.paths.get(PAGE)
-    if report is not None:
-        write(result, report)
-    if page is None:
-        return
-    import tempfile
+        write(result, files.paths[REPORT])
+    if PAGE in files.paths:
+        from contactverif_reports.html.pages import write_page
+        from contactverif_reports.html.report_page import report_page
 
-    from contactverif_reports.html.pages import write_page
-    from contactverif_reports.html.report_page import report_page
-    from contactverif_reports.netcdf.stored import read_report
-
-    with tempfile.TemporaryDirectory() as folder:
-        stored = report or Path(folder) / "report.nc"
-        if report is None:
-            write(result, stored)
-        # The page names the report in the commands that replay a case; without --out FILE.nc that is still to be made.
-        named = replace(read_report(stored), path=str(files.names.get(REPORT, "FILE.nc")))
-        write_page(page, report_page(named), "--out")
+        page = report_page(result, files.names.get(REPORT, Path("FILE.nc")))
+        write_page(files.paths[PAGE], page, "--out")
 
 
 def _show_counterexamples(
-    result: Run, subjects: Sequence[Subject | NotLoaded], files: OutputFiles, folder: PictureFolder | None
+    result: Run,
+    subjects: Sequence[Subject | NotLoaded],
+    questions: Sequence[Property | NotLoaded],
+    files: OutputFiles,
+    folder: PictureFolder | None,
 ) -> None:
     """Print the smallest mesh of each failure, and draw it if the user named a folder."""
-    from contactverif.cli.run_tables import counterexample, show_as_it_is
+    from contactverif.cli.console import show_as_it_is
+    from contactverif.cli.counterexample_text import counterexample_text, failing_examples
 
-    for row in result.rows:
-        text = counterexample(row, files.names.get(REPORT))
-        if text:
-            show_as_it_is(text)
-            if folder is not None:
-                _draw_counterexample(row, subjects, folder)
+    for example in failing_examples(result):
+        show_as_it_is(counterexample_text(example, files.names.get(REPORT)))
+        if folder is not None:
+            _draw_counterexample(example, subjects, questions, folder)
 
 
-def _draw_counterexample(row: Row, subjects: Sequence[Subject | NotLoaded], folder: PictureFolder) -> None:
+def _draw_counterexample(
+    example: Counterexample,
+    subjects: Sequence[Subject | NotLoaded],
+    questions: Sequence[Property | NotLoaded],
+    folder: PictureFolder,
+) -> None:
     from contactverif.cli.case_pictures import draw_outcome
+    from contactverif.contract.counterexample import case_id
+    from contactverif.contract.property import Property
     from contactverif.contract.subject import Subject
-    from contactverif_reports.netcdf.schema import case_id
 
-    subject = next(item for item in subjects if isinstance(item, Subject) and item.name == row.formulation)
-    outcome = row.shrunk or row.witness
-    assert outcome is not None
-    name = f"{case_id(row.formulation, row.question.id)}.png"
-    draw_outcome(subject, row.question, outcome, folder.path / name, argument="--pictures")
+    subject = next(item for item in subjects if isinstance(item, Subject) and item.name == example.formulation)
+    question = next(item for item in questions if isinstance(item, Property) and item.id == example.property_id)
+    name = f"{case_id(example.formulation, example.property_id)}.png"
+    draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
     typer.echo(f"    picture: {folder.name / name}")
 
 

@@ -1,7 +1,8 @@
-"""The contract of a check: what it needs, how it measures, and how a measurement becomes a verdict.
+"""The contract of a property: what it measures, how a measurement is judged, and what comes of one case.
 
-Measuring and judging are apart: a `Measurement` holds numbers, the tolerances they are held against and why, so that a
-stored one can be judged again.
+Rule for the next editor: measuring and judging stay apart. A `Measurement` holds numbers, their tolerances and the
+reasons of those, so that one that was stored can be judged again. `PropertyInfo` is plain data, which a report stores;
+only a `Property` holds functions.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from typing import Any, Literal
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Traits
 from contactverif.contract.subject import Subject
 
 
 class Verdict(IntEnum):
-    """How a case, or a property over all of its cases, came out. The numbers are those of a report."""
+    """The verdict on a case, or on a property over all of its cases. A report stores the numbers."""
 
     PASS = 0
     FAIL = 1
@@ -36,20 +39,20 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One number that a property measures.
+    """A number that a property measures, and the formula of its tolerance.
 
     Attributes
     ----------
     name : str
-        Short, in words.
+        A short name, in words.
     unit : str
-        "1" for a ratio.
+        The unit of value and tolerance; "1" for a ratio.
     tolerance : str
         The formula, as it is printed; its symbols are explained in docs/concepts/tolerances.md.
     reason : str
-        Why that formula.
+        The reason for that formula.
     sense : Literal['at most', 'at least']
-        Whether the number must be at most or at least the tolerance.
+        The relation of value to tolerance in a pass.
     """
 
     name: str
@@ -60,21 +63,48 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckedNumber:
+    """A measured number beside its tolerance.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        The quantity that was measured.
+    value, tolerance : float
+        Both in the unit of the quantity. A NaN value is a failure.
+    """
+
+    quantity: Quantity
+    value: float
+    tolerance: float
+
+    @property
+    def ratio(self) -> float:
+        """Value over tolerance (the inverse for "at least"): above 1 fails, infinite if one is not finite."""
+        return excess(self.quantity, self.value, self.tolerance)
+
+    @property
+    def sign(self) -> str:
+        """The sign between value and tolerance in a pass."""
+        return "≤" if self.quantity.sense == "at most" else "≥"
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
-    """Numbers, and what they are held against; `undecided` is a reason why they decide nothing.
+    """The numbers that a property measured on one case, with their tolerances.
 
     Attributes
     ----------
     values, tolerances : Mapping[str, float]
         {quantity: number}, the same names; a NaN value is a failure.
     undecided : str
-        Empty, or why a failure would not be the formulation's fault (roundoff, a kink).
+        The reason why a failure would not be the formulation's fault (roundoff, a kink); empty if it would.
     broken : str
-        Empty, or a breach that no number tells, in words.
+        A breach that no number shows, in words; empty if there is none.
     details : Mapping[str, float]
-        Further numbers worth keeping, {name: number}.
+        Further numbers worth keeping, {name: number}; they are not judged.
     series : Mapping[str, FloatArray]
-        Numbers by iterate, {name: (n_iterates,)}; those that the property declares.
+        Numbers by iterate, {name: (n_iterates,)}; only those that the property declares.
     idle : bool
         Nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
     """
@@ -89,73 +119,91 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Property:
-    """A question to a formulation.
+class PropertyInfo:
+    """What a reader of results needs to know of a property: plain data, which a report stores.
 
     Attributes
     ----------
     id : str
-        Dotted, `patch.flat.transmission`.
+        The dotted name on the command line, `patch.flat.transmission`.
     family : str
-        The group of a report that it belongs to.
+        The subject that the property belongs to, `patch`.
     summary : str
-        What is asked, in one line.
+        The property in one line.
     quantities : tuple[Quantity, ...]
-        What is measured.
-    cases : Callable[[Any], Any]
-        Makes a hypothesis strategy of `Case`; given an interface, random states on that one, or None where the
-        property cannot be asked of it. Where the property is one of bodies, it is given the case of a scene
-        instead.
-    measure : Callable[[Case, Subject], Measurement]
-        Numbers from a case; raises what the plugin raises.
+        The numbers that are measured and judged.
     needs : frozenset[str]
-        Parts of the contract without which there is nothing to ask, {"pair", "tangent", "contact_points"}.
-    promise : Callable[[Traits], bool | None]
-        What the traits say: True passes, False does not (with a witness), None nothing.
-    applicable : Callable[[Traits], str]
-        Empty, or why the question makes no sense for these traits.
+        The parts of the contract without which the property cannot be checked, {"pair", "tangent",
+        "contact_points"}.
     series : Mapping[str, str]
-        {name: unit} of the numbers by iterate that it keeps of each case.
-    bodies : bool
-        The cases are scenes, solved; else they are states of an interface alone.
-    exact : Callable[[Case], FloatArray] | None
-        Where there is an exact answer, the forces (n_nodes, dim) that push the nodes in this case, for
-        pictures.
+        {name: unit} of the numbers by iterate that a measurement may hold.
     """
 
     id: str
     family: str
     summary: str
     quantities: tuple[Quantity, ...]
+    needs: frozenset[str] = field(default=frozenset(), kw_only=True)
+    series: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Property(PropertyInfo):
+    """A property that formulations are checked for; besides the attributes of `PropertyInfo` it has functions.
+
+    Attributes
+    ----------
+    cases : Callable[[Any], Any]
+        Makes a hypothesis strategy of `Case`. Given an interface, it makes random states on that one, or returns
+        None if the property cannot be checked there. A property of bodies is given the case of a scene instead.
+    measure : Callable[[Case, Subject], Measurement]
+        Measures one case; it raises what the plugin raises.
+    promise : Callable[[Traits], bool | None]
+        Reads the traits: True if the formulation states that it passes, False if it states (with a witness) that
+        it fails, None if it states nothing.
+    applicable : Callable[[Traits], str]
+        Returns an empty string, or the reason why the property makes no sense for these traits.
+    bodies : bool
+        The cases are scenes, which are solved; else they are states of an interface alone.
+    exact : Callable[[Case], FloatArray] | None
+        Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
+        answer is known.
+    """
+
     cases: Callable[[Any], Any]
     measure: Callable[[Case, Subject], Measurement]
     promise: Callable[[Traits], bool | None]
-    needs: frozenset[str] = frozenset()
     applicable: Callable[[Traits], str] = lambda traits: ""
-    series: Mapping[str, str] = field(default_factory=dict)
     bodies: bool = False
     exact: Callable[[Case], FloatArray] | None = None
+
+    @property
+    def info(self) -> PropertyInfo:
+        """The plain data alone."""
+        return PropertyInfo(
+            self.id, self.family, self.summary, self.quantities, needs=self.needs, series=dict(self.series)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What became of one case.
+    """The verdict on one case, with the numbers behind it.
 
     Attributes
     ----------
-    case : Case
-        What was judged.
+    case_or_summary : Case | CaseSummary
+        The case that was judged; of most cases in a report only the summary is stored.
     verdict, reason : Verdict or str
-        How it came out, and why it is no pass.
+        The verdict, and the reason why it is no pass.
     measurement : Measurement | None
-        The numbers, None where the plugin gave none.
+        The numbers; None if the plugin gave none.
     seconds : float
-        Spent measuring and judging.
+        Time spent measuring and judging.
     breach : bool
-        The plugin broke the contract or returned NaN: a failure that nobody can have promised.
+        The plugin broke the contract or returned NaN: a failure that no statement excuses.
     """
 
-    case: Case
+    case_or_summary: Case | CaseSummary
     verdict: Verdict
     reason: str = ""
     measurement: Measurement | None = None
@@ -165,11 +213,34 @@ class Outcome:
     @property
     def decided(self) -> bool:
         """Whether the case counts as judged."""
-        return self.verdict in (Verdict.PASS, Verdict.FAIL, Verdict.CRASHED)
+        return self.verdict in DECIDED
+
+    @property
+    def case(self) -> Case:
+        """The case itself.
+
+        Raises
+        ------
+        MisuseError
+            If only the summary of the case was stored.
+        """
+        if not isinstance(self.case_or_summary, Case):
+            needed = "a counterexample; of all other cases a report stores no more than that"
+            raise MisuseError("case", "the summary of a case", needed)
+        return self.case_or_summary
+
+    @property
+    def summary(self) -> CaseSummary:
+        """The numbers that say what kind of case it is."""
+        case = self.case_or_summary
+        return CaseSummary.from_case(case) if isinstance(case, Case) else case
+
+
+DECIDED = frozenset({Verdict.PASS, Verdict.FAIL, Verdict.CRASHED})  # The verdicts that count as judged.
 
 
 def excess(quantity: Quantity, value: float, tolerance: float) -> float:
-    """How far the value is towards its tolerance: above 1 fails, infinite where either is no finite number."""
+    """Return how far the value is towards its tolerance: above 1 fails, infinite if one of them is not finite."""
     if not (isfinite(value) and isfinite(tolerance)):
         return float("inf")
     top, bottom = (value, tolerance) if quantity.sense == "at most" else (tolerance, value)
@@ -178,31 +249,44 @@ def excess(quantity: Quantity, value: float, tolerance: float) -> float:
     return top / bottom
 
 
-def judge(question: Property, measurement: Measurement) -> tuple[Verdict, str]:
-    """The verdict on a measurement, with its reason where it is no pass."""
-    strangers = measurement.values.keys() - {quantity.name for quantity in question.quantities}
+def checked_numbers(info: PropertyInfo, measurement: Measurement | None) -> tuple[CheckedNumber, ...]:
+    """Return the measured numbers beside their tolerances, in the order of the quantities."""
+    if measurement is None:
+        return ()
+    return tuple(
+        CheckedNumber(quantity, measurement.values[quantity.name], measurement.tolerances[quantity.name])
+        for quantity in info.quantities
+        if quantity.name in measurement.values
+    )
+
+
+def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
+    """Return the verdict on a measurement, with its reason if it is no pass.
+
+    Raises
+    ------
+    ValueError
+        If a value is measured that the property does not declare.
+    """
+    strangers = measurement.values.keys() - {quantity.name for quantity in info.quantities}
     if strangers:
-        raise ValueError(f"{question.id} measured {sorted(strangers)}, which it does not declare as quantities")
-    failures = []
-    measured = [quantity for quantity in question.quantities if quantity.name in measurement.values]
-    for quantity in measured:
-        if not isfinite(value := measurement.values[quantity.name]):
-            return Verdict.FAIL, f"{quantity.name} is {value}"
-    untold = ""
-    for quantity in measured:
-        value, tolerance = measurement.values[quantity.name], measurement.tolerances[quantity.name]
-        if not isfinite(tolerance):
-            untold = f"the tolerance of {quantity.name} is {tolerance}"
-        elif excess(quantity, value, tolerance) > 1:
-            failures.append(f"{quantity.name} {value:.3g}, {quantity.sense} {tolerance:.3g}")
-    if measurement.broken:
-        failures.insert(0, measurement.broken)
-    if failures and measurement.undecided:
+        raise ValueError(f"{info.id} measured {sorted(strangers)}, which it does not declare as quantities")
+    numbers = checked_numbers(info, measurement)
+    for number in numbers:
+        if not isfinite(number.value):
+            return Verdict.FAIL, f"{number.quantity.name} is {number.value}"
+    failures = [measurement.broken] if measurement.broken else []
+    failures += [_failure(number) for number in numbers if isfinite(number.tolerance) and number.ratio > 1]
+    if measurement.undecided and (failures or not numbers):
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
         return Verdict.FAIL, "; ".join(failures)
-    if measurement.undecided and not measured:  # nothing to judge, and a reason why
-        return Verdict.UNDECIDED, measurement.undecided
-    if untold:  # the judge's fault, not the formulation's: neither a pass nor an accusation
-        return Verdict.UNDECIDED, untold
+    for number in reversed(numbers):
+        if not isfinite(number.tolerance):  # The judge's fault, not the formulation's: neither pass nor accusation.
+            return Verdict.UNDECIDED, f"the tolerance of {number.quantity.name} is {number.tolerance}"
     return Verdict.PASS, ""
+
+
+def _failure(number: CheckedNumber) -> str:
+    quantity = number.quantity
+    return f"{quantity.name} {number.value:.3g}, {quantity.sense} {number.tolerance:.3g}"

@@ -1,16 +1,25 @@
-"""What a run found, ready to be printed or stored: a `Row` for each formulation and property, all rows in a `Run`."""
+"""The model of what a run found: a `Row` for each formulation and property, all rows in a `Run`.
+
+Rules for the next editor:
+
+- This is the only model. The runner makes a `Run`, a report stores it, and the reader makes it again from the file.
+- A table, a page or a comparison reads a `Run` and never asks where it comes from.
+- Whatever one of them needs is stored; what follows from other attributes is computed here and only here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
+NOT_JUDGED = "not judged"
 
 
 class Result(StrEnum):
@@ -28,67 +37,147 @@ class Result(StrEnum):
     NOT_LOADED = "not loaded"
 
 
-def result_of(verdict: Verdict, promise: bool | None, known: str, unexpected: str) -> Result:
-    """Return the word for a verdict, given what the formulation states and why the row makes the run fail, if so."""
-    failed = verdict in (Verdict.FAIL, Verdict.CRASHED)
-    if unexpected and verdict not in (Verdict.CRASHED, Verdict.NOT_JUDGED):
-        return Result.BROKEN_PROMISE
-    if failed and not unexpected and (promise is False or known):
-        return Result.FAILS_AS_STATED
-    return Result[verdict.name]
+@dataclass(frozen=True, slots=True)
+class ClosestNumber:
+    """The number of a row that came closest to its tolerance, or went furthest beyond it.
+
+    Attributes
+    ----------
+    number : CheckedNumber
+        Value and tolerance.
+    case : int | None
+        The number of the random case; None for the witness.
+    """
+
+    number: CheckedNumber
+    case: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """The counts over all outcomes of a row.
+
+    Attributes
+    ----------
+    verdicts : Mapping[Verdict, int]
+        Numbers of random cases with each verdict.
+    reasons : Mapping[str, int]
+        {reason: number of random cases} of the cases that were not decided, the most frequent first.
+    breach : bool
+        The plugin broke the contract in some case, the witness included.
+    closest : ClosestNumber | None
+        The closest number of all decided cases, the witness included; None if nothing was measured.
+    """
+
+    verdicts: Mapping[Verdict, int]
+    reasons: Mapping[str, int]
+    breach: bool
+    closest: ClosestNumber | None
+
+    @classmethod
+    def from_outcomes(cls, info: PropertyInfo, outcomes: Sequence[Outcome], witness: Outcome | None) -> Tally:
+        """Count in one pass; the first of equally close numbers is the closest."""
+        verdicts: Counter[Verdict] = Counter()
+        reasons: Counter[str] = Counter()
+        breach = witness is not None and witness.breach
+        closest: ClosestNumber | None = None
+        for case, outcome in enumerate(outcomes):
+            verdicts[outcome.verdict] += 1
+            breach = breach or outcome.breach
+            if outcome.decided:
+                closest = _closer(closest, info, outcome, case)
+            else:
+                reasons[outcome.reason] += 1
+        if witness is not None and witness.decided:
+            closest = _closer(closest, info, witness, None)
+        return cls(verdicts, dict(reasons.most_common()), breach, closest)
+
+
+def _closer(
+    closest: ClosestNumber | None, info: PropertyInfo, outcome: Outcome, case: int | None
+) -> ClosestNumber | None:
+    for number in checked_numbers(info, outcome.measurement):
+        if closest is None or number.ratio > closest.number.ratio:
+            closest = ClosestNumber(number, case)
+    return closest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """One formulation, one property.
+    """What one formulation made of one property.
 
     Attributes
     ----------
     formulation : str
-        Name on the command line, with options.
-    question : Property
+        The name on the command line, with options.
+    info : PropertyInfo
         The property.
     verdict : Verdict
-        Over all cases: crashed and fail first, then not judged, then pass.
+        The verdict over all cases: crashed and fail first, then not judged, then pass.
     promise : bool | None
-        True promised, False said to fail, None nothing said.
+        True if the formulation promises to pass, False if it states that it fails, None if it states nothing.
     known : str
-        Why a failure is known, empty if it is not.
+        The reason why a failure is known to the caller, empty if it is not.
     reason : str
-        Why the verdict is no pass, of the worst case.
+        The reason why the verdict is no pass, from the worst case.
     planned : int
-        Number of random cases asked for.
-    outcomes : tuple[Outcome, ...]
-        Of the random cases, in order.
+        The number of random cases that were planned.
+    outcomes : Sequence[Outcome]
+        The outcomes of the random cases, in order.
     witness : Outcome | None
-        Outcome of the named case of a promise "does not".
+        The outcome of the named case with which a formulation proves that it fails.
     shrunk : Outcome | None
-        The worst case after shrinking, None where nothing failed.
+        The worst case after shrinking; None if no random case failed.
     seconds : float
-        Spent judging, shrinking excluded.
+        Time spent judging, shrinking excluded.
     """
 
     formulation: str
-    question: Property
+    info: PropertyInfo
     verdict: Verdict
     promise: bool | None
     known: str = ""
     reason: str = ""
     planned: int = 0
-    outcomes: tuple[Outcome, ...] = ()
+    outcomes: Sequence[Outcome] = ()
     witness: Outcome | None = None
     shrunk: Outcome | None = None
     seconds: float = 0.0
+    _tally: Tally | None = field(default=None, init=False, repr=False)
+
+    @property
+    def property_id(self) -> str:
+        """The id of the property."""
+        return self.info.id
+
+    @property
+    def tally(self) -> Tally:
+        """The counts over all outcomes, computed at the first use."""
+        if self._tally is None:
+            object.__setattr__(self, "_tally", Tally.from_outcomes(self.info, self.outcomes, self.witness))
+        assert self._tally is not None
+        return self._tally
 
     @property
     def judged(self) -> int:
-        """Number of random cases that were decided."""
-        return sum(outcome.decided for outcome in self.outcomes)
+        """The number of random cases that were decided."""
+        counts = self.tally.verdicts
+        return sum(counts.get(verdict, 0) for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.CRASHED))
+
+    @property
+    def undecided(self) -> int:
+        """The number of random cases that were measured, but left open whether they pass."""
+        return self.tally.verdicts.get(Verdict.UNDECIDED, 0)
 
     @property
     def breach(self) -> bool:
-        """Whether the contract was broken somewhere, which fails a run whatever was promised."""
-        return any(outcome.breach for outcome in (*self.outcomes, *((self.witness,) if self.witness else ())))
+        """Whether the plugin broke the contract somewhere, which fails a run whatever the formulation states."""
+        return self.tally.breach
+
+    @property
+    def closest(self) -> ClosestNumber | None:
+        """The number that came closest to its tolerance, or went furthest beyond it, the witness included."""
+        return self.tally.closest
 
     @property
     def unexpected(self) -> str:
@@ -97,7 +186,7 @@ class Row:
             case Verdict.CRASHED:
                 return "" if self.known else "crashed"
             case Verdict.NOT_JUDGED:
-                return "not judged"
+                return NOT_JUDGED
             case Verdict.FAIL if not self.known:
                 return "breaks the contract" if self.breach else BROKEN_BY_FAILING if self.promise else ""
             case Verdict.NOT_PROVIDED if self.promise and not self.known:
@@ -111,12 +200,25 @@ class Row:
     @property
     def result(self) -> Result:
         """The word for the row in tables and pages."""
-        return result_of(self.verdict, self.promise, self.known, self.unexpected)
+        if self.unexpected and self.verdict not in (Verdict.CRASHED, Verdict.NOT_JUDGED):
+            return Result.BROKEN_PROMISE
+        failed = self.verdict in (Verdict.FAIL, Verdict.CRASHED)
+        if failed and not self.unexpected and (self.promise is False or self.known):
+            return Result.FAILS_AS_STATED
+        return Result[self.verdict.name]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NotLoaded:
-    """A formulation (or a property, under its id) that could not be loaded, and so was not asked anything."""
+    """A formulation (or a property, under its id) that could not be loaded, so that nothing was checked.
+
+    Attributes
+    ----------
+    formulation : str
+        The name of the plugin.
+    reason : str
+        The error that loading it raised.
+    """
 
     formulation: str
     reason: str
@@ -129,13 +231,13 @@ class Run:
     Attributes
     ----------
     rows : tuple[Row, ...]
-        Formulation by formulation, property by property.
+        The results, formulation by formulation, property by property.
     not_loaded : tuple[NotLoaded, ...]
-        Plugins that did not load.
+        The plugins that did not load.
     provided : Mapping[str, Mapping[str, bool]]
         {formulation: {part of the contract: provided}}.
     provenance : Mapping[str, str]
-        Root attributes of a report: versions, seed, profile, command, ….
+        Where the run comes from: versions, seed, profile, command, ….
     """
 
     rows: tuple[Row, ...]
@@ -144,6 +246,38 @@ class Run:
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def passed(self) -> bool:
-        """Whether every promise was kept and every property judged."""
-        return bool(self.rows) and not self.not_loaded and not any(row.unexpected for row in self.rows)
+    def formulations(self) -> tuple[str, ...]:
+        """The names of all formulations that loaded, in the order of the run."""
+        return tuple(dict.fromkeys([*(row.formulation for row in self.rows), *self.provided]))
+
+    @property
+    def properties(self) -> dict[str, PropertyInfo]:
+        """All properties {id: property}, in the order of the run."""
+        return {row.property_id: row.info for row in self.rows}
+
+    @property
+    def row_of(self) -> dict[tuple[str, str], Row]:
+        """The rows, {(formulation, property id): row}."""
+        return {(row.formulation, row.property_id): row for row in self.rows}
+
+    @property
+    def unexpected(self) -> tuple[Row, ...]:
+        """The rows that make the run fail."""
+        return tuple(row for row in self.rows if row.unexpected)
+
+    @property
+    def promises_kept(self) -> bool:
+        """Whether every promise is kept, every property was judged, and every plugin loaded."""
+        return bool(self.rows) and not self.not_loaded and not self.unexpected
+
+    def count(self, *results: Result) -> int:
+        """Return the number of rows with one of these results."""
+        return sum(row.result in results for row in self.rows)
+
+    def only(self, property_ids: Collection[str]) -> Run:
+        """Return the run without all other properties."""
+        return replace(self, rows=tuple(row for row in self.rows if row.property_id in property_ids))
+
+    def rows_of(self, formulation: str) -> Iterator[Row]:
+        """Return the rows of a formulation."""
+        return (row for row in self.rows if row.formulation == formulation)

@@ -1,4 +1,11 @@
-"""Judges the planned cases of each property, then shrinks what failed. The command line and pytest both come here."""
+"""The runner: it judges the planned cases of each property, then shrinks what failed.
+
+Rules for the next editor:
+
+- All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early.
+- The cases of a property depend on the seed and the property alone, neither on the formulation nor on other properties.
+- Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +23,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
-from contactverif.contract.property import Outcome, Property, Verdict, excess, judge
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.run.driver import SHRINK_CALLS, PlannedCases, draw_cases, shrink
@@ -26,17 +33,29 @@ from contactverif.scenes.named_states import named_case
 
 __all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
 
-CLEARLY = 1000.0  # a shrunk case need not fail by more than this many tolerances
+CLEAR_RATIO = 1000.0  # A shrunk case need not fail by more than this many tolerances.
+
+Phase = Literal["drawing", "judging", "shrinking"]
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is: `done` of `planned` cases of one property of one formulation; shrinking may end early."""
+    """How far a run is with one property of one formulation.
+
+    Attributes
+    ----------
+    formulation, property_id : str
+        The names on the command line.
+    phase : Phase
+        The kind of work.
+    count, planned : int
+        The number of cases that are finished, and of all; shrinking may end early.
+    """
 
     formulation: str
     property_id: str
-    phase: Literal["drawing", "judging", "shrinking"]
-    done: int
+    phase: Phase
+    count: int
     planned: int
 
 
@@ -52,49 +71,60 @@ def run(
     known: Mapping[str, str] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Run:
-    """Ask every property of every formulation.
+    """Check every property of every formulation.
 
     Parameters
     ----------
-    subjects, properties : Sequence[Subject | NotLoaded] or Sequence[Property | NotLoaded]
-        As the registry loads them; what did not load is reported and fails the run.
-    profile, examples, seed : Profile | str or int | None
-        How much is asked; examples and seed overrule the profile.
+    subjects : Sequence[Subject | NotLoaded]
+        The formulations, as the registry loads them. One that did not load is reported and fails the run.
+    properties : Sequence[Property | NotLoaded]
+        The properties, likewise.
+    profile : Profile | str
+        The numbers of cases and the seed.
+    examples, seed : int | None
+        Numbers that overrule those of the profile.
     interface : Interface | None
-        Ask everything on this one, with random states, instead of on random interfaces.
+        Check everything on this interface, with random states, instead of on random interfaces.
     scene : Case | None
-        Ask what needs bodies of this one alone, and all else on its interface. That it passes there breaks no
-        promise to fail.
+        Check what needs bodies on this scene alone, and all else on its interface. A pass there breaks no statement
+        that the formulation fails.
     known : Mapping[str, str] | None
-        {property id: why its failure is known}.
+        {property id: reason why its failure is known}.
     progress : Callable[[Progress], None] | None
-        Called after every case.
+        A function that is called after every case.
+
+    Returns
+    -------
+    Run
+        A row for each formulation and property.
 
     Raises
     ------
     MisuseError
-        If a known failure names no property of this run, or something is asked twice.
+        If a known failure names no property of this run, or a name stands there twice.
     """
     known = known or {}
-    questions = [question for question in properties if isinstance(question, Property)]
     loaded = [subject for subject in subjects if isinstance(subject, Subject)]
-    not_loaded = tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded))
+    questions = [question for question in properties if isinstance(question, Property)]
     _check_once("formulation", [subject.name for subject in loaded])
     _check_once("property", [question.id for question in questions])
-    asked = [item.id if isinstance(item, Property) else item.formulation for item in properties]
-    for property_id in known:
-        if property_id not in asked:
-            raise unknown_name_error("known failure", property_id, asked)
-    settled = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
-    assert settled.seed is not None
-    if scene is not None:
-        interface = scene.interface
-    plan = _Plan(settled.examples, settled.seed, interface, scene, known, progress or (lambda _: None), {})
+    _check_known(known, properties)
+    resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
+    assert resolved.seed is not None
+    plan = _Plan(
+        examples=resolved.examples,
+        seed=resolved.seed,
+        interface=interface if scene is None else scene.interface,
+        scene=scene,
+        known=known,
+        report_progress=progress or (lambda _: None),
+        cases={},
+    )
     return Run(
-        rows=tuple(_row(plan, subject, question) for subject in loaded for question in questions),
-        not_loaded=not_loaded,
+        rows=tuple(_check_property(plan, subject, question) for subject in loaded for question in questions),
+        not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
         provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
-        provenance=collect_provenance(profile=settled.name, examples=settled.examples, seed=settled.seed),
+        provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=resolved.seed),
     )
 
 
@@ -104,13 +134,34 @@ def _check_once(what: str, names: Sequence[str]) -> None:
             raise MisuseError(what, f"{name} {times} times", "each of them once")
 
 
+def _check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoaded]) -> None:
+    ids = [item.id if isinstance(item, Property) else item.formulation for item in properties]
+    for property_id in known:
+        if property_id not in ids:
+            raise unknown_name_error("known failure", property_id, ids)
+
+
 def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
-    """What becomes of one case; also how a stored one is judged again. Whatever the plugin does is an outcome.
+    """Judge one case, a new one or one that was stored. Whatever the plugin does is an outcome.
+
+    Parameters
+    ----------
+    question : Property
+        The property to check.
+    case : Case
+        The case to check it on.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Outcome
+        Verdict, reason and numbers.
 
     Raises
     ------
     Exception
-        From the harness itself or the property, whose mistake it then is, with the case as a note.
+        Any error of the harness or the property itself, with the case as a note.
     """
     start = perf_counter()
 
@@ -118,13 +169,13 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
 
     try:
-        with np.errstate(all="ignore"):  # NaN is told by a check of the answer, not by a warning in between
+        with np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
             measurement = question.measure(case, subject)
             verdict, reason = judge(question, measurement)
     except PluginError as error:
-        hows: dict[type, str] = {MemoryError: "memory", SystemExit: "exit"}
-        how = hows.get(type(error.__cause__), "exception")
-        return outcome(Verdict.CRASHED, f"{how}: {error}")
+        kinds: dict[type, str] = {MemoryError: "memory", SystemExit: "exit"}
+        kind = kinds.get(type(error.__cause__), "exception")
+        return outcome(Verdict.CRASHED, f"{kind}: {error}")
     except NonFiniteError as error:
         return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
     except ContractError as error:
@@ -137,33 +188,50 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What all rows of a run share; `drawn` fills up with the cases of each property."""
+    """What all rows of a run share; `cases` fills up with the cases of each property."""
 
     examples: int
     seed: int
     interface: Interface | None
     scene: Case | None
     known: Mapping[str, str]
-    progress: Callable[[Progress], None]
-    drawn: dict[str, PlannedCases]
+    report_progress: Callable[[Progress], None]
+    cases: dict[str, PlannedCases]
 
     def key(self, question: Property) -> str:
-        """The seed of a property, which does not depend on what else is asked."""
+        """Return the seed of a property, which does not depend on the other properties of the run."""
         return f"{self.seed}/{question.id}"
 
     def strategy(self, question: Property) -> SearchStrategy[Case] | None:
-        """Of its cases; None where it cannot be asked of what is given."""
+        """Return the strategy of the cases; None if the property cannot be checked on this interface or scene."""
         if not question.bodies:
             return cast("SearchStrategy[Case] | None", question.cases(self.interface))
         if self.interface is not None and self.scene is None:
             return None
         return cast("SearchStrategy[Case] | None", question.cases(self.scene))
 
+    def progress(self, subject: Subject, question: Property, phase: Phase, planned: int) -> Callable[[int], None]:
+        """Return a function that reports how many cases are finished."""
+        return lambda count: self.report_progress(Progress(subject.name, question.id, phase, count, planned))
 
-def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
+    def planned_cases(
+        self, strategy: SearchStrategy[Case], subject: Subject, question: Property
+    ) -> tuple[PlannedCases, int]:
+        """Return the cases of the property, drawn once a run, and how many were planned."""
+        if question.id not in self.cases:
+            progress = self.progress(subject, question, "drawing", self.examples)
+            self.cases[question.id] = draw_cases(
+                strategy, seed=self.key(question), examples=self.examples, progress=progress
+            )
+        cases = self.cases[question.id]
+        return cases, len(cases.cases) if cases.exhausted else self.examples
+
+
+def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
+    """Return the row of one formulation and one property."""
     row = Row(
         formulation=subject.name,
-        question=question,
+        info=question.info,
         verdict=Verdict.PASS,
         promise=question.promise(subject.traits),
         known=plan.known.get(question.id, ""),
@@ -174,43 +242,50 @@ def _row(plan: _Plan, subject: Subject, question: Property) -> Row:
         return replace(row, verdict=Verdict.NOT_PROVIDED, reason=f"{', '.join(sorted(missing))}: not provided")
     strategy = plan.strategy(question)
     if strategy is None:
-        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="cannot be asked of what is given")
-    if plan.scene is not None and row.promise is False:  # some scene fails, this one need not
+        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
+    if plan.scene is not None and row.promise is False:  # The formulation fails on some scene, not on every one.
         row = replace(row, promise=None)
     try:
-        witness_case = _witness(subject, question) if row.promise is False else None
+        witness = _witness(subject, question) if row.promise is False else None
     except MisuseError as error:
         return replace(row, verdict=Verdict.CRASHED, reason=f"traits: {error}")
+    row = _judge_all(plan, subject, question, row, strategy, witness)
+    return replace(row, shrunk=_shrink(plan, strategy, subject, question, row))
 
-    def told(phase: Literal["drawing", "judging", "shrinking"], done: int, planned: int) -> None:
-        plan.progress(Progress(subject.name, question.id, phase, done, planned))
 
-    if question.id not in plan.drawn:
-        plan.drawn[question.id] = draw_cases(
-            strategy,
-            seed=plan.key(question),
-            examples=plan.examples,
-            progress=lambda done: told("drawing", done, plan.examples),
-        )
-    drawn = plan.drawn[question.id]
-    planned = len(drawn.cases) if drawn.exhausted else plan.examples
+def _judge_all(
+    plan: _Plan,
+    subject: Subject,
+    question: Property,
+    row: Row,
+    strategy: SearchStrategy[Case],
+    witness: Case | None,
+) -> Row:
+    """Return the row with the outcomes of all planned cases, and the verdict over them."""
+    cases, planned = plan.planned_cases(strategy, subject, question)
+    progress = plan.progress(subject, question, "judging", planned)
     start = perf_counter()
     outcomes = []
-    for case in drawn.cases:
+    for case in cases.cases:
         outcomes.append(judge_case(question, case, subject))
-        told("judging", len(outcomes), planned)
-    witness = judge_case(question, witness_case, subject) if witness_case is not None else None
-    row = replace(row, planned=planned, outcomes=tuple(outcomes), witness=witness, seconds=perf_counter() - start)
-    verdict, reason = _overall(row)
-    if verdict is Verdict.NOT_JUDGED and plan.scene is not None and question.bodies and row.outcomes and not row.judged:
-        # there is one case, and nobody said that it can be decided
+        progress(len(outcomes))
+    row = replace(
+        row,
+        planned=planned,
+        outcomes=tuple(outcomes),
+        witness=None if witness is None else judge_case(question, witness, subject),
+        seconds=perf_counter() - start,
+    )
+    verdict, reason = _verdict_over_all(row)
+    on_scene = plan.scene is not None and question.bodies and row.outcomes
+    if verdict is Verdict.NOT_JUDGED and on_scene and not row.judged:
+        # There is this one case alone, and nobody promised that it can be decided.
         verdict, reason = Verdict.UNDECIDED, row.outcomes[0].reason or reason
-    row = replace(row, verdict=verdict, reason=reason)
-    smallest = _shrunk(plan, strategy, subject, row, lambda asked: told("shrinking", asked, SHRINK_CALLS))
-    return replace(row, shrunk=smallest)
+    return replace(row, verdict=verdict, reason=reason)
 
 
 def _witness(subject: Subject, question: Property) -> Case:
+    """Return the case that the traits name as a proof that the formulation fails."""
     name = subject.traits.witness(question.id)
     if name is None:
         raise MisuseError(
@@ -218,73 +293,65 @@ def _witness(subject: Subject, question: Property) -> Case:
         )
     if not question.bodies:
         return named_case(name)
-    from contactverif.scenes.catalogue import (
-        load_scene_case,  # brings bodies and Newton's method: only where they are needed
-    )
+    # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
+    from contactverif.scenes.catalogue import load_scene_case
 
     return load_scene_case(name)
 
 
-def _overall(row: Row) -> tuple[Verdict, str]:
-    """Verdict and reason of a row from its outcomes."""
+def _verdict_over_all(row: Row) -> tuple[Verdict, str]:
+    """Return verdict and reason of a row from its outcomes."""
     everything = [*row.outcomes, *([row.witness] if row.witness else [])]
-    worst = max(everything, key=lambda outcome: _badness(row.question, outcome), default=None)
+    worst = max(everything, key=lambda outcome: _badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         return worst.verdict, worst.reason
     if row.judged < JUDGED_SHARE * row.planned:
-        why = Counter(outcome.reason for outcome in row.outcomes if not outcome.decided).most_common(1)
-        cause = f"most often because {why[0][0]}" if why else "no more cases could be made"
+        cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
     if everything and all(outcome.measurement is not None and outcome.measurement.idle for outcome in everything):
         return Verdict.NOT_JUDGED, "no case gave any force: nothing was judged"
     return Verdict.PASS, ""
 
 
-def _badness(question: Property, outcome: Outcome) -> tuple[int, float]:
-    """Orders outcomes: crashes, then breaches of the contract, then failures, each by how far beyond its tolerance."""
+def _badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
+    """Return a key that orders outcomes: crashes, breaches of the contract, failures by how far beyond tolerance."""
     if outcome.verdict is Verdict.CRASHED:
         return 3, inf
     if outcome.verdict is not Verdict.FAIL:
         return 0, 0.0
     if outcome.breach:
         return 2, inf
-    found = outcome.measurement
-    if found is None or found.broken:
+    if outcome.measurement is None or outcome.measurement.broken:
         return 1, inf
-    excesses = [
-        excess(quantity, found.values[quantity.name], found.tolerances[quantity.name])
-        for quantity in question.quantities
-        if quantity.name in found.values
-    ]
-    return 1, max(excesses, default=inf)
+    return 1, max((number.ratio for number in checked_numbers(info, outcome.measurement)), default=inf)
 
 
-def _shrunk(
-    plan: _Plan, strategy: SearchStrategy[Case], subject: Subject, row: Row, told: Callable[[int], None]
+def _shrink(
+    plan: _Plan, strategy: SearchStrategy[Case], subject: Subject, question: Property, row: Row
 ) -> Outcome | None:
-    """The smallest case found that fails as badly as the worst random one; None if no random case failed.
+    """Return the smallest case that fails as badly as the worst random one; None if no random case failed.
 
-    As badly: it crashes if something crashed, breaks the contract if something did. Of failures by a number it must
-    be a clear one, half-way on a logarithmic scale between the tolerance and the worst value: the smallest case that
-    fails at all often fails by a hair, and convinces nobody.
+    It crashes if something crashed, and breaks the contract if something did. Of failures by a number it must be a
+    clear one, half-way on a logarithmic scale between the tolerance and the worst value: the smallest case that fails
+    at all often fails by a hair, and convinces nobody.
     """
-    question = row.question
-    badness = [_badness(question, outcome) for outcome in row.outcomes]
+    badness = [_badness(row.info, outcome) for outcome in row.outcomes]
     kind, worst = max(badness, default=(0, 0.0))
     if kind == 0:
         return None
-    least = (kind, min(CLEARLY, sqrt(worst)) if kind == 1 else worst)
-    first = next(number for number, found in enumerate(badness) if found >= least and found[0] == kind)
+    least = (kind, min(CLEAR_RATIO, sqrt(worst)) if kind == 1 else worst)
+    first = next(number for number, bad in enumerate(badness) if bad >= least and bad[0] == kind)
     smallest = row.outcomes[first]
-    asked = 0
+    progress = plan.progress(subject, question, "shrinking", SHRINK_CALLS)
+    calls = 0
 
     def fails(case: Case) -> bool:
-        nonlocal smallest, asked
-        asked += 1
-        told(asked)
+        nonlocal smallest, calls
+        calls += 1
+        progress(calls)
         outcome = judge_case(question, case, subject)
-        found = _badness(question, outcome)
-        if found[0] != kind or found < least:
+        bad = _badness(row.info, outcome)
+        if bad[0] != kind or bad < least:
             return False
         smallest = outcome
         return True

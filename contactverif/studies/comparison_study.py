@@ -1,8 +1,8 @@
-"""Candidates against a reference: one run over the same cases, its numbers side by side, the cost of an evaluation."""
+"""A comparison of candidates with a reference: one run over the same cases, then the cost of an evaluation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isnan
 from typing import Any
@@ -17,24 +17,24 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.profiles import Profile
 from contactverif.run.runner import Progress, run
-from contactverif.studies.evaluation_cost import measured
+from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """All that a comparison found.
+    """A comparison with all that it rests on.
 
     Attributes
     ----------
     run : Run
-        As `verify` would have found it, reference and candidates.
+        The run of reference and candidates, as `verify` makes it.
     comparison : Comparison
         Its numbers side by side.
     differing : tuple[Differing, ...]
-        A case a property, the largest difference first.
+        The case of each property on which they differ most, the largest difference first.
     costs : tuple[Cost, ...]
-        Of an evaluation.
+        The times of an evaluation.
     """
 
     run: Run
@@ -43,7 +43,7 @@ class Study:
     costs: tuple[Cost, ...]
 
 
-def compared(
+def run_comparison(
     reference: Subject,
     candidates: Sequence[Subject | NotLoaded],
     properties: Sequence[Property | NotLoaded],
@@ -55,23 +55,34 @@ def compared(
     scene: Case | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Study:
-    """Ask every property of the reference and of the candidates, on the same cases.
+    """Check every property of the reference and of the candidates, on the same cases.
 
     Parameters
     ----------
+    reference : Subject
+        The formulation that the candidates are compared with.
+    candidates : Sequence[Subject | NotLoaded]
+        The formulations to compare.
+    properties : Sequence[Property | NotLoaded]
+        The properties to check.
     profile, examples, seed, interface, scene, progress
-        As of `contactverif.run.runner.run`.
+        The same arguments as of `contactverif.run.runner.run`.
+
+    Returns
+    -------
+    Study
+        Run, comparison, differing cases and costs.
 
     Raises
     ------
     MisuseError
-        If the reference is a candidate too, or there is no candidate; and as `run`.
+        If the reference is a candidate too, there is no candidate, or `run` raises it.
     """
     if not candidates:
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
     if any(_name(candidate) == reference.name for candidate in candidates):
         raise MisuseError("--against", f"{reference.name}, which is compared too", "another formulation than those")
-    found = run(
+    result = run(
         [reference, *candidates],
         properties,
         profile=profile,
@@ -81,38 +92,40 @@ def compared(
         scene=scene,
         progress=progress,
     )
-    comparison = Comparison.of(found, reference.name)
+    comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    return Study(found, comparison, differing(found, comparison), measured([reference, *loaded]))
+    return Study(result, comparison, find_differing(result, comparison), measure_costs([reference, *loaded]))
 
 
-def differing(found: Run, comparison: Comparison) -> tuple[Differing, ...]:
-    """For each property the case on which some candidate differs most from the reference, the largest difference first.
+def find_differing(result: Run, comparison: Comparison) -> tuple[Differing, ...]:
+    """Return for each property the case on which a candidate differs most from the reference.
 
-    Cases on which one passes and the other does not stand before those where both fail.
+    The largest difference comes first. Cases on which one passes and the other does not stand before those where both
+    fail.
     """
-    rows = {(row.formulation, row.question.id): row for row in found.rows}
-    chosen = []
+    rows = result.row_of
+    largest = []
     for property_id in comparison.properties:
         every = list(_candidates(rows, comparison, property_id))
         if every:
-            chosen.append(max(every, key=_rank))
-    return tuple(sorted(chosen, key=_rank, reverse=True))
+            largest.append(max(every, key=_rank))
+    return tuple(sorted(largest, key=_rank, reverse=True))
 
 
-def _candidates(rows: dict[tuple[str, str], Row], comparison: Comparison, property_id: str) -> Iterator[Differing]:
+def _candidates(rows: Mapping[tuple[str, str], Row], comparison: Comparison, property_id: str) -> Iterator[Differing]:
+    """Yield for each candidate the case on which it differs most."""
     reference = comparison.reference
     for name in comparison.formulations[1:]:
         paired = comparison.paired.get((name, property_id))
         if paired is None:
             continue
-        row, against = rows[name, property_id], rows[reference, property_id]
+        row, reference_row = rows[name, property_id], rows[reference, property_id]
         cells = comparison.cells[name, property_id], comparison.cells[reference, property_id]
         number = paired.furthest(cells[0].kinds[:, :2].sum(axis=1))
         if number is None:
             continue
         yield Differing(
-            question=row.question,
+            info=row.info,
             formulation=name,
             number=number,
             apart=bool(paired.apart[number]),
@@ -120,13 +133,13 @@ def _candidates(rows: dict[tuple[str, str], Row], comparison: Comparison, proper
             margin=float(cells[0].standing[number]),
             reference_margin=float(cells[1].standing[number]),
             outcome=row.outcomes[number],
-            reference_outcome=against.outcomes[number],
+            reference_outcome=reference_row.outcomes[number],
         )
 
 
-def _rank(one: Differing) -> tuple[Any, ...]:
-    far = inf if isnan(one.decades) else float(np.abs(one.decades))
-    return one.apart, far
+def _rank(differing: Differing) -> tuple[Any, ...]:
+    far = inf if isnan(differing.decades) else float(np.abs(differing.decades))
+    return differing.apart, far
 
 
 def _name(candidate: Subject | NotLoaded) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from contactverif.contract.property import Outcome, Property, Verdict, excess
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, excess
 from contactverif.contract.result import Row
 
 
@@ -23,7 +23,7 @@ def explain(row: Row, *, command: str) -> str:
     str
         Several lines; all but the first are indented.
     """
-    question = row.question
+    question = row.info
     lines = [f"{row.formulation}, {question.id}: {row.unexpected}", f"  The property: {question.summary}"]
     if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
         lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
@@ -43,10 +43,10 @@ def _example(row: Row, outcome: Outcome) -> list[str]:
     ]
     if outcome.measurement is None:
         lines.append(f"    {outcome.reason}")
-    return [*lines, *_numbers(row.question, outcome), _drawing(outcome)]
+    return [*lines, *_numbers(row.info, outcome), _drawing(outcome)]
 
 
-def _numbers(question: Property, outcome: Outcome) -> list[str]:
+def _numbers(question: PropertyInfo, outcome: Outcome) -> list[str]:
     """Return each measured number against its tolerance, with the formula of the tolerance and its reason."""
     measurement = outcome.measurement
     if measurement is None:

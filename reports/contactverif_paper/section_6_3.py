@@ -19,7 +19,7 @@ import xarray as xr
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.studies.evaluation_cost import measured
+from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
@@ -76,7 +76,7 @@ def compute(report_progress: Progress) -> Cost:
     terms = [[count_terms(formulation, master) for master in MASTERS.values()] for formulation in FORMULATIONS]
     cases = [long_interface(ratio) for ratio in MESH_RATIOS.values()]
     entries = [[_entries(formulation, case) / _N_SEGMENTS for case in cases] for formulation in TIMED]
-    costs = measured([subject_of(formulation) for formulation in TIMED], cases)
+    costs = measure_costs([subject_of(formulation) for formulation in TIMED], cases)
     seconds = np.array([[row.seconds["residual"], row.seconds["tangent"]] for row in costs]) / _N_SEGMENTS
     by_formulation = seconds.reshape(len(cases), len(TIMED), 2).swapaxes(0, 1)
     return Cost(np.array(terms, dtype=np.int64), np.array(entries), by_formulation, tangents())

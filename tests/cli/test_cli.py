@@ -22,7 +22,8 @@ from asking import Answer, Ask, asking
 
 from contactverif.cli import app as cli
 from contactverif.run import registry, runner
-from contactverif_reports.netcdf.read import case_ids, read_case, same_data
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import case_ids, read_case
 
 ROOT = Path(__file__).parents[2]
 PUNCH = ROOT / "tests" / "data" / "punch.msh"

@@ -20,7 +20,7 @@ from contactverif.contract.result import Run
 from contactverif.run import runner
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import run
-from contactverif_reports.netcdf.read import same_data
+from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.write import write
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"

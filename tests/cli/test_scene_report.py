@@ -16,7 +16,8 @@ from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import SCENES, load_scene
 from contactverif.studies.solved_scenes import solve_scene
-from contactverif_reports.netcdf.read import case_ids, read_case, same_data
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import case_ids, read_case
 from contactverif_reports.netcdf.write import write
 
 ID = "vts-ppt.patch.flat.transmission"

@@ -50,7 +50,7 @@ def test_a_run_accuses_a_mutant_and_shrinks_its_case() -> None:
     result = run([Subject(mutant.name, mutant.make)], [load_property(mutant.caught_by)], profile="ci")
     (row,) = result.rows
     assert row.unexpected == "promised to pass, but fails"
-    assert not result.passed
+    assert not result.promises_kept
     assert row.shrunk is not None
     assert row.shrunk.verdict is Verdict.FAIL
     interface = row.shrunk.case.interface

@@ -40,7 +40,7 @@ def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
     assert "barrier" in SCALING.applicable(Traits(penalty="nodal", enforcement="barrier"))
     result = run([subject(Springs)], [SCALING], examples=3, seed=1)
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
-    assert result.passed
+    assert result.promises_kept
 
 
 def test_an_absolute_tolerance_is_found() -> None:

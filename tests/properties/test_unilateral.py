@@ -91,7 +91,7 @@ def test_springs_beside_multipliers_are_not_accused() -> None:
     """A unit multiplier is lost in roundoff beside them; one of their size is not."""
     questions = load_properties(["patch.flat.*", "unilateral"])
     result = run([Subject("augmented", Augmented)], questions, examples=60, seed=0)
-    assert {row.question.id: row.verdict for row in result.rows} == dict.fromkeys(
+    assert {row.property_id: row.verdict for row in result.rows} == dict.fromkeys(
         ["patch.flat.resultant", "patch.flat.solve", "patch.flat.transmission", "unilateral"], Verdict.PASS
     )
 

@@ -101,5 +101,12 @@ def small_run(*, passing: bool = False) -> Run:
         tuple(rows),
         () if passing else (NotLoaded("mine", "ModuleNotFoundError: No module named 'mine'"),),
         {"vts-ppt": parts} if passing else {"vts-ppt": parts, "vts-me:n=4": parts | {"tangent": True}},
-        {"created": "2025-01-01T00:00:00", "command": "verify", "platform": "Linux", "seed": "7", "empty": ""},
+        {
+            "created": "2025-01-01T00:00:00",
+            "command": "verify",
+            "platform": "Linux",
+            "seed": "7",
+            "examples": "4",
+            "empty": "",
+        },
     )

@@ -23,7 +23,7 @@ from contactverif_reports.html import report_page as report_page_module
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import number, render, svg_inline, write_page
 from contactverif_reports.html.report_page import report_page
-from contactverif_reports.netcdf.stored import read_report
+from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
 EVIL = "<script>alert(1)</script> & \"'"
@@ -42,7 +42,7 @@ def figure(title: str = "a title") -> Figure:
 def page(tmp_path: Path, run: object, name: str = "report.nc") -> str:
     path = tmp_path / name
     write(run, path)  # type: ignore[arg-type]
-    return report_page(read_report(path))
+    return report_page(read_run(path), path)
 
 
 @pytest.fixture
@@ -149,12 +149,13 @@ def test_every_template_can_be_read() -> None:
 def test_the_page_of_a_report_is_sound(tmp_path: Path, passing: bool) -> None:
     html = page(tmp_path, small_run(passing=passing))
     assert not complaints(html)
-    assert html == report_page(read_report(tmp_path / "report.nc")), "the same report gives the same bytes"
+    path = tmp_path / "report.nc"
+    assert html == report_page(read_run(path), path), "the same report gives the same bytes"
 
 
 def test_the_page_says_what_failed(tmp_path: Path) -> None:
     text = Page(page(tmp_path, small_run())).text
-    assert "✗ 1 unexpected and 1 not loaded. 2 formulations, 3 properties, 13 of 14 random cases decided." in text
+    assert "✗ 1 crash, 1 plugin not loaded. 2 formulations, 3 properties, 13 of 14 random cases decided." in text
     assert "vts-me:n=4 , objectivity: crashed" in text
     assert "mine : not loaded . ModuleNotFoundError: No module named 'mine'" in text.replace("mine: ", "mine : ")
     assert "ZeroDivisionError: at residual" in text
@@ -164,7 +165,7 @@ def test_the_page_says_what_failed(tmp_path: Path) -> None:
 def test_the_page_of_a_run_that_passed(tmp_path: Path) -> None:
     html = page(tmp_path, small_run(passing=True))
     text = Page(html).text
-    assert "✓ Every promise kept, every property judged." in text
+    assert "✓ Every promise is kept and every property was judged." in text
     assert "What went wrong" not in text
     assert "smallest meshes" not in text
     assert not any(tag == "table" and attrs.get("class") == "matrix" for tag, attrs in Page(html).tags), (
@@ -174,17 +175,17 @@ def test_the_page_of_a_run_that_passed(tmp_path: Path) -> None:
 
 def test_numbers_agree_with_the_file(tmp_path: Path) -> None:
     html = page(tmp_path, small_run())
-    report = read_report(tmp_path / "report.nc")
+    run = read_run(tmp_path / "report.nc")
     tables = [table for table in Page(html).tables if table.caption.startswith("What ")]
-    assert len(tables) == len(report.formulations)
-    for name, table in zip(report.formulations, tables, strict=True):
+    assert len(tables) == len(run.formulations)
+    for name, table in zip(run.formulations, tables, strict=True):
         for line in table.rows[1:]:
-            row = report.rows[name, line[0]]
-            assert line[2].endswith(str(row.cell.verdict))
-            assert line[3] == (f"{row.cell.judged}/{row.cell.planned}" if row.cell.planned else "–")
-            worst = row.furthest
+            row = run.row_of[name, line[0]]
+            assert line[2].endswith(str(row.result))
+            assert line[3] == (f"{row.judged}/{row.planned}" if row.planned else "–")
+            closest = row.closest.number if row.closest is not None else None
             assert line[5:7] == (
-                [number(worst.value, 2), f"{worst.sign} {number(worst.tolerance, 2)}"] if worst else ["", ""]
+                [number(closest.value, 2), f"{closest.sign} {number(closest.tolerance, 2)}"] if closest else ["", ""]
             )
 
 
@@ -201,7 +202,7 @@ def test_evil_words_stay_words(tmp_path: Path) -> None:
 def test_many_formulations_are_folded_and_few_counterexamples_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_page_module, "DRAWN", 2)
+    monkeypatch.setattr(report_page_module, "MOST_FIGURES", 2)
     row = next(row for row in small_run().rows if row.shrunk is not None)
     rows = tuple(replace(row, formulation=f"mine:n={n}") for n in range(9))
     html = page(tmp_path, replace(small_run(), rows=rows, provided={}, not_loaded=()))

@@ -14,7 +14,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.read import case_ids, opened, read_case, same_data
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import case_ids, open_report, read_case
 from contactverif_reports.netcdf.write import write
 
 
@@ -49,15 +50,19 @@ def test_every_bit_of_a_case_comes_back(report: Path) -> None:
     assert np.signbit(stored.case.z[3])
 
 
-def test_what_was_found_comes_back(report: Path) -> None:
-    stored = read_case(report, "vts-me_n_4.patch.flat.transmission")
-    assert (stored.formulation, stored.property_id) == ("vts-me:n=4", "patch.flat.transmission")
-    assert (stored.verdict, stored.reason) == (Verdict.FAIL, "force error 0.25, at most 1e-12")
-    assert (stored.values, stored.tolerances) == ({ERROR.name: 0.25}, {ERROR.name: 1e-12})
+def test_a_counterexample_comes_back_with_its_numbers(report: Path) -> None:
+    example = read_case(report, "vts-me_n_4.patch.flat.transmission")
+    assert (example.formulation, example.property_id) == ("vts-me:n=4", "patch.flat.transmission")
+    assert (example.verdict, example.reason) == (Verdict.FAIL, "force error 0.25, at most 1e-12")
+    assert example.outcome.measurement is not None
+    assert example.outcome.measurement.values == {ERROR.name: 0.25}
+    assert example.outcome.measurement.tolerances == {ERROR.name: 1e-12}
     crashed = read_case(report, "vts-me_n_4.objectivity")
-    assert (crashed.verdict, crashed.values) == (Verdict.CRASHED, {})
+    assert (crashed.verdict, crashed.outcome.measurement) == (Verdict.CRASHED, None)
     partly = read_case(report, "vts-me_n_4.tangent.directional.witness")
-    assert list(partly.values) == [ERROR.name]  # the slope was not measured
+    assert partly.is_witness
+    assert partly.outcome.measurement is not None
+    assert list(partly.outcome.measurement.values) == [ERROR.name], "the slope was not measured"
 
 
 def test_an_unknown_id_suggests_the_nearest(report: Path, tmp_path: Path) -> None:
@@ -77,16 +82,19 @@ def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
     netCDF4.Dataset(tmp_path / "other.nc", "w").close()
     with netCDF4.Dataset(tmp_path / "newer.nc", "w") as newer:
         newer.title, newer.schema = schema.TITLE, "99"
+    with netCDF4.Dataset(tmp_path / "older.nc", "w") as older:
+        older.title, older.schema = schema.TITLE, "1"
     with netCDF4.Dataset(tmp_path / "empty.nc", "w") as empty:
-        empty.title, empty.schema = schema.TITLE, "1"
+        empty.title, empty.schema = schema.TITLE, schema.SCHEMA
     for name, words in {
         "missing.nc": "does not exist",
         ".": "is a folder",
         "text.nc": "no netCDF file",
         "cut.nc": "no netCDF file",
         "other.nc": "of something else",
-        "newer.nc": "schema 99; needed schema 1",
-        "empty.nc": "without the group 'counterexamples'",
+        "newer.nc": "schema 99; needed schema 2; install a newer contactverif",
+        "older.nc": "schema 1, which an older contactverif wrote; needed schema 2; run the same command again",
+        "empty.nc": "without the group 'summary'; needed an undamaged report",
     }.items():
         with pytest.raises(MisuseError, match=words) as error:
             case_ids(tmp_path / name)
@@ -108,6 +116,6 @@ def test_a_damaged_case_is_said_to_be_one(report: Path) -> None:
 )
 def test_what_is_damaged_in_a_report_is_one_line(report: Path, error: Exception) -> None:
     said = r"report.nc, which cannot be read \(.*\); needed an undamaged report"
-    with pytest.raises(MisuseError, match=said) as told, opened(report):
+    with pytest.raises(MisuseError, match=said) as caught, open_report(report):
         raise error
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)

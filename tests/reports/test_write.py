@@ -16,12 +16,12 @@ import pytest
 import xarray as xr
 from made import ERROR, flat, outcome, question, small_run
 
+from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Row, Run
-from contactverif_reports.netcdf.read import same_data
-from contactverif_reports.netcdf.schema import VERDICTS, case_id, group_of
-from contactverif_reports.netcdf.summary_group import worst
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.schema import VERDICTS, group_names
 from contactverif_reports.netcdf.write import check_writable, write
 
 
@@ -39,10 +39,10 @@ def variables(group: netCDF4.Dataset) -> list[netCDF4.Variable]:
 def test_opens_with_xarray(report: Path) -> None:
     with xr.open_datatree(report) as tree:
         assert list(tree.children) == [
-            "summary", "patch", "tangent", "invariants", "counterexamples", "timing",
+            "summary", "patch", "tangent", "objectivity", "counterexamples", "timing",
         ]  # fmt: skip
-        patch = tree["patch/flat_transmission"].to_dataset()
-        assert patch.sizes == {"formulation": 2, "case": 4, "quantity": 1, "detail": 1}
+        patch = tree["patch/flat/transmission"].to_dataset()
+        assert patch.sizes == {"formulation": 2, "case": 4, "quantity": 1, "detail": 1, "parameter": 1}
         verdicts = patch.verdict.sel(formulation="vts-me:n=4").values
         np.testing.assert_array_equal(verdicts, [0, 0, 1, np.nan])
         assert patch.value.sel(formulation="vts-me:n=4", quantity=ERROR.name)[2] == 0.25
@@ -50,16 +50,16 @@ def test_opens_with_xarray(report: Path) -> None:
         assert patch.tolerance_formula.values == [ERROR.tolerance]
         assert patch.n_master_segments.sel(formulation="vts-ppt").values.tolist() == [1, 1, 1, 1]
         assert patch.parameter_penetration.units == "m"
-        assert patch.witness.values.tolist() == ["", "C′ №1"]
+        assert patch.witness_case_name.values.tolist() == ["", "C′ №1"]
         assert tree["tangent/directional"].sizes["quantity"] == 2
-        assert "quantity" not in tree["invariants/objectivity"].sizes
+        assert "quantity" not in tree["objectivity"].sizes
 
 
 def test_root_attributes_are_the_provenance(report: Path) -> None:
     with xr.open_datatree(report) as tree:
         assert tree.attrs["seed"] == "7"
-        assert tree.attrs["passed"] == "false"
-        assert tree.attrs["schema"] == "1"
+        assert tree.attrs["promises_kept"] == "false"
+        assert tree.attrs["schema"] == "2"
         assert tree.attrs["Conventions"] == "CF-1.11 UGRID-1.0"
 
 
@@ -70,7 +70,7 @@ def test_summary_counts_every_verdict(report: Path) -> None:
     assert row["count"].sel(verdict="pass") == 2
     assert row["count"].sel(verdict="fail") == 1
     assert (row.planned, row.judged, row.row_verdict, row.promise) == (4, 3, VERDICTS["fail"], 2)
-    assert (row.worst_value, row.worst_tolerance, row.worst_case) == (0.25, 1e-12, 2)
+    assert (row.closest_value, row.closest_tolerance, row.closest_case) == (0.25, 1e-12, 2)
     assert summary.sizes["verdict"] == len(Verdict)
     assert summary.unexpected.sel(formulation="vts-me:n=4", property="objectivity").item() == "crashed"
     assert summary.provided.sel(formulation="vts-ppt", part="tangent") == 0
@@ -91,7 +91,8 @@ def test_reads_like_documentation(report: Path) -> None:
                 assert variable.filters()["zlib"], variable
                 assert variable.filters()["complevel"] == 4
             if hasattr(variable, "flag_meanings"):
-                assert len(variable.flag_meanings.split()) == len(variable.flag_values)
+                names = "flag_masks" if hasattr(variable, "flag_masks") else "flag_values"
+                assert len(variable.flag_meanings.split()) == len(variable.getncattr(names))
             assert variable.dtype is not str  # those crash HDF5 when a file is opened twice
 
 
@@ -133,7 +134,7 @@ def test_differences_are_told(tmp_path: Path) -> None:
     write(changed, tmp_path / "b.nc")
     assert same_data(tmp_path / "a.nc", tmp_path / "b.nc") == [
         "/:seed: 7 and 8",
-        "/patch/flat_transmission/value: 1e-15 and 2e-15 at (0, 0, 0), and 0 more",
+        "/patch/flat/transmission/value: 1e-15 and 2e-15 at (0, 0, 0), and 0 more",
     ]
     write(small_run(passing=True), tmp_path / "b.nc")
     assert any(line.startswith("/counterexamples/") for line in same_data(tmp_path / "a.nc", tmp_path / "b.nc"))
@@ -143,7 +144,7 @@ def test_nothing_but_plugins_that_did_not_load(tmp_path: Path) -> None:
     write(Run((), small_run().not_loaded), tmp_path / "none.nc")
     with xr.open_datatree(tmp_path / "none.nc") as tree:
         assert tree["summary"].not_loaded.values.tolist() == ["mine"]
-        assert tree.attrs["passed"] == "false"
+        assert tree.attrs["promises_kept"] == "false"
 
 
 def test_words_that_netcdf_cannot_hold(tmp_path: Path) -> None:
@@ -152,28 +153,40 @@ def test_words_that_netcdf_cannot_hold(tmp_path: Path) -> None:
     write(Run((row, dataclasses.replace(row, formulation="a b/c:d=è"))), tmp_path / "odd.nc")
     with xr.open_datatree(tmp_path / "odd.nc") as tree:
         assert list(tree["counterexamples"].children) == ["a_b_c_d_.a_b", "a_b_c_d_.a_b-2"]
-        assert tree["timing_/a_b"].reason[0, 0].item() == "lone \\udc80, NUL \\x00, tab \t, ℓ"
+        assert tree["a_b"].reason[0, 0].item() == "lone \\udc80, NUL \\x00, tab \t, ℓ"
 
 
-def test_names() -> None:
-    assert group_of("patch.flat.transmission", "patch") == "/patch/flat_transmission"
-    assert group_of("objectivity", "invariants") == "/invariants/objectivity"
+def test_a_group_is_spelled_like_the_property() -> None:
+    assert group_names(["patch.flat.transmission", "objectivity"]) == {
+        "patch.flat.transmission": "/patch/flat/transmission",
+        "objectivity": "/objectivity",
+    }
+
+
+def test_a_group_is_neither_a_folder_of_others_nor_one_of_the_report_itself() -> None:
+    names = group_names(["patch", "patch.flat", "timing", "timing.fast", "a/b", "a_b"])
+    assert list(names.values()) == ["/patch_", "/patch/flat", "/timing__", "/timing_/fast", "/a_b", "/a_b-2"]
+
+
+def test_an_id_is_typeable() -> None:
     assert case_id("two-pass/nts-ar:area=reference", "patch", witness=True) == (
         "two-pass_nts-ar_area_reference.patch.witness"
     )
 
 
-def test_worst_is_the_furthest_of_the_decided() -> None:
+def test_the_closest_number_is_that_of_a_decided_case_or_of_the_witness() -> None:
     row = small_run().rows[0]
-    found = worst(row)
-    assert found is not None
-    assert (found.case, found.value) == (3, 4e-15)
-    assert worst(dataclasses.replace(row, outcomes=())) is None
+    assert row.closest is not None
+    assert (row.closest.case, row.closest.number.value) == (3, 4e-15)
+    assert dataclasses.replace(row, outcomes=()).closest is None
     nan = outcome(flat([1], [1]), float("nan"), Verdict.FAIL)
     doubtful = outcome(flat([1], [1]), 1.0, Verdict.UNDECIDED)
-    found = worst(dataclasses.replace(row, outcomes=(*row.outcomes, doubtful, nan)))
-    assert found is not None
-    assert found.case == 5
+    closest = dataclasses.replace(row, outcomes=(*row.outcomes, doubtful, nan)).closest
+    assert closest is not None
+    assert closest.case == 5
+    closest = dataclasses.replace(row, witness=outcome(flat([1], [1]), 0.5)).closest
+    assert closest is not None
+    assert (closest.case, closest.number.value) == (None, 0.5)
 
 
 def test_an_exception_leaves_what_was_there(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,7 +259,7 @@ def test_replaces_the_file_behind_a_link(tmp_path: Path, report: Path) -> None:
     link.symlink_to(report)
     write(small_run(passing=True), link)
     assert link.is_symlink()
-    assert any("passed" in line for line in same_data(report, _written(tmp_path / "c.nc", small_run())))
+    assert any("promises_kept" in line for line in same_data(report, _written(tmp_path / "c.nc", small_run())))
 
 
 def _written(path: Path, run: Run) -> Path:
@@ -289,4 +302,4 @@ def test_a_folder_that_may_not_be_written_to(tmp_path: Path) -> None:
 def test_ncdump_reads_it(report: Path) -> None:
     header = subprocess.run(["ncdump", "-h", report], capture_output=True, text=True, check=True).stdout
     assert "tangent: not provided" in header
-    assert 'flag_meanings = "no_promise promised said_to_fail"' in header
+    assert 'flag_meanings = "no_promise promised stated_to_fail"' in header

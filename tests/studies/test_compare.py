@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.cli.comparison_tables import outcome_of
+from contactverif.cli.changes_tables import regressions_text
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
@@ -20,15 +20,15 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import End, solve
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.scenes.catalogue import load_scene
-from contactverif.studies.comparison_study import compared, differing
-from contactverif.studies.evaluation_cost import measured, state
+from contactverif.studies.comparison_study import find_differing, run_comparison
+from contactverif.studies.evaluation_cost import make_state, measure_costs
 from contactverif_properties.newton_order import NEWTON_ORDER
 from contactverif_properties.shared.newton_solution import solution_details
 from contactverif_reports.compare.cells import ORDER, Cell, Paired
 from contactverif_reports.compare.comparison import CONVERGED, END, ITERATIONS, Comparison
-from contactverif_reports.compare.regression import ALPHA, Changes, change, few, shift, wandering
+from contactverif_reports.compare.regression import ALPHA, Changes, NamedRun, compare_rows, few, shift, wandering
 from contactverif_reports.html.comparison_page import changes_page, comparison_page
-from contactverif_reports.netcdf.stored_cells import StoredCells, read_cells
+from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
 ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding")
@@ -72,8 +72,18 @@ def row(
     return Row(formulation, question(), worst, promise, planned=len(outcomes), outcomes=outcomes, seconds=1.0)
 
 
+OF_ROWS = {"formulation", "info", "verdict", "promise", "reason"}  # What a cell takes from its row.
+
+
 def cell(*margins: float | Verdict, **changes: Any) -> Cell:
-    return replace(Cell.of_row(row("vts-me", *margins)), **changes)
+    return changed(Cell.from_row(row("vts-me", *margins)), **changes)
+
+
+def changed(old: Cell, **changes: Any) -> Cell:
+    """The cell with other attributes, of its own or of its row."""
+    row_changes = {name: value for name, value in changes.items() if name in OF_ROWS}
+    others = {name: value for name, value in changes.items() if name not in OF_ROWS}
+    return replace(old, row=replace(old.row, **row_changes), **others)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -84,14 +94,14 @@ def test_a_margin_is_the_quantity_that_went_furthest() -> None:
     one = question("newton.order", ERROR, SLOPE)
     found = Measurement({ERROR.name: 0.5, SLOPE.name: 0.95}, {ERROR.name: 1.0, SLOPE.name: 1.9})
     outcomes = (Outcome(a_case(1), Verdict.FAIL, "slope", found),)
-    made = Cell.of_row(Row("nts", one, Verdict.FAIL, None, planned=1, outcomes=outcomes))
+    made = Cell.from_row(Row("nts", one, Verdict.FAIL, None, planned=1, outcomes=outcomes))
     assert made.margins.tolist() == [2.0]  # 1.9 / 0.95, the quantity that must be at least its tolerance
     assert made.orders.tolist() == [0.95]
 
 
 def test_medians_and_worst_are_over_what_was_decided() -> None:
     made = cell(0.5, 0.25, 8.0, 4.0, 0.125, Verdict.UNDECIDED, Verdict.PASS)
-    assert (made.median, made.worst, made.judged) == (0.5, 8.0, 6)
+    assert (made.median, made.worst, made.row.judged) == (0.5, 8.0, 6)
     assert np.isnan(made.margins[[5, 6]]).all()
     assert made.standing[6] == 0.0  # it passes, without a number
     assert isnan(made.standing[5])
@@ -101,16 +111,16 @@ def test_a_failure_without_a_number_is_infinitely_far() -> None:
     assert cell(Verdict.CRASHED, Verdict.FAIL).margins.tolist() == [inf, inf]
     broken = Measurement({ERROR.name: 0.0}, {ERROR.name: TOLERANCE}, broken="changes its input")
     outcomes = (Outcome(a_case(1), Verdict.FAIL, "changes its input", broken),)
-    made = Cell.of_row(Row("nts", question(), Verdict.FAIL, None, planned=1, outcomes=outcomes))
+    made = Cell.from_row(Row("nts", question(), Verdict.FAIL, None, planned=1, outcomes=outcomes))
     assert made.margins.tolist() == [inf]
 
 
 def test_a_row_that_was_not_asked_is_an_empty_cell() -> None:
-    made = Cell.of_row(Row("nts", question(), Verdict.NOT_APPLICABLE, None, reason="no springs"))
+    made = Cell.from_row(Row("nts", question(), Verdict.NOT_APPLICABLE, None, reason="no springs"))
     assert isnan(made.median)
     assert isnan(made.worst)
     assert isnan(made.seconds)
-    assert Paired.of(made, made).n == 0
+    assert Paired.from_cells(made, made).n == 0
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -121,7 +131,7 @@ def test_pairs_are_counted_case_by_case() -> None:
     #                within  worse  better  both fail: near  worse  better  undecided        crash
     one = cell(0.25, 2.0, 0.5, 100.0, 100.0, 8.0, Verdict.UNDECIDED, Verdict.CRASHED)
     other = cell(0.75, 1.0, 2.0, 100.5, 10.0, 80.0, 4.0, Verdict.CRASHED)
-    found = Paired.of(one, other)
+    found = Paired.from_cells(one, other)
     assert (found.n, found.better, found.equal, found.worse) == (7, 2, 3, 2)
     assert found.apart.tolist() == [False, True, True, False, False, False, False, False]
     assert found.decades[[0, 3, 7]] == pytest.approx([0.0, np.log10(100 / 100.5), 0.0])
@@ -131,27 +141,28 @@ def test_pairs_are_counted_case_by_case() -> None:
 
 
 def test_the_ratio_is_the_median_of_ratios_on_the_same_cases() -> None:
-    assert Paired.of(cell(2.0, 8.0, 64.0), cell(1.0, 2.0, 8.0)).ratio == pytest.approx(4.0)
-    assert Paired.of(cell(0.0, 0.0), cell(0.0, 0.0)).ratio == 1.0
-    assert Paired.of(cell(0.5), cell(0.0)).ratio == 1.0  # within the tolerance all is roundoff
-    assert Paired.of(cell(40.0), cell(1e-6)).ratio == pytest.approx(40.0)
-    assert Paired.of(cell(Verdict.FAIL), cell(0.5)).ratio == inf
-    assert isnan(Paired.of(cell(Verdict.UNDECIDED), cell(1.0)).ratio)
+    assert Paired.from_cells(cell(2.0, 8.0, 64.0), cell(1.0, 2.0, 8.0)).ratio == pytest.approx(4.0)
+    assert Paired.from_cells(cell(0.0, 0.0), cell(0.0, 0.0)).ratio == 1.0
+    assert Paired.from_cells(cell(0.5), cell(0.0)).ratio == 1.0  # within the tolerance all is roundoff
+    assert Paired.from_cells(cell(40.0), cell(1e-6)).ratio == pytest.approx(40.0)
+    assert Paired.from_cells(cell(Verdict.FAIL), cell(0.5)).ratio == inf
+    assert isnan(Paired.from_cells(cell(Verdict.UNDECIDED), cell(1.0)).ratio)
 
 
 @pytest.mark.parametrize(("other", "counts"), [(100.0, (0, 1, 0)), (101.0, (0, 1, 0)), (101.5, (1, 0, 0))])
 def test_beyond_the_tolerance_one_tolerance_is_roundoff(other: float, counts: tuple[int, int, int]) -> None:
-    found = Paired.of(cell(100.0), cell(other))
+    found = Paired.from_cells(cell(100.0), cell(other))
     assert (found.better, found.equal, found.worse) == counts
 
 
 def test_the_mesh_to_draw_is_a_small_one_that_differs_much() -> None:
     sizes = np.array([40.0, 4.0, 2.0, 9.0])
     one = cell(1e12, 1e8, 10.0, 0.5)
-    assert Paired.of(one, cell(0.5, 0.5, 0.5, 0.5)).furthest(sizes) == 1  # 8 decades of 12; 1 decade is too few
+    assert Paired.from_cells(one, cell(0.5, 0.5, 0.5, 0.5)).furthest(sizes) == 1  # 8 decades of 12; 1 decade is too few
     # one passes and the other does not: before those where both fail, however far
-    assert Paired.of(one, cell(2.0, 2.0, 0.5, 0.5)).furthest(sizes) == 2
-    assert Paired.of(cell(0.1, 0.9), cell(0.9, 0.1)).furthest(sizes[:2]) is None  # within the tolerance nothing differs
+    assert Paired.from_cells(one, cell(2.0, 2.0, 0.5, 0.5)).furthest(sizes) == 2
+    # Within the tolerance nothing differs.
+    assert Paired.from_cells(cell(0.1, 0.9), cell(0.9, 0.1)).furthest(sizes[:2]) is None
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -169,11 +180,11 @@ def small_run() -> Run:
 
 def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     run = small_run()
-    found = Comparison.of(run, "vts-me")
+    found = Comparison.from_run(run, "vts-me")
     assert found.formulations == ("vts-me", "vts-ppt", "nts")
     assert found.unexpected == ()  # vts-me promised to pass, but it is the reference
-    assert not found.kept  # `mine` did not load
-    found = Comparison.of(run, "vts-ppt")
+    assert not found.promises_kept  # `mine` did not load
+    found = Comparison.from_run(run, "vts-ppt")
     assert [one.formulation for one in found.unexpected] == ["vts-me"]
     assert found.not_loaded == {"mine": "no module"}
     paired = found.paired["vts-me", "patch.flat.transmission"]
@@ -183,7 +194,7 @@ def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
 
 def test_the_mesh_that_is_drawn_is_the_small_one() -> None:
     run = small_run()
-    (one,) = differing(run, Comparison.of(run, "vts-ppt"))
+    (one,) = find_differing(run, Comparison.from_run(run, "vts-ppt"))
     assert (one.formulation, one.number, one.apart) == ("vts-me", 2, True)
     assert len(one.case.interface.slave) == 1
     assert (one.margin, one.reference_margin) == (32.0, 0.125)
@@ -205,7 +216,7 @@ def test_iterations_are_counted_where_both_converged() -> None:
         )
         for name, taken in solves.items()
     )
-    one, other = Comparison.of(Run(rows), "vts-ppt").iterations
+    one, other = Comparison.from_run(Run(rows), "vts-ppt").iterations
     assert (one.formulation, one.converged, one.solved, one.median, one.most) == ("vts-ppt", 3, 4, 3.0, 4.0)
     assert (other.converged, other.median, other.most) == (3, 4.0, 5.0)
     assert (other.fewer, other.same, other.more) == (0, 1, 1)
@@ -215,15 +226,15 @@ def test_the_reference_is_no_candidate() -> None:
     subject, *questions = load_formulation("nts"), *load_properties(["purity"])
     assert isinstance(subject, Subject)
     with pytest.raises(MisuseError, match="--against: found nts, which is compared too"):
-        compared(subject, [subject], questions)
+        run_comparison(subject, [subject], questions)
     with pytest.raises(MisuseError, match="NAME: found nothing"):
-        compared(subject, [], questions)
+        run_comparison(subject, [], questions)
 
 
 def test_all_are_asked_the_same_cases() -> None:
     subjects = [load_formulation(name) for name in ("vts-ppt", "vts-me")]
     assert isinstance(subjects[0], Subject)
-    study = compared(subjects[0], subjects[1:], load_properties(["patch.flat.transmission"]), examples=12, seed=1)
+    study = run_comparison(subjects[0], subjects[1:], load_properties(["patch.flat.transmission"]), examples=12, seed=1)
     ours, theirs = (found.outcomes for found in study.run.rows)
     assert [one.case for one in ours] == [other.case for other in theirs]
     assert study.differing[0].formulation == "vts-me"
@@ -253,7 +264,7 @@ class Raising:
 
 def test_cost_is_of_what_is_provided_and_a_failure_has_none() -> None:
     subjects = [Subject("counting", lambda penalty: Counting()), Subject("raising", lambda penalty: Raising())]
-    good, bad = measured(subjects, [state(4)], turns=3)
+    good, bad = measure_costs(subjects, [make_state(4)], turns=3)
     assert Counting.asked >= 4  # once to warm up
     assert good.n_segments == 4
     assert good.total == good.seconds["residual"] > 0
@@ -264,7 +275,7 @@ def test_cost_is_of_what_is_provided_and_a_failure_has_none() -> None:
 
 
 def test_the_shared_state_is_in_contact_everywhere() -> None:
-    case = state(16)
+    case = make_state(16)
     assert (len(case.interface.slave), len(case.interface.master)) == (16, 12)
     assert (case.positions[: case.interface.n_slave_nodes, 1] < 0).all()
     subject = load_formulation("vts-ppt")
@@ -280,7 +291,7 @@ def test_the_shared_state_is_in_contact_everywhere() -> None:
 
 def test_the_same_again_is_no_regression() -> None:
     one = cell(0.5, 1e12, Verdict.CRASHED, Verdict.UNDECIDED)
-    found = change(one, one, same_seed=True)
+    found = compare_rows(one, one, same_seed=True)
     assert found.paired is not None
     assert found.regressions == ()
 
@@ -301,15 +312,15 @@ def test_the_same_again_is_no_regression() -> None:
     ],
 )
 def test_a_verdict_that_got_worse(old: Verdict, new: Verdict, said: list[str]) -> None:
-    found = change(cell(verdict=old), cell(verdict=new), same_seed=True)
+    found = compare_rows(cell(verdict=old), cell(verdict=new), same_seed=True)
     assert list(found.regressions) == said
     assert found.better is (new is Verdict.PASS)
 
 
 def test_a_promise_that_is_not_kept_any_more() -> None:
-    old, new = cell(0.5, promise=False), cell(0.5, promise=False, unexpected="stated to fail, but passes")
-    assert change(old, new, same_seed=True).regressions == ("as promised → stated to fail, but passes",)
-    assert change(new, new, same_seed=True).regressions == ()
+    old, new = cell(0.5, promise=None), cell(0.5, promise=False)
+    assert compare_rows(old, new, same_seed=True).regressions == ("promises kept → stated to fail, but passes",)
+    assert compare_rows(new, new, same_seed=True).regressions == ()
 
 
 @pytest.mark.parametrize(
@@ -328,15 +339,15 @@ def test_a_promise_that_is_not_kept_any_more() -> None:
     ],
 )
 def test_an_error_more_than_doubles_and_two_tolerances(old: tuple[Any, ...], new: tuple[Any, ...], grew: bool) -> None:
-    before, after = (cell(*margins, verdict=Verdict.FAIL, unexpected="") for margins in (old, new))
-    found = change(before, after, same_seed=True).regressions
+    before, after = (cell(*margins, verdict=Verdict.FAIL) for margins in (old, new))
+    found = compare_rows(before, after, same_seed=True).regressions
     said = [words for words in found if "passed and fail now" not in words]
     assert bool(said) is grew
     assert all(words.startswith("error grew, in tolerances, on the same") for words in said)
 
 
 def test_a_case_that_passed_and_fails_is_named_in_a_row_that_failed_already() -> None:
-    found = change(cell(0.5, 0.5, 64.0), cell(0.5, 2.0, 64.0), same_seed=True)
+    found = compare_rows(cell(0.5, 0.5, 64.0), cell(0.5, 2.0, 64.0), same_seed=True)
     assert found.regressions == ("1 of 3 cases passed and fail now, the first is case 1",)
 
 
@@ -347,13 +358,13 @@ def test_cases_that_were_judged_and_are_undecided_now(n: int) -> None:
     for lost, regressed in ((some, False), (some + 1, True)):
         new = cell(*[Verdict.UNDECIDED] * lost, *[0.5] * (n - lost))
         said = (f"{lost} of the same {n} cases were judged and are undecided now",) * regressed
-        assert change(old, new, same_seed=True).regressions == said
-        assert change(new, old, same_seed=True).regressions == ()
+        assert compare_rows(old, new, same_seed=True).regressions == said
+        assert compare_rows(new, old, same_seed=True).regressions == ()
     back = cell(*[Verdict.UNDECIDED] * 2, *[0.5] * (n - 2))
     gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 2), *[0.5] * (n - some - 4))
-    assert change(back, gone, same_seed=True).regressions == ()  # noise goes both ways
+    assert compare_rows(back, gone, same_seed=True).regressions == ()  # noise goes both ways
     gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 3), *[0.5] * (n - some - 5))
-    (said_so,) = change(back, gone, same_seed=True).regressions
+    (said_so,) = compare_rows(back, gone, same_seed=True).regressions
     assert said_so.endswith("undecided now, 2 the other way round")
 
 
@@ -361,18 +372,21 @@ def test_cases_that_were_judged_and_are_undecided_now(n: int) -> None:
 def test_fewer_cases_at_the_same_seed_and_number_of_examples(left: int, regressed: bool) -> None:
     old, new = cell(*[0.5] * 60), cell(*[0.5] * left)
     said = (f"{left} cases, 60 before, at the same seed and number of examples",) * regressed
-    assert change(old, new, same_seed=True).regressions == said
-    assert change(new, old, same_seed=True).regressions == ()
-    assert change(old, new, same_seed=True, same_examples=False).regressions == ()
-    assert change(old, new, same_seed=False).regressions == ()
+    assert compare_rows(old, new, same_seed=True).regressions == said
+    assert compare_rows(new, old, same_seed=True).regressions == ()
+    assert compare_rows(old, new, same_seed=True, same_examples=False).regressions == ()
+    assert compare_rows(old, new, same_seed=False).regressions == ()
 
 
 def test_fewer_examples_are_no_fewer_cases() -> None:
     key = ("vts-me", "patch.flat.transmission")
     old, new = stored({key: cell(*[0.5] * 60)}), stored({key: cell(0.5, 0.5, 0.5)})
-    assert len(Changes.of(old, new).regressions) == 1  # neither says how many were asked
-    asked = [replace(one, provenance={"seed": "1", "examples": n}) for one, n in ((old, "60"), (new, "3"))]
-    assert Changes.of(*asked).regressions == ()
+    assert len(Changes.between(old, new).regressions) == 1  # neither says how many were asked
+    asked = [
+        replace(one, run=replace(one.run, provenance={"seed": "1", "examples": n}))
+        for one, n in ((old, "60"), (new, "3"))
+    ]
+    assert Changes.between(*asked).regressions == ()
 
 
 def solved(ends: list[End], taken: float = 3.0, what: str = "") -> Cell:
@@ -390,19 +404,19 @@ def test_solutions_that_converged_and_do_not_any_more(end: End, what: str) -> No
         new = solved([end] * lost + [End.CONVERGED] * (n - lost), what=what)
         kind = f"{n} solutions{' (high penalty)' if what else ''}"
         said = (f"{lost} of the same {kind} converged and do not any more",) * regressed
-        assert change(old, new, same_seed=True).regressions == said
-        assert change(new, old, same_seed=True).regressions == ()
+        assert compare_rows(old, new, same_seed=True).regressions == said
+        assert compare_rows(new, old, same_seed=True).regressions == ()
 
 
 def test_roundoff_takes_solutions_both_ways_and_one_that_was_not_kept_says_nothing() -> None:
     good, bad = End.CONVERGED, End.CYCLE
     old = solved([bad] * 20 + [good] * 40)
-    assert change(old, solved([good] * 20 + [bad] * 25 + [good] * 15), same_seed=True).regressions == ()
-    (said,) = change(old, solved([good] * 20 + [bad] * 26 + [good] * 14), same_seed=True).regressions
+    assert compare_rows(old, solved([good] * 20 + [bad] * 25 + [good] * 15), same_seed=True).regressions == ()
+    (said,) = compare_rows(old, solved([good] * 20 + [bad] * 26 + [good] * 14), same_seed=True).regressions
     assert said == "26 of the same 60 solutions converged and do not any more, 20 the other way round"
     untold = replace(old, details={"end": np.full(60, np.nan)})
-    assert change(old, untold, same_seed=True).regressions == ()
-    assert change(old, replace(old, details={}), same_seed=True).regressions == ()
+    assert compare_rows(old, untold, same_seed=True).regressions == ()
+    assert compare_rows(old, replace(old, details={}), same_seed=True).regressions == ()
 
 
 @pytest.mark.parametrize(
@@ -421,7 +435,7 @@ def test_roundoff_takes_solutions_both_ways_and_one_that_was_not_kept_says_nothi
 def test_an_error_that_leaps_within_its_tolerance_is_worth_a_look(
     old: tuple[float, ...], new: tuple[float, ...], said: list[str]
 ) -> None:
-    found = change(cell(*old), cell(*new), same_seed=True)
+    found = compare_rows(cell(*old), cell(*new), same_seed=True)
     assert [words.partition(" ")[0] for words in found.noteworthy] == said
     assert bool(found.regressions) is (new == (64.0,))
 
@@ -430,7 +444,7 @@ def test_an_error_that_leaps_within_its_tolerance_is_worth_a_look(
 def test_iterations_that_more_than_double_are_worth_a_look(taken: float, said: bool) -> None:
     ends = [End.CONVERGED] * 4
     for what in ("", ", high penalty"):
-        found = change(solved(ends, what=what), solved(ends, taken, what), same_seed=True)
+        found = compare_rows(solved(ends, what=what), solved(ends, taken, what), same_seed=True)
         words = f"Newton iterations{' (high penalty)' if what else ''}, median 3 → {taken:g}"
         assert (found.regressions, found.noteworthy) == ((), (words,) * said)
 
@@ -438,33 +452,33 @@ def test_iterations_that_more_than_double_are_worth_a_look(taken: float, said: b
 def test_a_row_is_one_regression_however_much_of_it_got_worse() -> None:
     key = ("vts-me", "patch.flat.transmission")
     old, new = cell(0.5, 0.5), cell(64.0, 64.0, details={"x": np.zeros(2)})
-    bad = Changes.of(stored({key: old}), stored({key: replace(new, verdict=Verdict.FAIL)}))
+    bad = Changes.between(stored({key: old}), stored({key: changed(new, verdict=Verdict.FAIL)}))
     assert len(bad.changes[0].regressions) == 2
     (line,) = bad.regressions
     assert line == f"vts-me, patch.flat.transmission: {'; '.join(bad.changes[0].regressions)}"
-    assert outcome_of(bad).plain.splitlines() == ["1 regression", f"  {line}"]
+    assert regressions_text(bad).plain.splitlines() == ["1 regression", f"  {line}"]
     assert "1 regression." in changes_page(bad, {})
 
 
 def test_what_is_worth_a_look_is_told_and_no_regression() -> None:
     key = ("vts-me", "patch.flat.transmission")
-    one = Changes.of(stored({key: cell(1e-6)}), stored({key: cell(0.5)}))
+    one = Changes.between(stored({key: cell(1e-6)}), stored({key: cell(0.5)}))
     line = "vts-me, patch.flat.transmission: median error grew within its tolerance, 1e-06 → 0.5 of it; worst"
     assert one.regressions == ()
-    told, last = outcome_of(one).plain.splitlines()
+    told, last = regressions_text(one).plain.splitlines()
     assert told.startswith(f"worth a look: {line}")
-    assert last == "nothing got worse"
+    assert last == "Nothing got worse."
     page = changes_page(one, {})
     assert "<h2>Worth a look</h2>" in page
     assert f"<li>{line}" in page
     assert "What got worse" not in page
-    same = Changes.of(stored({key: cell(0.5)}), stored({key: cell(0.5)}))
-    assert outcome_of(same).plain == "nothing got worse"
+    same = Changes.between(stored({key: cell(0.5)}), stored({key: cell(0.5)}))
+    assert regressions_text(same).plain == "Nothing got worse."
     assert "Worth a look" not in changes_page(same, {})
 
 
 def test_speed_is_told_and_never_a_regression() -> None:
-    found = change(cell(0.5), cell(0.5, seconds=25.0), same_seed=True)
+    found = compare_rows(cell(0.5), cell(0.5, seconds=25.0), same_seed=True)
     assert (found.slower, found.regressions) == (100.0, ())
 
 
@@ -475,11 +489,11 @@ def test_other_cases_are_compared_as_distributions() -> None:
     old = cell(*[10.0] * n)
     for worse, regressed in ((just, False), (beyond, True)):
         new = cell(*[10.0] * (n - worse), *[1000.0] * worse)
-        found = change(old, new, same_seed=False)
+        found = compare_rows(old, new, same_seed=False)
         assert found.paired is None
         assert bool(found.regressions) is regressed
-        assert change(new, old, same_seed=False).regressions == ()  # it got better
-    within = change(cell(*[0.01] * n), cell(*[0.99] * n), same_seed=False)
+        assert compare_rows(new, old, same_seed=False).regressions == ()  # it got better
+    within = compare_rows(cell(*[0.01] * n), cell(*[0.99] * n), same_seed=False)
     assert within.regressions == ()
 
 
@@ -495,14 +509,14 @@ def test_other_cases_are_compared_as_distributions() -> None:
 )
 def test_distributions_on_other_cases_know_the_same_factor(before: float, after: float, regressed: bool) -> None:
     old, new = cell(*[before] * 40), cell(*[after] * 40, verdict=cell(before).verdict)
-    assert bool(change(old, new, same_seed=False).regressions) is regressed
+    assert bool(compare_rows(old, new, same_seed=False).regressions) is regressed
 
 
 def test_cases_are_the_same_only_if_the_meshes_are() -> None:
     old, new = row("vts-me", 0.5, 2.0, sizes=[1, 2]), row("vts-me", 0.5, 9.0, sizes=[1, 3])
-    assert change(Cell.of_row(old), Cell.of_row(new), same_seed=True).paired is None
-    longer = Cell.of_row(row("vts-me", 0.5, 9.0, 64.0, sizes=[1, 2, 7]))
-    found = change(Cell.of_row(old), longer, same_seed=True).paired
+    assert compare_rows(Cell.from_row(old), Cell.from_row(new), same_seed=True).paired is None
+    longer = Cell.from_row(row("vts-me", 0.5, 9.0, 64.0, sizes=[1, 2, 7]))
+    found = compare_rows(Cell.from_row(old), longer, same_seed=True).paired
     assert found is not None
     assert found.n == 2  # the first ones
 
@@ -514,16 +528,19 @@ def test_the_distance_of_two_samples() -> None:
     assert shift(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 2.0, 5.0, 6.0])) == 0.5
 
 
-def stored(cells: dict[tuple[str, str], Cell], lost: dict[str, str] | None = None) -> StoredCells:
-    formulations, properties = (tuple(dict.fromkeys(key[k] for key in cells)) for k in (0, 1))
-    return StoredCells("r.nc", cells, formulations, properties, lost or {}, {"seed": "1"})
+def stored(cells: dict[tuple[str, str], Cell], lost: dict[str, str] | None = None) -> NamedRun:
+    """A report with these rows, {(formulation, property): cell}."""
+    renamed = {(name, id_): changed(one, formulation=name, info=question(id_)) for (name, id_), one in cells.items()}
+    not_loaded = tuple(NotLoaded(*item) for item in (lost or {}).items())
+    run = Run(tuple(one.row for one in renamed.values()), not_loaded, {}, {"seed": "1"})
+    return NamedRun("r.nc", run, renamed)
 
 
 def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> None:
     one = cell(0.5)
     old = stored({("nts", "purity"): one, ("vts-me", "purity"): one, ("nts", "scaling"): one})
     new = stored({("nts", "purity"): one, ("nts", "newton.order"): one}, {"vts-me": "no module", "other": "no module"})
-    found = Changes.of(old, new)
+    found = Changes.between(old, new)
     assert found.gone == ("vts-me", "scaling")
     assert found.added == ("newton.order",)
     assert found.lost == {"vts-me": "no module"}
@@ -531,47 +548,40 @@ def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> N
 
 
 def test_a_stored_report_gives_the_cells_of_its_run(tmp_path: Path) -> None:
-    rows: tuple[Row, ...] = (
-        row("vts-ppt", 0.5, 0.25, Verdict.UNDECIDED, promise=True, sizes=[3, 2, 1]),
-        row("vts-me:n=4", 64.0, 0.25, promise=False, sizes=[3, 2]),
-        Row("nts", question(), Verdict.NOT_PROVIDED, None, reason="pair: not provided"),
-    )
+    rows: tuple[Row, ...] = (row("vts-ppt", 0.5, 0.25, Verdict.UNDECIDED, promise=True, sizes=[3, 2, 1]),)
     order = question("newton.order", SLOPE)
     solved = Measurement({SLOPE.name: 2.0}, {SLOPE.name: 1.9}, details={"iterations": 3.0, "end": 0.0})
     outcomes = (Outcome(a_case(1), Verdict.PASS, "", solved), Outcome(a_case(2), Verdict.CRASHED, "exception: x"))
     rows += (Row("vts-ppt", order, Verdict.CRASHED, True, planned=2, outcomes=outcomes, reason="exception: x"),)
+    rows += (row("vts-me:n=4", 64.0, 0.25, promise=False, sizes=[3, 2]),)
+    rows += (Row("nts", question(), Verdict.NOT_PROVIDED, None, reason="pair: not provided"),)
     run = Run(rows, (NotLoaded("mine", "no module"),), {}, {"seed": "1", "command": "", "platform": "", "created": ""})
     write(run, tmp_path / "r.nc")
-    found = read_cells(tmp_path / "r.nc")
+    found = read_run(tmp_path / "r.nc")
     assert found.formulations == ("vts-ppt", "vts-me:n=4", "nts")
-    assert found.properties == ("patch.flat.transmission", "newton.order")
-    assert found.not_loaded == {"mine": "no module"}
-    assert found.provenance["seed"] == "1"
-    assert len(found.cells) == len(rows)
-    for made in map(Cell.of_row, rows):
-        read = found.cells[made.formulation, made.property_id]
-        for name in Cell.__slots__:
-            ours, theirs = getattr(made, name), getattr(read, name)
-            if name == "details":
-                assert ours.keys() == theirs.keys()
-                assert all(np.array_equal(ours[key], theirs[key], equal_nan=True) for key in ours)
-            elif isinstance(ours, np.ndarray):
-                assert np.array_equal(ours, theirs, equal_nan=True), name
-            else:
-                assert ours == theirs or (isnan(ours) and isnan(theirs)), name
-    assert Changes.of(found, found).regressions == ()
+    assert list(found.properties) == ["patch.flat.transmission", "newton.order"]
+    assert len(found.rows) == len(rows)
+    for ours, theirs in zip(map(Cell.from_row, rows), map(Cell.from_row, found.rows), strict=True):
+        assert ours.details.keys() == theirs.details.keys()
+        assert all(np.array_equal(ours.details[name], theirs.details[name], equal_nan=True) for name in ours.details)
+        for name in ("verdicts", "margins", "orders", "kinds"):
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name), equal_nan=True), name
+        assert ours.closest == theirs.closest
+        assert ours.seconds == theirs.seconds or (isnan(ours.seconds) and isnan(theirs.seconds))
+    again = NamedRun.from_run("r.nc", found)
+    assert Changes.between(again, again).regressions == ()
 
 
 def test_a_page_escapes_what_a_plugin_calls_itself() -> None:
     evil = "<script>alert(1)</script>"
-    bad = replace(cell(64.0), formulation=evil, unexpected=evil, reason=evil)
+    bad = cell(64.0, reason=evil)
     key = (evil, "patch.flat.transmission")
-    old, new = stored({key: replace(bad, verdict=Verdict.PASS, unexpected="")}), stored({key: bad}, {"nts": evil})
-    page = changes_page(Changes.of(old, new), {})
+    old, new = stored({key: changed(bad, verdict=Verdict.PASS)}), stored({key: bad}, {"nts": evil})
+    page = changes_page(Changes.between(old, new), {})
     assert "<script" not in page
     assert "&lt;script&gt;" in page
     run = replace(small_run(), not_loaded=(NotLoaded(evil, evil),))
-    comparison = Comparison.of(run, "vts-ppt")
+    comparison = Comparison.from_run(run, "vts-ppt")
     page = comparison_page(comparison, (), (), ())
     assert "<script" not in page
     assert page == comparison_page(comparison, (), (), ())

@@ -1,10 +1,11 @@
-"""Candidates beside a reference: the cells of a run, Newton's iterations, cost, and the meshes that tell most.
+"""A comparison of candidates with a reference: the cells of a run, Newton's iterations, and the cost.
 
-Numbers alone, for a terminal and for a page: nothing is judged, solved or timed here.
+Rule for the next editor: numbers alone, for a terminal and for a page. Nothing is judged, solved or timed here.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
@@ -13,36 +14,38 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Outcome, Property
+from contactverif.contract.property import Outcome, PropertyInfo
 from contactverif.contract.result import Run
 from contactverif_reports.compare.cells import Cell, Paired
 
-ITERATIONS, END = "iterations", "end"  # the details in which a property that solves says how it went
-PARTS = ("pair", "residual", "tangent")  # of an evaluation, as it is timed
-CONVERGED = 0.0  # the code of an end that is one
+ITERATIONS, END = "iterations", "end"  # The details in which a property that solves says how Newton's method went.
+PARTS = ("pair", "residual", "tangent")  # The parts of an evaluation that are timed.
+CONVERGED = 0.0  # The code of an end that is a solution.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Iterations:
-    """How many Newton iterations a formulation took where a property solved.
+    """The Newton iterations of a formulation, where a property solved.
 
     Attributes
     ----------
-    what : str
-        Empty, or which of several solutions of a case.
+    formulation, property_id : str
+        The names on the command line.
+    solution : str
+        The name of the solution if a case has several ("high penalty"), else empty.
     solved, converged : int
         Numbers of cases.
     median, most : float
-        Of the iterations of those that converged; NaN where none did.
+        Median and largest number of iterations of those that converged; NaN where none did.
     fewer, same, more : int
-        Numbers of cases, of those where the reference converged too, against it.
+        Numbers of cases against the reference, of those where the reference converged too.
     order : float
         Median order of one step, NaN where it was not measured.
     """
 
     formulation: str
     property_id: str
-    what: str
+    solution: str
     solved: int
     converged: int
     median: float
@@ -54,8 +57,8 @@ class Iterations:
 
     @property
     def title(self) -> str:
-        """The property, and which of its solutions."""
-        return f"{self.property_id}, {self.what}" if self.what else self.property_id
+        """The property, and the solution if there are several."""
+        return f"{self.property_id}, {self.solution}" if self.solution else self.property_id
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,21 +68,21 @@ class Comparison:
     Attributes
     ----------
     reference : str
-        The formulation that the others are held against.
+        The formulation that the candidates are compared with.
     formulations : tuple[str, ...]
         All of them, the reference first.
     properties : tuple[str, ...]
         Ids, in the order of the run.
     cells : Mapping[tuple[str, str], Cell]
-        By (formulation, property).
+        {(formulation, property): numbers}.
     paired : Mapping[tuple[str, str], Paired]
-        By (candidate, property), where both decided some case.
+        {(candidate, property): comparison}, where both decided some case.
     iterations : tuple[Iterations, ...]
-        Of Newton's method, property by property.
+        Newton's iterations, property by property.
     not_loaded : Mapping[str, str]
-        {name: reason} of what could not be asked.
+        {name: reason} of plugins that did not load.
     provenance : Mapping[str, str]
-        Of the run.
+        Where the run comes from.
     """
 
     reference: str
@@ -92,53 +95,56 @@ class Comparison:
     provenance: Mapping[str, str]
 
     @classmethod
-    def of(cls, run: Run, reference: str) -> Comparison:
-        """Of a live run that asked the reference too."""
-        cells = {(row.formulation, row.question.id): Cell.of_row(row) for row in run.rows}
-        named = dict.fromkeys(row.formulation for row in run.rows)
-        formulations = (reference, *(name for name in named if name != reference))
-        properties = tuple(dict.fromkeys(row.question.id for row in run.rows))
+    def from_run(cls, run: Run, reference: str) -> Comparison:
+        """Compare the formulations of a run with one of them."""
+        cells = {key: Cell.from_row(row) for key, row in run.row_of.items()}
+        candidates = [name for name in dict.fromkeys(name for name, _ in cells) if name != reference]
+        formulations, properties = (reference, *candidates), tuple(run.properties)
         pairs = {
-            (name, id_): Paired.of(cells[name, id_], cells[reference, id_])
-            for name in formulations[1:]
+            (name, id_): Paired.from_cells(cells[name, id_], cells[reference, id_])
+            for name in candidates
             for id_ in properties
+            if (name, id_) in cells and (reference, id_) in cells
         }
+        lines = [
+            count_iterations([cells[name, id_] for name in formulations if (name, id_) in cells]) for id_ in properties
+        ]
         return cls(
             reference=reference,
             formulations=formulations,
             properties=properties,
             cells=cells,
-            paired={key: found for key, found in pairs.items() if found.n},
-            iterations=tuple(
-                line for id_ in properties for line in iterations([cells[name, id_] for name in formulations])
-            ),
+            paired={key: pair for key, pair in pairs.items() if pair.n},
+            iterations=tuple(itertools.chain.from_iterable(lines)),
             not_loaded={item.formulation: item.reason for item in run.not_loaded},
             provenance=run.provenance,
         )
 
     @property
     def unexpected(self) -> tuple[Cell, ...]:
-        """What candidates promised otherwise, or could not be judged on; the reference is not on trial."""
+        """The cells in which a candidate breaks a promise or was not judged; the reference is not on trial."""
         return tuple(cell for (name, _), cell in self.cells.items() if name != self.reference and cell.unexpected)
 
     @property
-    def kept(self) -> bool:
-        """Whether every candidate was asked something and keeps all that it promises."""
+    def promises_kept(self) -> bool:
+        """Whether every candidate was checked and keeps all that it promises."""
         return not self.unexpected and not self.not_loaded and len(self.formulations) > 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cost:
-    """Seconds of one evaluation on one state, the fastest of the turns; NaN for a part that is not provided.
+    """The time of one evaluation on one state, the fastest of the turns.
 
     Attributes
     ----------
+    formulation : str
+        The name on the command line.
     n_segments : int
-        Of the slave.
+        The number of slave segments.
     seconds : dict[str, float]
-        {"pair", "residual", "tangent"}.
+        {"pair", "residual", "tangent"}; NaN for a part that is not provided.
     failed : str
-        Empty, or why it could not be timed.
+        The reason why it could not be timed; empty if it was.
     """
 
     formulation: str
@@ -148,9 +154,9 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """Of all parts that are provided; NaN where nothing could be timed."""
-        told = [value for value in self.seconds.values() if value == value]
-        return sum(told) if told else nan
+        """The sum over all parts that are provided; NaN where nothing could be timed."""
+        seconds = [value for value in self.seconds.values() if value == value]
+        return sum(seconds) if seconds else nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,24 +165,24 @@ class Differing:
 
     Attributes
     ----------
-    question : Property
+    info : PropertyInfo
         The property.
     formulation : str
         The candidate.
     number : int
-        Of the case in the run.
+        The number of the case in the run.
     apart : bool
         One passes and the other does not.
     decades : float
-        Powers of ten beyond the tolerance that the candidate is further than the reference; negative where the
+        Powers of ten that the candidate is further beyond the tolerance than the reference; negative where the
         reference is further.
     margin, reference_margin : float
-        How far each went, over its tolerance.
+        The error of each over its tolerance.
     outcome, reference_outcome : Outcome
-        Of the case.
+        The verdict on each, with its numbers.
     """
 
-    question: Property
+    info: PropertyInfo
     formulation: str
     number: int
     apart: bool
@@ -192,51 +198,51 @@ class Differing:
         return self.outcome.case
 
 
-def iterations(cells: Sequence[Cell]) -> list[Iterations]:
-    """A line for each solution that the property keeps and each formulation; the first cell is the reference's."""
-    found = []
-    names = dict.fromkeys(
-        name for cell in cells for name in cell.details if name == ITERATIONS or name.startswith(f"{ITERATIONS}, ")
+def count_iterations(cells: Sequence[Cell]) -> list[Iterations]:
+    """Count Newton's iterations over the rows of one property, one line for each solution and formulation.
+
+    Parameters
+    ----------
+    cells : Sequence[Cell]
+        The rows, the reference first.
+
+    Returns
+    -------
+    list[Iterations]
+        A line for each solution that the property keeps and each formulation that has it.
+    """
+    names = sorted({name for cell in cells for name in cell.details if name.partition(", ")[0] == ITERATIONS})
+    return [
+        _iterations(cell, name, _converged(cells[0], name)) for name in names for cell in cells if name in cell.details
+    ]
+
+
+def _iterations(cell: Cell, name: str, reference: FloatArray) -> Iterations:
+    counts = _converged(cell, name)
+    converged = counts[~np.isnan(counts)]
+    n_both = min(len(counts), len(reference))
+    with np.errstate(invalid="ignore"):  # A comparison with NaN is False, as it should be.
+        against = np.sign(counts[:n_both] - reference[:n_both])
+    return Iterations(
+        formulation=cell.formulation,
+        property_id=cell.property_id,
+        solution=name.partition(", ")[2],
+        solved=int((~np.isnan(cell.details[name])).sum()),
+        converged=len(converged),
+        median=float(np.median(converged)) if len(converged) else nan,
+        most=float(converged.max()) if len(converged) else nan,
+        fewer=int((against < 0).sum()),
+        same=int((against == 0).sum()),
+        more=int((against > 0).sum()),
+        order=float(np.nanmedian(cell.orders)) if np.isfinite(cell.orders).any() else nan,
     )
-    orders = {cell.formulation: float(np.nanmedian(cell.orders)) for cell in cells if np.isfinite(cell.orders).any()}
-    for name in names:
-        _, _, what = name.partition(", ")
-        reference = _converged(cells[0], name)
-        for cell in cells:
-            own = _converged(cell, name)
-            if own is None:
-                continue
-            done = own[~np.isnan(own)]
-            n_both = min(len(own), 0 if reference is None else len(reference))
-            with np.errstate(invalid="ignore"):  # NaN compares as False
-                against = np.sign(own[:n_both] - reference[:n_both]) if reference is not None else np.zeros(0)
-            solved = int((~np.isnan(cell.details[name])).sum())
-            median, most = (float(np.median(done)), float(done.max())) if len(done) else (nan, nan)
-            fewer, same, more = (int((against == sign).sum()) for sign in (-1, 0, 1))
-            order = orders.get(cell.formulation, nan)
-            found.append(
-                Iterations(
-                    formulation=cell.formulation,
-                    property_id=cell.property_id,
-                    what=what,
-                    solved=solved,
-                    converged=len(done),
-                    median=median,
-                    most=most,
-                    fewer=fewer,
-                    same=same,
-                    more=more,
-                    order=order,
-                )
-            )
-    return found
 
 
-def _converged(cell: Cell, name: str) -> FloatArray | None:
-    """(n_cases,) iterations of the cases that converged, NaN of the others; None where the property kept none."""
+def _converged(cell: Cell, name: str) -> FloatArray:
+    """Return the iterations of the cases that converged, NaN for the others; empty where the property keeps none."""
     if name not in cell.details:
-        return None
-    taken = cell.details[name]
+        return np.zeros(0)
+    counts = cell.details[name]
     end = cell.details.get(name.replace(ITERATIONS, END, 1))
-    found: FloatArray = taken if end is None else np.where(end == CONVERGED, taken, nan)
-    return found
+    converged: FloatArray = counts if end is None else np.where(end == CONVERGED, counts, nan)
+    return converged

@@ -1,22 +1,22 @@
-"""What got worse from an old report to a new one, by rules with a formula: no clock and no noise has a say in it.
+"""The regressions from an old report to a new one, by rules with a formula: no clock and no noise decides.
 
-A row (formulation × property) has regressed where
+A row (formulation × property) has regressed if one of these holds:
 
-- it passed and does not any more, or it crashes and did not;
-- a promise that was kept, or a property that was judged, is not any more (`unexpected`);
-- on the same cases, one that passed fails;
-- on the same cases, the median or the worst margin m = value/tolerance is above 1 and m_new > 2 m_old + 2: a tolerance
+- It passed and does not any more, or it crashes and did not.
+- A promise that was kept, or a property that was judged, is not any more (`unexpected`).
+- On the same cases, one that passed fails.
+- On the same cases, the median or the worst margin m = value/tolerance is above 1 and m_new > 2 m_old + 2. A tolerance
   is what roundoff may do to a number, and each of the two may be off by one. Far beyond it, where a solution fails,
-  roundoff decides which of its iterates is judged: a factor of two between them is no news;
-- on the same cases, those that were judged and are undecided now outnumber those the other way round by more than
-  max(1, 1 %): roundoff may take a case across a limit of what can be decided, either way, but few lie at one;
-- likewise solutions that converged and do not any more, by more than 2 + 5 %: whether an active set that wanders comes
-  to rest is chaotic too. ±1 ulp in the residual was seen to cost 5 of 150;
-- with the same seed and number of examples it has fewer cases, by more than max(1, 1 %), which no roundoff does;
-- on different cases, which are two samples of one population, the new margins lie higher than chance allows: of
-  max(m, 1) the empirical distributions F satisfy max (F_old − F_new) > √(½ ln(1/α) (1/n_old + 1/n_new) / s), the
-  one-sided test of Smirnov at the level α = 1e-6, s the share of a run's cases that are independent: hypothesis varies
-  what it drew before. Noise of failures is in both samples and shifts neither. But the test sees ranks, so that it
+  roundoff decides which of its iterates is judged, so a factor of two between them is no news.
+- On the same cases, those that were judged and are undecided now outnumber those the other way round by more than
+  max(1, 1 %). Roundoff may take a case across a limit of what can be decided, either way, but few lie at one.
+- Likewise solutions that converged and do not any more, by more than 2 + 5 %. Whether an active set that wanders comes
+  to rest is chaotic too: ±1 ulp in the residual was seen to cost 5 of 150.
+- With the same seed and number of examples it has fewer cases, by more than max(1, 1 %), which no roundoff does.
+- On different cases, which are two samples of one population, the new margins lie higher than chance allows. The
+  empirical distributions F of max(m, 1) then satisfy max (F_old − F_new) > √(½ ln(1/α) (1/n_old + 1/n_new) / s), the
+  one-sided test of Smirnov at the level α = 1e-6. The share s of a run's cases is independent: hypothesis varies what
+  it drew before. Failures occur in both samples, so they do not bias the comparison. The test sees ranks, so that it
   takes a change of 1 % for news where all margins are alike: an old m > 1 enters as 2 m + 2 here too. Within the
   tolerance nothing is compared.
 """
@@ -32,16 +32,18 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.property import Verdict
+from contactverif.contract.result import Run
 from contactverif_reports.compare.cells import Cell, Paired, statistics
 from contactverif_reports.compare.comparison import CONVERGED, END, Iterations
-from contactverif_reports.compare.noteworthy import noteworthy, solves
-from contactverif_reports.netcdf.stored_cells import StoredCells
+from contactverif_reports.compare.noteworthy import noteworthy_changes, paired_iterations
 
-ALPHA = 1e-6  # false alarms per row on different cases
-INDEPENDENT = 0.5  # of the cases: so far apart do runs of one code lie at other seeds, at 90 % and 99 % of 1100 pairs
-REASON = 100  # characters of a reason
-FACTOR = 2.0  # between two margins beyond the tolerance that is no news
-ROUNDOFFS = 2.0  # tolerances by which two right margins may differ
+ALPHA = 1e-6  # The rate of false alarms per row on different cases.
+# The share of the cases that is independent: runs of one code with other seeds lie so far apart, at 90 % and 99 % of
+# 1100 pairs.
+INDEPENDENT_SHARE = 0.5
+REASON_LENGTH = 100  # The number of characters of a reason that are printed.
+FACTOR = 2.0  # The factor between two margins beyond the tolerance that is no news.
+ROUNDOFFS = 2.0  # The number of tolerances by which two right margins may differ.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +53,13 @@ class Change:
     Attributes
     ----------
     old, new : Cell
-        What was found.
+        The numbers of both rows.
     paired : Paired | None
         The new beside the old, case by case; None where the cases are not the same.
     regressions : tuple[str, ...]
-        In words; empty where nothing got worse.
+        What got worse, in words; empty where nothing did.
     noteworthy : tuple[str, ...]
-        In words, what is worth a look and no regression.
+        What is worth a look and no regression, in words.
     """
 
     old: Cell
@@ -68,13 +70,42 @@ class Change:
 
     @property
     def better(self) -> bool:
-        """Whether it passes now, and did not."""
+        """Whether the row passes now, and did not."""
         return self.new.verdict is Verdict.PASS and self.old.verdict is not Verdict.PASS
 
     @property
     def slower(self) -> float:
-        """Median seconds of a case, new over old; NaN where nothing was judged. Of a clock, so judged by nobody."""
+        """Median seconds of a case, new over old; NaN where nothing was judged. It decides nothing."""
         return self.new.seconds / self.old.seconds if self.old.seconds > 0 else nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NamedRun:
+    """A run with the name of its report and its numbers by case.
+
+    Attributes
+    ----------
+    path : str
+        The report as the caller wrote it.
+    run : Run
+        The run that it stores.
+    cells : Mapping[tuple[str, str], Cell]
+        {(formulation, property): numbers}.
+    """
+
+    path: str
+    run: Run
+    cells: Mapping[tuple[str, str], Cell]
+
+    @classmethod
+    def from_run(cls, path: str, run: Run) -> NamedRun:
+        """Collect the numbers of a run."""
+        return cls(path, run, {key: Cell.from_row(row) for key, row in run.row_of.items()})
+
+    @property
+    def not_loaded(self) -> dict[str, str]:
+        """The plugins that did not load, {name: reason}."""
+        return {item.formulation: item.reason for item in self.run.not_loaded}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,16 +114,18 @@ class Changes:
 
     Attributes
     ----------
+    old, new : NamedRun
+        The runs.
     changes : tuple[Change, ...]
-        Rows that both have.
+        The rows that both have.
     gone, added : tuple[str, ...]
-        What only the old, only the new report asked: names of formulations, ids of properties, or rows.
+        What only the old, only the new report has: names of formulations, ids of properties, or rows.
     lost : Mapping[str, str]
-        {name: reason} of what the old report asked, and the new one could not load.
+        {name: reason} of what the old report has, and the new one could not load.
     """
 
-    old: StoredCells
-    new: StoredCells
+    old: NamedRun
+    new: NamedRun
     changes: tuple[Change, ...]
     gone: tuple[str, ...]
     added: tuple[str, ...]
@@ -100,32 +133,34 @@ class Changes:
 
     @property
     def regressions(self) -> tuple[str, ...]:
-        """All that got worse: a line for each row, and for what was lost."""
-        found = [_line(change, change.regressions) for change in self.changes if change.regressions]
-        return (*found, *(f"{name}: not loaded any more: {reason}" for name, reason in self.lost.items()))
+        """All that got worse: a line for each row, and for each plugin that was lost."""
+        lines = [_line(change, change.regressions) for change in self.changes if change.regressions]
+        return (*lines, *(f"{name}: not loaded any more: {reason}" for name, reason in self.lost.items()))
 
     @property
     def noteworthy(self) -> tuple[str, ...]:
-        """What is worth a look though it did not get worse: a line for each row."""
+        """All that is worth a look though it did not get worse: a line for each row."""
         return tuple(_line(change, change.noteworthy) for change in self.changes if change.noteworthy)
 
     @property
     def iterations(self) -> tuple[tuple[Iterations, Iterations], ...]:
-        """Newton iterations, (old, new), on the same cases and not as they were."""
+        """Newton iterations (old, new) that changed, on the same cases."""
         paired = [change for change in self.changes if change.paired is not None]
-        return tuple(lines for change in paired for lines in solves(change.old, change.new) if _moved(*lines))
+        return tuple(
+            lines for change in paired for lines in paired_iterations(change.old, change.new) if _moved(*lines)
+        )
 
     @classmethod
-    def of(cls, old: StoredCells, new: StoredCells) -> Changes:
-        """The rows that both reports have; none, if they have nothing in common."""
+    def between(cls, old: NamedRun, new: NamedRun) -> Changes:
+        """Compare the rows that both runs have; none if they have nothing in common."""
         same_seed, same_examples = (
-            old.provenance.get(name) == new.provenance.get(name) for name in ("seed", "examples")
+            old.run.provenance.get(name) == new.run.provenance.get(name) for name in ("seed", "examples")
         )
         return cls(
             old=old,
             new=new,
             changes=tuple(
-                change(cell, new.cells[key], same_seed=same_seed, same_examples=same_examples)
+                compare_rows(cell, new.cells[key], same_seed=same_seed, same_examples=same_examples)
                 for key, cell in old.cells.items()
                 if key in new.cells
             ),
@@ -134,87 +169,97 @@ class Changes:
             lost={
                 name: reason
                 for name, reason in new.not_loaded.items()
-                if name in (*old.formulations, *old.properties) and name not in old.not_loaded
+                if name in (*old.run.formulations, *old.run.properties) and name not in old.not_loaded
             },
         )
 
 
-def change(old: Cell, new: Cell, *, same_seed: bool, same_examples: bool = True) -> Change:
-    """One row, before and after, with all that got worse."""
-    paired = Paired.of(new, old) if same_seed and same_cases(old, new) else None
-    found = [*_verdicts(old, new)]
+def compare_rows(old: Cell, new: Cell, *, same_seed: bool, same_examples: bool = True) -> Change:
+    """Compare one row, before and after.
+
+    Parameters
+    ----------
+    old, new : Cell
+        The row in both reports.
+    same_seed, same_examples : bool
+        The reports have the same seed, and the same number of examples.
+
+    Returns
+    -------
+    Change
+        The two, with all that got worse.
+    """
+    paired = Paired.from_cells(new, old) if same_seed and same_cases(old, new) else None
+    lines = [*_verdicts(old, new)]
     n_old, n_new = len(old.verdicts), len(new.verdicts)
     if same_seed and same_examples and n_old - n_new > few(n_old):
-        found.append(f"{n_new} cases, {n_old} before, at the same seed and number of examples")
+        lines.append(f"{n_new} cases, {n_old} before, at the same seed and number of examples")
     if paired is None:
-        return Change(old, new, None, (*found, *_on_others(old, new)))
-    found += [*_on_the_same(old, new, paired), *_fewer(old, new)]
-    return Change(old, new, paired, tuple(found), tuple(noteworthy(old, new)))
+        return Change(old, new, None, (*lines, *_on_others(old, new)))
+    lines += [*_on_the_same(old, new, paired), *_fewer(old, new)]
+    return Change(old, new, paired, tuple(lines), tuple(noteworthy_changes(old, new)))
 
 
 def few(n_cases: int) -> float:
-    """Cases that roundoff may leave undecided."""
+    """Return the number of cases that roundoff may leave undecided."""
     return max(1.0, 0.01 * n_cases)
 
 
 def wandering(n_cases: int) -> float:
-    """Solutions that roundoff may keep from converging."""
+    """Return the number of solutions that roundoff may keep from converging."""
     return 2 + 0.05 * n_cases
 
 
 def same_cases(old: Cell, new: Cell) -> bool:
-    """Whether the cases of the shorter row are the first ones of the longer row, told by what is stored of each."""
+    """Return whether the cases of the shorter row are the first of the longer one, by their summaries."""
     n = min(len(old.kinds), len(new.kinds))
     return bool(np.array_equal(old.kinds[:n], new.kinds[:n], equal_nan=True))
 
 
 def _verdicts(old: Cell, new: Cell) -> Sequence[str]:
-    found = []
-    passed, crashes = Verdict.PASS, Verdict.CRASHED
-    if new.verdict is not old.verdict and (old.verdict is passed or new.verdict is crashes):
-        why = f" ({shorten(new.reason, REASON, placeholder=' …')})" if new.reason else ""
-        found.append(f"{old.verdict} → {new.verdict}{why}")
-    elif new.unexpected and not old.unexpected:
-        found.append(f"as promised → {new.unexpected}")
-    return found
+    if new.verdict is not old.verdict and (old.verdict is Verdict.PASS or new.verdict is Verdict.CRASHED):
+        reason = new.row.reason
+        why = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
+        return [f"{old.verdict} → {new.verdict}{why}"]
+    if new.unexpected and not old.unexpected:
+        return [f"promises kept → {new.unexpected}"]
+    return []
 
 
 def _on_the_same(old: Cell, new: Cell, paired: Paired) -> Sequence[str]:
     n = len(paired.decades)
     fails_now = paired.apart & (new.standing[:n] > 1)
-    found = []
+    lines = []
     if fails_now.any() and old.verdict is not Verdict.PASS:
         first = int(np.flatnonzero(fails_now)[0])
-        found.append(f"{int(fails_now.sum())} of {paired.n} cases passed and fail now, the first is case {first}")
+        lines.append(f"{int(fails_now.sum())} of {paired.n} cases passed and fail now, the first is case {first}")
     grew = [
         f"{name} {m_old:.3g} → {m_new:.3g}"
         for name, m_old, m_new in statistics(old, new)
         if m_new > 1 and m_new > FACTOR * m_old + ROUNDOFFS
     ]
     if grew:
-        found.append(f"error grew, in tolerances, on the same {paired.n} cases: {', '.join(grew)}")
-    return found
+        lines.append(f"error grew, in tolerances, on the same {paired.n} cases: {', '.join(grew)}")
+    return lines
 
 
 def _fewer(old: Cell, new: Cell) -> Sequence[str]:
-    """Cases that were judged, or converged, and are or do not any more."""
+    """Return a line if fewer cases are judged, and one for each solution that converges less often."""
     n = min(len(old.verdicts), len(new.verdicts))
-    found = []
+    lines = []
     lost, back = _exchanged(old.decided[:n], new.decided[:n])
     if lost - back > few(n):
-        found.append(f"{lost} of the same {n} cases were judged and are undecided now{_back(back)}")
-    for name in old.details.keys() & new.details.keys():
-        kind, _, what = name.partition(", ")
-        if kind != END:
-            continue
+        lines.append(f"{lost} of the same {n} cases were judged and are undecided now{_back(back)}")
+    ends = [name for name in old.details if name in new.details and name.partition(", ")[0] == END]
+    for name in ends:
         before, after = old.details[name][:n], new.details[name][:n]
-        told = ~(np.isnan(before) | np.isnan(after))
-        lost, back = _exchanged(told & (before == CONVERGED), told & (after == CONVERGED))
-        n_told = int(told.sum())
-        if lost - back > wandering(n_told):
-            solutions = f"{n_told} solutions{f' ({what})' if what else ''}"
-            found.append(f"{lost} of the same {solutions} converged and do not any more{_back(back)}")
-    return found
+        both = ~(np.isnan(before) | np.isnan(after))
+        lost, back = _exchanged(both & (before == CONVERGED), both & (after == CONVERGED))
+        n_both, solution = int(both.sum()), name.partition(", ")[2]
+        if lost - back > wandering(n_both):
+            solutions = f"{n_both} solutions{f' ({solution})' if solution else ''}"
+            lines.append(f"{lost} of the same {solutions} converged and do not any more{_back(back)}")
+    return lines
 
 
 def _exchanged(before: BoolArray, after: BoolArray) -> tuple[int, int]:
@@ -230,16 +275,16 @@ def _on_others(old: Cell, new: Cell) -> Sequence[str]:
     if not (len(before) and len(after)):
         return []
     higher = shift(np.where(before > 1, FACTOR * before + ROUNDOFFS, 1.0), after)
-    by_chance = sqrt(0.5 * log(1 / ALPHA) * (1 / len(before) + 1 / len(after)) / INDEPENDENT)
+    by_chance = sqrt(0.5 * log(1 / ALPHA) * (1 / len(before) + 1 / len(after)) / INDEPENDENT_SHARE)
     if higher <= by_chance:
         return []
     return [f"errors grew on other cases: distributions {higher:.2f} apart, chance allows {by_chance:.2f}"]
 
 
 def shift(before: FloatArray, after: FloatArray) -> float:
-    """Smirnov's one-sided distance max (F_before − F_after) of two samples (n,): how much higher `after` lies."""
-    at = np.unique(np.concatenate([before, after]))
-    counts = [np.searchsorted(np.sort(sample), at, side="right") / len(sample) for sample in (before, after)]
+    """Return Smirnov's one-sided distance max (F_before − F_after) of two samples (n,): how much higher `after` is."""
+    places = np.unique(np.concatenate([before, after]))
+    counts = [np.searchsorted(np.sort(sample), places, side="right") / len(sample) for sample in (before, after)]
     return float(np.max(counts[0] - counts[1], initial=0.0))
 
 
@@ -251,13 +296,13 @@ def _moved(old: Iterations, new: Iterations) -> bool:
     return bool(new.fewer or new.more or old.converged != new.converged)
 
 
-def _only(one: StoredCells, other: StoredCells) -> tuple[str, ...]:
-    """What the other did not ask; a formulation or property that it does not have at all is named once."""
-    formulations = [name for name in one.formulations if name not in other.formulations]
-    properties = [name for name in one.properties if name not in other.properties]
+def _only(first: NamedRun, second: NamedRun) -> tuple[str, ...]:
+    """Return what only the first has; a formulation or property that the second does not have is named once."""
+    formulations = [name for name in first.run.formulations if name not in second.run.formulations]
+    properties = [name for name in first.run.properties if name not in second.run.properties]
     rows = [
         f"{formulation}, {id_}"
-        for formulation, id_ in one.cells
-        if formulation not in formulations and id_ not in properties and (formulation, id_) not in other.cells
+        for formulation, id_ in first.cells
+        if formulation not in formulations and id_ not in properties and (formulation, id_) not in second.cells
     ]
     return (*formulations, *properties, *rows)

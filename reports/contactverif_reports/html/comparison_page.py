@@ -11,29 +11,29 @@ from markupsafe import Markup
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Counterexample
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import PARTS, Comparison, Cost, Differing
 from contactverif_reports.compare.regression import Change, Changes
 from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
-from contactverif_reports.netcdf.read import StoredCase
 
-_ABOUT = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "platform")
-_INCHES = 5.6  # wide; two stand side by side on a wide page
-_LEGEND = 7  # points: its four entries, with forces, are else wider than the figure
+_FACTS = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "platform")
+_FIGURE_WIDTH = 5.6  # The width of a figure in inches; two stand side by side on a wide page.
+_LEGEND_SIZE = 7  # The size of the legend's letters in points; with larger ones it is wider than the figure.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """What a picture of a differing case needs; whoever gives none of it is drawn without.
+    """The arrays that a picture of a differing case needs; without any of them the mesh alone is drawn.
 
     Attributes
     ----------
-    candidate, reference : FloatArray | None
-        Nodal forces (n_nodes, 2) that they find.
-    exact : FloatArray | None
-        The exact ones.
+    candidate, reference : FloatArray | None, shape (n_nodes, 2)
+        The nodal forces that each of them gives.
+    exact : FloatArray | None, shape (n_nodes, 2)
+        The exact nodal forces.
     solved : SolvedScene | None
         A case with bodies, solved by both; it is drawn instead of the forces at its first guess.
     """
@@ -45,49 +45,77 @@ class Drawing:
 
 
 def comparison_page(
-    found: Comparison, differing: Sequence[Differing], drawings: Sequence[Drawing], costs: Sequence[Cost]
+    comparison: Comparison, differing: Sequence[Differing], drawings: Sequence[Drawing], costs: Sequence[Cost]
 ) -> str:
-    """The page of formulations against a reference; `drawings` belong to `differing`, one each."""
-    axis = Axis.of(cell.margins for cell in found.cells.values())
-    asked = [id_ for id_ in found.properties if any((name, id_) in found.cells for name in found.formulations)]
+    """Return the page of formulations against a reference.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        The numbers side by side.
+    differing : Sequence[Differing]
+        The meshes on which they differ most.
+    drawings : Sequence[Drawing]
+        The arrays to draw on those meshes, one entry each.
+    costs : Sequence[Cost]
+        The times of an evaluation.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file.
+    """
+    axis = Axis.of(cell.margins for cell in comparison.cells.values())
     return render(
         "compare.html.j2",
-        found=found,
-        candidates=found.formulations[1:],
-        wrong=[*found.unexpected],
-        differ=[id_ for id_ in asked if _verdicts_differ(found, id_)],
-        verdicts=[(id_, [_verdict(found, name, id_) for name in found.formulations]) for id_ in asked],
-        errors=[
-            (id_, [(cell, found.paired.get((cell.formulation, id_)), strip(cell.margins, axis)) for cell in cells])
-            for id_ in asked
-            if (cells := _told(found, id_))
-        ],
+        found=comparison,
+        candidates=comparison.formulations[1:],
+        wrong=comparison.unexpected,
+        differ=[id_ for id_ in comparison.properties if _verdicts_differ(comparison, id_)],
+        results=[(id_, _results(comparison, id_)) for id_ in comparison.properties],
+        errors=[(id_, lines) for id_ in comparison.properties if (lines := _errors(comparison, id_, axis))],
         ticks=ticks(axis),
         parts_of_time=PARTS,
         inf=inf,
-        costs=_costs(costs, found.reference),
-        meshes=[_mesh(one, drawing, found.reference) for one, drawing in zip(differing, drawings, strict=True)],
-        about=_about(found.provenance),
+        costs=_costs(costs, comparison.reference),
+        meshes=[_mesh(*pair, comparison.reference) for pair in zip(differing, drawings, strict=True)],
+        about=_facts(comparison.provenance),
     )
 
 
-def changes_page(changes: Changes, meshes: Mapping[str, StoredCase]) -> str:
-    """The page of an old report and a new one; `meshes` are counterexamples of the new one, by id."""
+def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> str:
+    """Return the page of an old report and a new one.
+
+    Parameters
+    ----------
+    changes : Changes
+        The two reports side by side.
+    examples : Mapping[str, Counterexample]
+        {id: counterexample} of the new report, of what got worse.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file.
+    """
     axis = Axis.of(cell.margins for change in changes.changes for cell in (change.old, change.new))
     return render(
         "changes.html.j2",
         changes=changes,
         rows=_by_formulation(changes, axis),
         ticks=ticks(axis),
-        meshes=[(id_, stored, _drawn(stored.case, None, None, id_)) for id_, stored in meshes.items()],
+        meshes=[
+            (example, example.replay_command(changes.new.path), _case_figure(example.case, None, None, id_))
+            for id_, example in examples.items()
+        ],
         n_others=sum(change.paired is None for change in changes.changes),
-        old_about=_about(changes.old.provenance),
-        new_about=_about(changes.new.provenance),
+        old_about=_facts(changes.old.run.provenance),
+        new_about=_facts(changes.new.run.provenance),
     )
 
 
 def _by_formulation(changes: Changes, axis: Axis) -> list[tuple[str, list[tuple[Change, Markup, Markup]]]]:
-    """Rows with the strips of the old and the new margins."""
+    """Return the rows by formulation, with the strips of the old and the new margins."""
     rows: dict[str, list[tuple[Change, Markup, Markup]]] = {}
     for change in changes.changes:
         line = (change, strip(change.old.margins, axis), strip(change.new.margins, axis))
@@ -95,79 +123,95 @@ def _by_formulation(changes: Changes, axis: Axis) -> list[tuple[str, list[tuple[
     return list(rows.items())
 
 
-def _verdict(found: Comparison, name: str, id_: str) -> dict[str, Any] | None:
-    cell, reference = found.cells.get((name, id_)), found.cells.get((found.reference, id_))
-    if cell is None:
-        return None
-    return {
-        "word": str(cell.verdict),
-        "unexpected": cell.unexpected,
-        "differs": reference is not None and cell.verdict is not reference.verdict,
-    }
+def _cells(comparison: Comparison, id_: str) -> list[Cell]:
+    """Return the cells of one property, the reference first."""
+    keys = ((name, id_) for name in comparison.formulations)
+    return [comparison.cells[key] for key in keys if key in comparison.cells]
 
 
-def _verdicts_differ(found: Comparison, id_: str) -> bool:
-    cells = [found.cells.get((name, id_)) for name in found.formulations]
-    return len({cell.verdict for cell in cells if cell is not None}) > 1
+def _results(comparison: Comparison, id_: str) -> list[dict[str, Any] | None]:
+    """Return the results of one property, None where a formulation was not checked."""
+    reference = comparison.cells.get((comparison.reference, id_))
+    results: list[dict[str, Any] | None] = []
+    for name in comparison.formulations:
+        cell = comparison.cells.get((name, id_))
+        if cell is None:
+            results.append(None)
+            continue
+        differs = reference is not None and cell.verdict is not reference.verdict
+        results.append({"word": str(cell.result), "unexpected": cell.unexpected, "differs": differs})
+    return results
 
 
-def _told(found: Comparison, id_: str) -> list[Cell]:
-    cells = [found.cells[name, id_] for name in found.formulations if (name, id_) in found.cells]
-    return [cell for cell in cells if not isnan(cell.worst)]
+def _verdicts_differ(comparison: Comparison, id_: str) -> bool:
+    return len({cell.verdict for cell in _cells(comparison, id_)}) > 1
+
+
+def _errors(comparison: Comparison, id_: str, axis: Axis) -> list[tuple[Cell, Any, Markup]]:
+    """Return the lines of the table of errors of one property; none where nothing was measured."""
+    return [
+        (cell, comparison.paired.get((cell.formulation, id_)), strip(cell.margins, axis))
+        for cell in _cells(comparison, id_)
+        if not isnan(cell.worst)
+    ]
 
 
 def _costs(costs: Sequence[Cost], reference: str) -> list[tuple[int, list[dict[str, Any]]]]:
-    """By number of slave segments: microseconds of each formulation, in words, and its ratio to the reference's."""
-    of = {cost.n_segments: cost.total for cost in costs if cost.formulation == reference}
+    """Return by number of slave segments the microseconds of each formulation, and its ratio to the reference's."""
+    totals = {cost.n_segments: cost.total for cost in costs if cost.formulation == reference}
     lines: dict[int, list[dict[str, Any]]] = {cost.n_segments: [] for cost in costs}
     for cost in costs:
         seconds = [*(cost.seconds[part] for part in PARTS), cost.total]
+        ratio = cost.total / totals[cost.n_segments]
         lines[cost.n_segments].append(
             {
                 "formulation": cost.formulation,
                 "failed": cost.failed,
-                "times": [*map(_micro, seconds), _micro(cost.total / cost.n_segments, digits=2)],
-                "ratio": "–" if isnan(cost.total / of[cost.n_segments]) else f"{cost.total / of[cost.n_segments]:.2f}",
+                "times": [*map(_microseconds, seconds), _microseconds(cost.total / cost.n_segments, digits=2)],
+                "ratio": "–" if isnan(ratio) else f"{ratio:.2f}",
             }
         )
     return list(lines.items())
 
 
-def _micro(seconds: float, digits: int = 1) -> str:
+def _microseconds(seconds: float, digits: int = 1) -> str:
     return "–" if isnan(seconds) else f"{1e6 * seconds:.{digits}f}"
 
 
-def _mesh(one: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
-    """Two figures with a caption each, or one with both."""
+def _mesh(differing: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
+    """Return two figures with a caption each, or one with both."""
     sides = [
-        (one.formulation, one.outcome, one.margin),
-        (reference, one.reference_outcome, one.reference_margin),
+        (differing.formulation, differing.outcome, differing.margin),
+        (reference, differing.reference_outcome, differing.reference_margin),
     ]
+    id_ = differing.info.id
     if drawing.solved is not None and drawing.solved.solutions:
         from contactverif_reports.draw.scene_figures import make_scene_figure
 
-        figures = [(svg_inline(make_scene_figure(drawing.solved), f"{one.question.id}, solved"), sides)]
+        figures = [(svg_inline(make_scene_figure(drawing.solved), f"{id_}, solved"), sides)]
     else:
         figures = [
-            (_drawn(one.case, found, drawing.exact, f"{one.question.id}: {side[0]}"), [side])
-            for side, found in zip(sides, (drawing.candidate, drawing.reference), strict=True)
+            (_case_figure(differing.case, forces, drawing.exact, f"{id_}: {side[0]}"), [side])
+            for side, forces in zip(sides, (drawing.candidate, drawing.reference), strict=True)
         ]
-    return {"one": one, "figures": figures}
+    return {"differing": differing, "figures": figures}
 
 
-def _drawn(case: Case, forces: FloatArray | None, exact: FloatArray | None, label: str) -> Markup:
-    import matplotlib  # it takes its time
+def _case_figure(case: Case, forces: FloatArray | None, exact: FloatArray | None, label: str) -> Markup:
+    """Return the figure of a case: its bodies, or its interface with forces."""
+    import matplotlib  # Importing it is slow.
 
     from contactverif_reports.draw.case_figure import make_case_figure
     from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
 
     if has_outline(case):
-        return svg_inline(make_outline_figure(case, _INCHES), label)
-    with matplotlib.rc_context({"legend.fontsize": _LEGEND}):
-        beside = exact if forces is not None else None  # of multipliers nobody knows what it should be
-        figure = make_case_figure(case, title="", forces=forces, exact=beside, width=_INCHES)
+        return svg_inline(make_outline_figure(case, _FIGURE_WIDTH), label)
+    with matplotlib.rc_context({"legend.fontsize": _LEGEND_SIZE}):
+        beside = exact if forces is not None else None  # The exact multipliers are not known.
+        figure = make_case_figure(case, title="", forces=forces, exact=beside, width=_FIGURE_WIDTH)
     return svg_inline(figure, label)
 
 
-def _about(provenance: Mapping[str, str]) -> dict[str, str]:
-    return {name.replace("_", " "): provenance[name] for name in _ABOUT if provenance.get(name)}
+def _facts(provenance: Mapping[str, str]) -> dict[str, str]:
+    """Return what a reader of the page wants to know of the origin of the numbers."""
+    return {name.replace("_", " "): provenance[name] for name in _FACTS if provenance.get(name)}

@@ -19,13 +19,14 @@ from markupsafe import Markup
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
+from contactverif.contract.result import Result
 from contactverif_reports.files import check_writable, checked_name, whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".html", ".htm")
-MARKS = {
+MARKS: dict[Verdict | Result, str] = {
     Verdict.PASS: "✓",
     Verdict.FAIL: "✗",
     Verdict.UNDECIDED: "?",
@@ -34,6 +35,8 @@ MARKS = {
     Verdict.NOT_PROVIDED: "○",
     Verdict.NOT_LOADED: "○",
     Verdict.NOT_JUDGED: "?",
+    Result.FAILS_AS_STATED: "✗",
+    Result.BROKEN_PROMISE: "✗",
 }
 _SVG = "{http://www.w3.org/2000/svg}"
 _HREF = "{http://www.w3.org/1999/xlink}href"
@@ -129,7 +132,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    environment.globals["marks"] = {str(verdict): mark for verdict, mark in MARKS.items()}
+    environment.globals["marks"] = {str(word): mark for word, mark in MARKS.items()}
     return environment
 
 

@@ -1,84 +1,112 @@
-"""The HTML page of a stored report: verdicts, worst meshes drawn, distributions, provenance. Nothing is solved here."""
+"""The HTML page of a run: results, distributions, the smallest meshes that fail, provenance. Nothing is solved here."""
 
 from __future__ import annotations
 
 import os
-import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from markupsafe import Markup
 
-from contactverif.contract.property import Verdict
-from contactverif_reports.compare.comparison import Iterations, iterations
+from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.property import CheckedNumber, checked_numbers
+from contactverif.contract.result import Result, Row, Run
+from contactverif_reports.compare.cells import Cell
+from contactverif_reports.compare.comparison import Iterations, count_iterations
 from contactverif_reports.draw import as_text
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
-from contactverif_reports.netcdf.read import StoredCase
-from contactverif_reports.netcdf.stored import Held, StoredReport, StoredRow
 
-DRAWN = 24  # counterexamples drawn as figures, the unexpected ones first; the others are drawn in text
-_WIDTH = 5.4  # inches of a figure: on a phone its labels can still be read
-_COLUMNS = 14  # properties beside each other, so that a table fits on a page of paper
-_FEW = 8  # formulations whose sections are all open
+MOST_FIGURES = 24  # Counterexamples that are drawn as figures, the unexpected ones first; the others are text.
+_WIDTH = 5.4  # The width of a figure in inches: on a phone its labels can still be read.
+_COLUMNS = 14  # Properties beside each other, so that a table fits on a page of paper.
+_OPEN_SECTIONS = 8  # With more formulations than this, only sections with something unexpected are open.
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """A counterexample as the page shows it.
+    """A counterexample on the page.
 
     Attributes
     ----------
-    id, stored : str or StoredCase
-        Of the report.
-    unexpected : str
-        Why it makes the run fail, empty if it does not.
+    counterexample : Counterexample
+        The case with its row.
     figure : Markup
-        Empty where `text` draws it.
-    numbers : tuple[Held, ...]
-        Against their tolerances.
+        The figure; empty where `text` draws the case.
+    text : str
+        The drawing in text; empty where there is a figure.
+    numbers : tuple[CheckedNumber, ...]
+        The measured numbers beside their tolerances.
     reason : str
-        Why it fails, where the numbers do not say it.
+        The reason of the failure, where the numbers do not say it.
     replay : str
-        The command that judges it again.
+        The command that judges the case again.
     """
 
-    id: str
-    stored: StoredCase
-    unexpected: str
+    counterexample: Counterexample
     figure: Markup
     text: str
-    numbers: tuple[Held, ...]
+    numbers: tuple[CheckedNumber, ...]
     reason: str
     replay: str
+
+    @property
+    def id(self) -> str:
+        """The id of the counterexample."""
+        return self.counterexample.id
+
+    @property
+    def row(self) -> Row:
+        """The row that the case belongs to."""
+        return self.counterexample.row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A row of the table of a formulation."""
+    """A row of the table of a formulation.
 
-    property_id: str
-    row: StoredRow
+    Attributes
+    ----------
+    row : Row
+        The row.
+    cell : Cell
+        Its numbers by case.
+    promise : str
+        What the formulation states, in a word.
+    strip : Markup
+        The distribution of value over tolerance.
+    example : str
+        The id of its counterexample, empty if it has none.
+    """
+
+    row: Row
+    cell: Cell
     promise: str
     strip: Markup
-    median: float
-    worst: float
     example: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """What the page says of one formulation.
+    """The part of the page about one formulation.
 
     Attributes
     ----------
+    formulation : str
+        The name on the command line.
     number : int
-        From 1, for anchors.
+        The number of the section, from 1, for anchors.
     open : bool
-        Shown without being asked for.
+        The section is unfolded.
     missing : tuple[str, ...]
-        Parts of the contract that it does not provide.
+        Parts of the contract that the formulation does not provide.
+    lines : tuple[Line, ...]
+        A line for each property.
+    examples : tuple[Example, ...]
+        Its counterexamples.
+    iterations : tuple[Iterations, ...]
+        Newton's iterations where a property solved.
     """
 
     formulation: str
@@ -91,91 +119,154 @@ class Section:
 
     @property
     def counts(self) -> str:
-        """How many properties came out how, in words."""
-        verdicts = [line.row.cell.verdict for line in self.lines]
-        told = [(verdict, verdicts.count(verdict)) for verdict in Verdict]
-        return ", ".join(f"{count} {verdict}" for verdict, count in told if count)
+        """How many properties have which result, in words."""
+        results = [line.row.result for line in self.lines]
+        return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
 
-def report_page(report: StoredReport) -> str:
-    """The page: the same report, read from the same path, gives the same text."""
-    axis = Axis.of(row.cell.margins for row in report.rows.values())
+def report_page(run: Run, path: str | os.PathLike[str]) -> str:
+    """Return the page of a run. The same run and the same path give the same text.
+
+    Parameters
+    ----------
+    run : Run
+        The run, from memory or from a file.
+    path : str | os.PathLike[str]
+        The name of its report, for the commands that replay its counterexamples.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file.
+    """
+    cells = {key: Cell.from_row(row) for key, row in run.row_of.items()}
+    axis = Axis.of(cell.margins for cell in cells.values())
+    examples = _examples(run, os.fspath(path))
     return render(
         "report.html.j2",
-        report=report,
-        title=_title(report),
-        headline=headline(report),
-        sections=tuple(_sections(report, axis)),
-        chunks=_chunks(list(report.properties)),
-        anchors={id_: f"property-{n}" for n, id_ in enumerate(report.properties, 1)},
-        numbers={name: n for n, name in enumerate(report.formulations, 1)},
-        verdicts=[verdict for verdict in Verdict if any(row.cell.verdict is verdict for row in report.rows.values())],
+        run=run,
+        row_of=run.row_of,
+        title=_title(run),
+        headline=headline(run),
+        sections=_sections(run, cells, examples, axis),
+        chunks=_chunks(list(run.properties)),
+        anchors={id_: f"property-{n}" for n, id_ in enumerate(run.properties, 1)},
+        numbers={name: n for n, name in enumerate(run.formulations, 1)},
+        results=[result for result in Result if run.count(result)],
         ticks=ticks(axis),
         beyond=axis.most,
-        drawn=DRAWN,
-        planned=sum(row.cell.planned for row in report.rows.values()),
-        judged=sum(row.cell.judged for row in report.rows.values()),
-        file=os.path.basename(report.path),
+        n_examples=len(examples),
+        n_figures=MOST_FIGURES,
+        planned=sum(row.planned for row in run.rows),
+        judged=sum(row.judged for row in run.rows),
+        file=os.path.basename(path),
     )
 
 
-def headline(report: StoredReport) -> str:
-    """How it came out, in one line."""
-    if report.passed:
-        return "Every promise kept, every property judged."
-    told = [f"{len(report.unexpected)} unexpected"] if report.unexpected else []
-    told += [f"{len(report.not_loaded)} not loaded"] if report.not_loaded else []
-    return f"{' and '.join(told)}." if told else "Nothing was asked."
+def headline(run: Run) -> str:
+    """Say in one line how the run came out."""
+    if run.promises_kept:
+        return "Every promise is kept and every property was judged."
+    counts = (
+        ("broken promise", "broken promises", run.count(Result.BROKEN_PROMISE)),
+        ("crash", "crashes", sum(row.result is Result.CRASHED for row in run.unexpected)),
+        ("property not judged", "properties not judged", run.count(Result.NOT_JUDGED)),
+        ("plugin not loaded", "plugins not loaded", len(run.not_loaded)),
+    )
+    words = [f"{count} {singular if count == 1 else plural}" for singular, plural, count in counts if count]
+    return f"{', '.join(words)}." if words else "Nothing was checked."
 
 
-def _title(report: StoredReport) -> str:
-    names = report.formulations
+def _title(run: Run) -> str:
+    names = run.formulations
     if not names:
         return "Verification of contact formulations"
     return f"Verification of {', '.join(names)}" if len(names) <= 3 else f"Verification of {len(names)} formulations"
 
 
-def _sections(report: StoredReport, axis: Axis) -> Iterator[Section]:
-    figures = _figures(report)
-    few = len(report.formulations) <= _FEW
-    for n, name in enumerate(report.formulations, 1):
-        rows = {id_: report.rows[name, id_] for id_ in report.properties if (name, id_) in report.rows}
-        examples = tuple(_examples(report, name, figures))
-        of_property = {example.stored.property_id: example.id for example in examples}
-        yield Section(
-            formulation=name,
-            number=n,
-            open=few or any(row.cell.unexpected for row in rows.values()),
-            missing=tuple(part for part, has in report.provided.get(name, {}).items() if not has),
-            lines=tuple(_line(id_, row, axis, of_property.get(id_, "")) for id_, row in rows.items()),
-            examples=examples,
-            iterations=tuple(line for row in rows.values() for line in iterations([row.cell])),
+def _sections(
+    run: Run, cells: Mapping[tuple[str, str], Cell], examples: Sequence[Example], axis: Axis
+) -> tuple[Section, ...]:
+    """Return a section for each formulation."""
+    few = len(run.formulations) <= _OPEN_SECTIONS
+    return tuple(
+        _section(
+            number,
+            name,
+            run,
+            [cell for (formulation, _), cell in cells.items() if formulation == name],
+            [example for example in examples if example.row.formulation == name],
+            axis,
+            is_open=few or any(row.unexpected for row in run.rows_of(name)),
         )
-
-
-def _line(id_: str, row: StoredRow, axis: Axis, example: str) -> Line:
-    return Line(
-        property_id=id_,
-        row=row,
-        promise=_PROMISES[row.cell.promise],
-        strip=strip(row.cell.margins, axis),
-        median=row.cell.median,
-        worst=row.cell.worst,
-        example=example,
+        for number, name in enumerate(run.formulations, 1)
     )
 
 
-def _figures(report: StoredReport) -> dict[str, Markup]:
-    """{id: figure} of as many counterexamples as are drawn."""
-    if not report.examples:
+def _section(
+    number: int,
+    name: str,
+    run: Run,
+    cells: Sequence[Cell],
+    examples: Sequence[Example],
+    axis: Axis,
+    *,
+    is_open: bool,
+) -> Section:
+    example_of = {example.row.property_id: example.id for example in examples}
+    lines = [
+        Line(
+            row=cell.row,
+            cell=cell,
+            promise=_PROMISES[cell.row.promise],
+            strip=strip(cell.margins, axis),
+            example=example_of.get(cell.property_id, ""),
+        )
+        for cell in cells
+    ]
+    return Section(
+        formulation=name,
+        number=number,
+        open=is_open,
+        missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
+        lines=tuple(lines),
+        examples=tuple(examples),
+        iterations=tuple(line for cell in cells for line in count_iterations([cell])),
+    )
+
+
+def _examples(run: Run, path: str) -> list[Example]:
+    """Return all counterexamples, as many of them drawn as figures as the page holds."""
+    by_id = counterexamples(run)
+    figures = _figures(by_id)
+    examples = []
+    for id_, counterexample in by_id.items():
+        numbers = checked_numbers(counterexample.row.info, counterexample.outcome.measurement)
+        numbers_say_it = any(number.value == number.value and number.ratio > 1 for number in numbers)
+        examples.append(
+            Example(
+                counterexample=counterexample,
+                figure=figures.get(id_, Markup("")),
+                text="" if id_ in figures else as_text(counterexample.case),
+                numbers=numbers,
+                reason="" if numbers_say_it else counterexample.reason,
+                replay=counterexample.replay_command(path),
+            )
+        )
+    return examples
+
+
+def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
+    """Return {id: figure} of as many counterexamples as are drawn."""
+    if not examples:
         return {}
-    from contactverif_reports.draw.case_figure import make_case_figure  # matplotlib takes its time
+    from contactverif_reports.draw.case_figure import make_case_figure  # Importing matplotlib is slow.
     from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
 
-    ids = sorted(report.examples, key=lambda id_: not _unexpected(report, report.examples[id_]))
+    ids = sorted(examples, key=lambda id_: not examples[id_].row.unexpected)
     figures = {}
-    for id_ in ids[:DRAWN]:
-        case = report.examples[id_].case
+    for id_ in ids[:MOST_FIGURES]:
+        case = examples[id_].case
         figure = (
             make_outline_figure(case, _WIDTH)
             if has_outline(case)
@@ -185,31 +276,8 @@ def _figures(report: StoredReport) -> dict[str, Markup]:
     return figures
 
 
-def _examples(report: StoredReport, name: str, figures: Mapping[str, Markup]) -> Iterator[Example]:
-    for id_, stored in report.examples_of(name).items():
-        asked = report.properties.get(stored.property_id)
-        told = [quantity for quantity in asked.quantities if quantity.name in stored.values] if asked else []
-        held = [Held(quantity, stored.values[quantity.name], stored.tolerances[quantity.name]) for quantity in told]
-        said = any(one.value == one.value and one.excess > 1 for one in held)
-        yield Example(
-            id=id_,
-            stored=stored,
-            unexpected=_unexpected(report, stored),
-            figure=figures.get(id_, Markup("")),
-            text="" if id_ in figures else as_text(stored.case),
-            numbers=tuple(held),
-            reason="" if said else stored.reason,
-            replay=f"contactverif replay {shlex.quote(report.path)} --case {shlex.quote(id_)}",
-        )
-
-
-def _unexpected(report: StoredReport, stored: StoredCase) -> str:
-    row = report.rows.get((stored.formulation, stored.property_id))
-    return row.cell.unexpected if row else ""
-
-
 def _chunks(ids: list[str]) -> list[list[str]]:
-    """The properties in tables that are about equally wide."""
+    """Return the properties in tables that are about equally wide."""
     n_tables = -(-len(ids) // _COLUMNS)
     size = -(-len(ids) // n_tables) if n_tables else 0
     return [ids[start : start + size] for start in range(0, len(ids), size or 1)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,14 +10,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.result import Row, Run
+from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.property_group import detail_values, quantity_notes, quantity_values
+from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
-ORIGIN = "case_array"  # the attribute that names the array of Case.to_arrays()
-_ARRAYS = {  # name: dimensions, long name, unit
+ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
+_ARRAYS = {  # {array: (dimensions, long name, unit)}
     "nodes": (("node", "dim"), "reference positions, slave nodes first", schema.LENGTH),
     "slave_segments": (("slave_segment", "two"), "first and second node of each slave segment", "1"),
     "master_segments": (("master_segment", "two"), "first and second node of each master segment", "1"),
@@ -32,52 +32,35 @@ _ARRAYS = {  # name: dimensions, long name, unit
 }
 
 
-def found_in(run: Run) -> Iterator[tuple[str, Row, Outcome]]:
-    """(id, row, outcome) of every counterexample: the shrunk case, else a witness that failed or broke a promise."""
-    entries: list[tuple[str, Row, Outcome]] = []
-    for row in run.rows:
-        if row.shrunk is not None:
-            entries.append((schema.case_id(row.formulation, row.question.id), row, row.shrunk))
-        elif row.witness is not None and (
-            row.witness.verdict in (Verdict.FAIL, Verdict.CRASHED) or (row.promise is False and row.unexpected)
-        ):
-            entries.append((schema.case_id(row.formulation, row.question.id, witness=True), row, row.witness))
-    for name, (_, row, outcome) in zip(schema.distinct(entry[0] for entry in entries), entries, strict=True):
-        yield name, row, outcome
-
-
 def counterexample_groups(run: Run) -> dict[str, xr.Dataset]:
-    """`counterexamples`, and for each one a group with its mesh and in it a group with its arrays."""
-    entries = list(found_in(run))
+    """Return `counterexamples`, and for each one a group with its mesh and in it a group with its arrays."""
+    examples = counterexamples(run)
     folder = f"/{schema.COUNTEREXAMPLES}"
     comment = (
         "the smallest case found for each failure, each a UGRID mesh with the verdict on it; its group `case` rebuilds "
-        "it exactly. Again: contactverif replay REPORT --case ID"
+        "it exactly. To judge one again: contactverif replay REPORT --case ID"
     )
-    ids = " ".join(name for name, *_ in entries)
-    groups = {folder: xr.Dataset(attrs={"comment": comment, "ids": ids or schema.NONE})}
-    for name, row, outcome in entries:
-        groups[f"{folder}/{name}"] = _mesh(name, row, outcome)
-        groups[f"{folder}/{name}/{schema.CASE}"] = _arrays(outcome.case)
+    groups = {folder: xr.Dataset(attrs={"comment": comment, "ids": " ".join(examples) or schema.NONE})}
+    for id_, example in examples.items():
+        groups[f"{folder}/{id_}"] = _mesh(example)
+        groups[f"{folder}/{id_}/{schema.CASE}"] = _arrays(example.case)
     return groups
 
 
-def _mesh(name: str, row: Row, outcome: Outcome) -> xr.Dataset:
-    """The case as a UGRID-1.0 topology of dimension 1, and what was found on it."""
-    case, interface = outcome.case, outcome.case.interface
-    edges = np.vstack([interface.slave.segments, interface.master.segments])
+def _mesh(example: Counterexample) -> xr.Dataset:
+    """Return the case as a UGRID-1.0 topology of dimension 1, with the outcome on it."""
+    case, interface, info = example.case, example.case.interface, example.row.info
     on_nodes = {"mesh": "mesh", "location": "node", "coordinates": "node_x node_y"}
+    edges = np.vstack([interface.slave.segments, interface.master.segments])
+    sides = [0] * len(interface.slave) + [1] * len(interface.master)
     table = {
         "mesh": numbers([], np.int32(0), "topology of the two surfaces", "1"),
         "edge_nodes": numbers(["edge", "two"], edges, "first and second node of each segment, body on the left", "1"),
-        "side": codes(
-            ["edge"], [0] * len(interface.slave) + [1] * len(interface.master), schema.SIDES, "surface of each segment"
-        ),
+        "side": codes(["edge"], sides, schema.SIDES, "surface of each segment"),
         "node_x": numbers(["node"], interface.nodes[:, 0], "reference position, x", schema.LENGTH),
         "node_y": numbers(["node"], interface.nodes[:, 1], "reference position, y", schema.LENGTH),
         "current_x": numbers(["node"], case.positions[:, 0], "current position, x", schema.LENGTH),
         "current_y": numbers(["node"], case.positions[:, 1], "current position, y", schema.LENGTH),
-        "verdict": codes([], outcome.verdict, schema.VERDICTS, "verdict on the case"),
     }
     table["mesh"].attrs |= {
         "cf_role": "mesh_topology",
@@ -90,31 +73,31 @@ def _mesh(name: str, row: Row, outcome: Outcome) -> xr.Dataset:
     table["side"].attrs |= {"mesh": "mesh", "location": "edge"}
     for current in ("current_x", "current_y"):
         table[current].attrs |= on_nodes
-    table |= quantity_notes(row.question.quantities)
-    table |= quantity_values(row.question.quantities, outcome.measurement, [])
-    table |= detail_values(outcome.measurement, [])
+    names = replace(SharedNames.from_outcomes([example.outcome]), parameters=())  # They are among the arrays.
+    table |= coordinates(info, names)
+    table |= OutcomeVariables(info, [example.outcome], {}, names).table(with_summaries=False)
     attributes = {
-        "title": f"{row.formulation}, {row.question.id}: {outcome.verdict}",
-        "formulation": row.formulation,
-        "property_id": row.question.id,
-        "summary": row.question.summary,
-        "reason": outcome.reason or schema.NONE,
-        "origin": "shrunk from the random cases" if outcome is row.shrunk else "the witness of a promise",
+        "title": f"{example.formulation}, {info.id}: {example.verdict}",
+        "formulation": example.formulation,
+        "property_id": info.id,
+        "summary": info.summary,
+        "reason": example.reason or schema.NONE,
+        "origin": schema.WITNESS if example.is_witness else schema.SHRUNK,
         "case_name": case.name or schema.NONE,
-        "replay": f"contactverif replay REPORT --case {name}",
+        "replay": f"contactverif replay REPORT --case {example.id}",
     }
     return xr.Dataset(table, attrs={key: schema.text(value) for key, value in attributes.items()})
 
 
 def _arrays(case: Case) -> xr.Dataset:
-    """`Case.to_arrays()` as it is; the attribute `case_array` of each variable says which array it is."""
+    """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
     table: dict[str, xr.Variable] = {}
-    for safe, (name, values) in zip(schema.distinct(map(schema.typeable, arrays)), arrays.items(), strict=True):
+    for safe, (name, values) in zip(safe_names(arrays), arrays.items(), strict=True):
         variable = _array(safe, name, values)
-        variable.attrs[ORIGIN] = schema.text(name)
+        variable.attrs[ARRAY_NAME] = schema.text(name)
         table[safe] = variable
-    return xr.Dataset(table, attrs={"comment": "contactverif.contract.case.Case.from_arrays makes the case of these"})
+    return xr.Dataset(table, attrs={"comment": "contactverif.Case.from_arrays makes the case of these"})
 
 
 def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
@@ -127,6 +110,20 @@ def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
             schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN),
         ),
     )
-    if values.dtype.kind in "OU":  # words, and integers beyond 64 bits
+    if values.dtype.kind in "OU":  # Words, and integers beyond 64 bits.
         return words(dims, values.astype(np.str_).tolist(), long_name)
     return numbers(dims, values, long_name, units)
+
+
+def case_of_group(dataset: xr.Dataset) -> Case:
+    """Return the case that `_arrays` wrote.
+
+    Raises
+    ------
+    KeyError
+        If an array or its name is missing.
+    ValueError
+        If the arrays make no case.
+    """
+    arrays = {str(variable.attrs[ARRAY_NAME]): variable.values for variable in dataset.variables.values()}
+    return Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})

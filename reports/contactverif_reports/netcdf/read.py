@@ -1,225 +1,248 @@
-"""Gets a counterexample out of a report again, to the last bit, and tells two reports apart."""
+"""The reader of reports: it makes the `Run` again that was written, to the last bit.
+
+Rules for the next editor:
+
+- xarray opens the file, everything is loaded at once, and the file is closed before anything else happens: HDF5 may
+  crash when a damaged file is opened twice.
+- Whatever is wrong with a file is a `MisuseError` in one line.
+"""
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import xarray as xr
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Counterexample, counterexamples, find_counterexample
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Verdict
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict
+from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.counterexample_groups import case_of_group
+from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
+from contactverif_reports.netcdf.summary_group import root_attributes
+
+Groups = Mapping[str, xr.Dataset]
 
 _ARGUMENT = "REPORT"
-# What netCDF4 and we meet in a file that is not whole: a missing name, a number that means nothing, an HDF error.
-_DAMAGE = (AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError, OverflowError)
+_NEEDED = "a report that `contactverif verify --out FILE.nc` wrote"
+# What xarray and we meet in a file that is not whole: a missing name, a number that means nothing, an HDF error.
+_DAMAGE = (AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError, OverflowError, AssertionError)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StoredCase:
-    """A counterexample as it was stored.
+def read_run(path: str | os.PathLike[str]) -> Run:
+    """Return the run that a report stores.
 
-    Attributes
+    Parameters
     ----------
-    case : Case
-        Equal to the one that was judged, bit by bit.
-    formulation, property_id : str
-        As typed on the command line.
-    verdict, reason : Verdict or str
-        What was found then.
-    values, tolerances : Mapping[str, float]
-        {quantity: number}, in the units of the property; empty where nothing was measured.
-    """
+    path : str | os.PathLike[str]
+        The report.
 
-    case: Case
-    formulation: str
-    property_id: str
-    verdict: Verdict
-    reason: str
-    values: Mapping[str, float]
-    tolerances: Mapping[str, float]
+    Returns
+    -------
+    Run
+        The same run that was written. Of the random cases it holds the numbers, of counterexamples the whole case.
+
+    Raises
+    ------
+    MisuseError
+        If the file is not there, no netCDF file, no report of this schema, or damaged.
+    """
+    with open_report(path) as groups:
+        return _Reader(groups).run()
+
+
+def read_case(path: str | os.PathLike[str], case_id: str) -> Counterexample:
+    """Return the counterexample of that id.
+
+    Raises
+    ------
+    MisuseError
+        If the report cannot be read, or there is no such id.
+    """
+    return find_counterexample(read_run(path), case_id)
 
 
 def case_ids(path: str | os.PathLike[str]) -> list[str]:
-    """Ids of the counterexamples of a report, in the order of the run.
+    """Return the ids of the counterexamples of a report, in the order of the run.
 
     Raises
     ------
     MisuseError
-        If the file is not there, no netCDF file, or no report of this schema.
+        If the report cannot be read.
     """
-    with opened(path) as report:
-        return list(_group(report, schema.COUNTEREXAMPLES, path).groups)
-
-
-def read_case(path: str | os.PathLike[str], case_id: str) -> StoredCase:
-    """The counterexample of that id.
-
-    Raises
-    ------
-    MisuseError
-        As `case_ids`, and if there is no such id.
-    """
-    with opened(path) as report:
-        groups = _group(report, schema.COUNTEREXAMPLES, path).groups
-        if case_id not in groups:
-            raise MisuseError("--case", repr(case_id), _ids_that_are(case_id, list(groups)))
-        return _stored(groups[case_id], path)
-
-
-def read_cases(path: str | os.PathLike[str]) -> dict[str, StoredCase]:
-    """{id: counterexample} of all of them, in the order of the run.
-
-    Raises
-    ------
-    MisuseError
-        As `case_ids`.
-    """
-    with opened(path) as report:
-        groups = _group(report, schema.COUNTEREXAMPLES, path).groups
-        return {case_id: _stored(group, path) for case_id, group in groups.items()}
-
-
-def same_data(path_a: str | os.PathLike[str], path_b: str | os.PathLike[str]) -> list[str]:
-    """What two reports differ in, a line each: nothing, for two runs with the same seed.
-
-    The group `timing` and the root attributes `created`, `command` and `platform` are left out. Numbers are compared
-    bit by bit.
-    """
-    with opened(path_a) as report_a, opened(path_b) as report_b:
-        a, b = dict(_entries(report_a, "")), dict(_entries(report_b, ""))
-    differences = [f"{name}: only in {os.fspath(path_a)}" for name in a if name not in b]
-    differences += [f"{name}: only in {os.fspath(path_b)}" for name in b if name not in a]
-    for name in a:
-        if name in b and (difference := _difference(a[name], b[name])):
-            differences.append(f"{name}: {difference}")
-    return differences
+    return list(counterexamples(read_run(path)))
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
-    """The report as a `netCDF4.Dataset` that neither masks nor scales.
+def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterator[Groups]:
+    """Yield the groups of a report {path: dataset}, loaded; the file is closed already.
+
+    Parameters
+    ----------
+    path : str | os.PathLike[str]
+        The report.
+    decode : bool
+        Make strings of characters. Numbers are never masked or scaled.
 
     Raises
     ------
     MisuseError
-        If the file is not there, no netCDF file, or no report of this schema; and if something is missing or
-        damaged in what is read of it within the block.
+        If the file is not there, no netCDF file, or no report of this schema; and if the block finds something
+        missing or damaged in it.
     """
-    import netCDF4
-
-    found = os.fspath(path)
+    name = os.fspath(path)
     if not Path(path).is_file():
         what = "which is a folder" if Path(path).is_dir() else "which does not exist"
-        raise MisuseError(_ARGUMENT, f"{found}, {what}", "a report that `contactverif verify --out FILE.nc` wrote")
+        raise MisuseError(_ARGUMENT, f"{name}, {what}", _NEEDED)
     try:
-        report = netCDF4.Dataset(Path(path).resolve())
-    except (OSError, RuntimeError) as error:
-        raise MisuseError(
-            _ARGUMENT, f"{found}, which is no netCDF file or a damaged one ({error})", "a report (netCDF-4)"
-        ) from error
+        groups = xr.open_groups(
+            Path(path).resolve(),
+            engine="netcdf4",
+            mask_and_scale=False,
+            decode_times=False,
+            decode_timedelta=False,
+            decode_coords=False,
+            concat_characters=decode,
+        )
+    except _DAMAGE as error:
+        found = f"{name}, which is no netCDF file or a damaged one ({_one_line(error)})"
+        raise MisuseError(_ARGUMENT, found, "a report (netCDF-4)") from error
     try:
-        with report:
-            _check_schema(report, found)
-            report.set_auto_maskandscale(False)
-            yield report
+        try:
+            _check_schema(groups["/"], name)
+            for dataset in groups.values():
+                dataset.load()
+        finally:
+            for dataset in groups.values():
+                dataset.close()
+        yield groups
     except MisuseError:
         raise
     except _DAMAGE as error:
-        what = " ".join(str(error).split())
-        raise MisuseError(_ARGUMENT, f"{found}, which cannot be read ({what})", "an undamaged report") from error
+        found = f"{name}, which cannot be read ({_one_line(error)})"
+        raise MisuseError(_ARGUMENT, found, "an undamaged report") from error
 
 
-def _check_schema(report: Any, path: str) -> None:
-    if str(getattr(report, "title", "")) != schema.TITLE or not hasattr(report, "schema"):
-        needed = "a report that `contactverif verify --out FILE.nc` wrote"
-        raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", needed)
-    if str(report.schema) != schema.SCHEMA:
-        raise MisuseError(_ARGUMENT, f"{path} of schema {report.schema}", f"schema {schema.SCHEMA}")
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
-def _stored(group: Any, path: str | os.PathLike[str]) -> StoredCase:
-    from contactverif_reports.netcdf.counterexample_groups import ORIGIN
-
-    variables = _group(group, schema.CASE, path).variables
-    arrays = {variable.getncattr(ORIGIN): variable[...] for variable in variables.values()}
-    case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
-    values, tolerances = _measured(group)
-    return StoredCase(
-        case,
-        str(group.formulation),
-        str(group.property_id),
-        Verdict(int(group["verdict"][...])),
-        "" if group.reason == schema.NONE else str(group.reason),
-        values,
-        tolerances,
-    )
+def _check_schema(root: xr.Dataset, path: str) -> None:
+    if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
+        raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
+    version = str(root.attrs["schema"])
+    if version == "1":
+        needed = f"schema {schema.SCHEMA}; run the same command again to write the report anew"
+        raise MisuseError(_ARGUMENT, f"{path} of schema 1, which an older contactverif wrote", needed)
+    if version != schema.SCHEMA:
+        raise MisuseError(
+            _ARGUMENT, f"{path} of schema {version}", f"schema {schema.SCHEMA}; install a newer contactverif"
+        )
 
 
-def _group(parent: Any, name: str, path: str | os.PathLike[str]) -> Any:
-    if name not in parent.groups:
-        raise MisuseError(_ARGUMENT, f"{os.fspath(path)} without the group {name!r}", "an undamaged report")
-    return parent.groups[name]
+class _Reader:
+    """Makes a run of the groups of a report."""
+
+    def __init__(self, groups: Groups) -> None:
+        for name in (schema.SUMMARY, schema.COUNTEREXAMPLES, schema.TIMING):
+            if f"/{name}" not in groups:
+                raise MisuseError(_ARGUMENT, f"a report without the group {name!r}", "an undamaged report")
+        self._root, self._summary, self._timing = (groups[name] for name in ("/", "/summary", "/timing"))
+        self._properties = {
+            str(dataset.attrs["property_id"]): dataset
+            for name, dataset in groups.items()
+            if "property_id" in dataset.attrs and not name.startswith(f"/{schema.COUNTEREXAMPLES}/")
+        }
+        self._examples = _examples(groups)
+
+    def run(self) -> Run:
+        """Return the run."""
+        formulations, properties = (self._words(name) for name in ("formulation", "property"))
+        by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
+        for j, property_id in enumerate(properties):
+            for i, row in self._rows_of(j, property_id, formulations):
+                by_formulation[i][j] = row
+        names, reasons = (self._words(name) for name in ("not_loaded", "not_loaded_reason"))
+        run = Run(
+            rows=tuple(row for rows in by_formulation for row in rows.values()),
+            not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
+            provided=self._provided(formulations),
+        )
+        written = root_attributes(run)
+        origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
+        return Run(run.rows, run.not_loaded, run.provided, origin)
+
+    def _rows_of(self, j: int, property_id: str, formulations: list[str]) -> Iterator[tuple[int, Row]]:
+        """Yield the rows of a property, with the number of the formulation."""
+        dataset = self._properties[property_id]
+        info = read_info(dataset)
+        outcomes = OutcomeArrays(dataset, info, ("formulation", "case"))
+        witnesses = OutcomeArrays(dataset, info, ("formulation",), "witness_") if "witness_verdict" in dataset else None
+        n_cases = dataset.sizes["case"]
+        codes = outcomes.verdicts.reshape(len(formulations), n_cases)
+        for i, formulation in enumerate(formulations):
+            verdict = int(self._summary["row_verdict"].values[i, j])
+            if verdict == schema.NOT_PLANNED:
+                continue
+            shrunk, case = self._example(formulation, property_id, info)
+            length = int((codes[i] != schema.NOT_PLANNED).sum())
+            yield (
+                i,
+                Row(
+                    formulation=formulation,
+                    info=info,
+                    verdict=Verdict(verdict),
+                    promise=schema.Promise(int(self._summary["promise"].values[i, j])).promise,
+                    known=str(self._summary["known"].values[i, j]),
+                    reason=str(self._summary["reason"].values[i, j]),
+                    planned=int(self._summary["planned"].values[i, j]),
+                    outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length)),
+                    witness=None if witnesses is None else witnesses.outcome(i, case),
+                    shrunk=shrunk,
+                    seconds=float(self._timing["row_seconds"].values[i, j]),
+                ),
+            )
+
+    def _example(self, formulation: str, property_id: str, info: PropertyInfo) -> tuple[Outcome | None, Case | None]:
+        """Return the shrunk case, or the case of the witness, of a row; None where the report stores none."""
+        if (formulation, property_id) not in self._examples:
+            return None, None
+        dataset, case = self._examples[formulation, property_id]
+        if dataset.attrs["origin"] == schema.WITNESS:
+            return None, case
+        return OutcomeArrays(dataset, info, ()).outcome(0, case), None
+
+    def _case_seconds(self, i: int, j: int, n_cases: int) -> FloatArray:
+        seconds: FloatArray = self._timing["case_seconds"].values[i, j, :n_cases]
+        if len(seconds) != n_cases:
+            raise ValueError("case_seconds is too short")
+        return seconds
+
+    def _provided(self, formulations: list[str]) -> dict[str, dict[str, bool]]:
+        if "provided" not in self._summary:
+            return {}
+        provided = {}
+        for name, codes in zip(formulations, self._summary["provided"].values.tolist(), strict=True):
+            parts = zip(self._words("part"), codes, strict=True)
+            provided[name] = {part: bool(code) for part, code in parts if code != schema.UNSAID}
+        return provided
+
+    def _words(self, name: str) -> list[str]:
+        return [str(word) for word in self._summary[name].values] if name in self._summary else []
 
 
-def _ids_that_are(case_id: str, ids: list[str]) -> str:
-    if not ids:
-        return "a report with counterexamples; this one has none"
-    near = difflib.get_close_matches(case_id, ids, n=3, cutoff=0.4)
-    shown = near or ids[:5]
-    more = f" (and {len(ids) - len(shown)} more)" if len(ids) > len(shown) else ""
-    return f"{'an id like' if near else 'one of'} {', '.join(shown)}{more}"
-
-
-def _measured(group: Any) -> tuple[dict[str, float], dict[str, float]]:
-    """Values and tolerances by name, without what was not measured: both are NaN there."""
-    values: dict[str, float] = {}
-    tolerances: dict[str, float] = {}
-    if "quantity" in group.variables:
-        columns = (group[name][...] for name in ("quantity", "value", "tolerance"))
-        for name, value, tolerance in zip(*columns, strict=True):
-            if not (np.isnan(value) and np.isnan(tolerance)):
-                values[str(name)], tolerances[str(name)] = float(value), float(tolerance)
-    return values, tolerances
-
-
-def _entries(group: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """(name, value) of every attribute, dimension and variable below."""
-    for name in group.ncattrs():
-        if path or name not in schema.OFF_THE_RECORD:
-            yield f"{path or '/'}:{name}", group.getncattr(name)
-    for name, dimension in group.dimensions.items():
-        yield f"{path}/{name} (dimension)", len(dimension)
-    for name, variable in group.variables.items():
-        yield f"{path}/{name}", variable[...]
-        yield f"{path}/{name} (dimensions)", " ".join(variable.dimensions)
-        for attribute in variable.ncattrs():
-            yield f"{path}/{name}:{attribute}", variable.getncattr(attribute)
-    for name, child in group.groups.items():
-        if path or name != schema.TIMING:
-            yield from _entries(child, f"{path}/{name}")
-
-
-def _difference(a: Any, b: Any) -> str:
-    first, second = np.asarray(a), np.asarray(b)
-    if first.shape != second.shape:
-        return f"shape {first.shape} and {second.shape}"
-    if first.dtype != second.dtype and "U" not in (first.dtype.kind, second.dtype.kind):
-        return f"dtype {first.dtype} and {second.dtype}"
-    if first.dtype.kind in "OU":
-        differ = np.asarray(first != second)
-    else:  # bit by bit: NaN equals NaN, and -0.0 is not 0.0
-        bits = [np.ascontiguousarray(x).reshape(-1).view(np.uint8) for x in (first, second)]
-        differ = (bits[0] != bits[1]).reshape(-1, first.itemsize).any(axis=1).reshape(first.shape)
-    if not differ.any():
-        return ""
-    where = tuple(int(index[0]) for index in np.nonzero(np.atleast_1d(differ)))
-    found = f"{np.atleast_1d(first)[where]!s} and {np.atleast_1d(second)[where]!s}"
-    return found if not first.ndim else f"{found} at {where}, and {int(differ.sum()) - 1} more"
+def _examples(groups: Groups) -> dict[tuple[str, str], tuple[xr.Dataset, Case]]:
+    """Return the counterexamples by formulation and property, each with its case."""
+    examples = {}
+    folder = f"/{schema.COUNTEREXAMPLES}/"
+    for name, dataset in groups.items():
+        if name.startswith(folder) and not name.endswith(f"/{schema.CASE}"):
+            key = str(dataset.attrs["formulation"]), str(dataset.attrs["property_id"])
+            examples[key] = dataset, case_of_group(groups[f"{name}/{schema.CASE}"])
+    return examples

@@ -1,30 +1,37 @@
-"""Every name that a report is made of, in one place: groups, dimensions, codes, units.
+"""The names that a report is made of, in one place: groups, dimensions, codes, units.
 
-The prose is in `reports/README.md`. What changes the meaning of a file that exists already changes `SCHEMA`.
+Rules for the next editor:
+
+- The prose is in `reports/README.md`, and a test compares it with a file.
+- Whatever changes the meaning of a file that exists already raises `SCHEMA`.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
 
+from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Verdict
 
-SCHEMA = "1"
+SCHEMA = "2"
 CONVENTIONS = "CF-1.11 UGRID-1.0"
 TITLE = "contactverif: what a verification of contact formulations found"
 UNITS_NOTE = (
     "Lengths are written in m and forces, per unit of thickness, in N; read them as any one consistent system of units."
 )
+ROOT_NOTE = (
+    "promises_kept is true if the formulations do all that they state and every property was judged. The attributes "
+    f"n_… count pairs of a formulation and a property. {UNITS_NOTE}"
+)
 
 SUMMARY, COUNTEREXAMPLES, TIMING, CASE = "summary", "counterexamples", "timing", "case"
 RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING})
-OFF_THE_RECORD = frozenset({"created", "command", "platform"})  # root attributes that two equal runs may differ in
+OFF_THE_RECORD = frozenset({"created", "command", "platform"})  # Root attributes in which two equal runs may differ.
 PARTS = ("pair", "tangent", "contact_points")
 
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"
-FORCE, STRESS = "N", "N m-1"  # forces are per unit of thickness
+FORCE, STRESS = "N", "N m-1"  # Forces are per unit of thickness.
 PARAMETER_UNITS: Mapping[str, str] = {
     "penetration": LENGTH,
     "along": LENGTH,
@@ -49,59 +56,52 @@ PARAMETER_UNITS: Mapping[str, str] = {
 }
 
 VERDICTS: Mapping[str, int] = {str(verdict).replace(" ", "_"): int(verdict) for verdict in Verdict}
-NONE = "none"  # an attribute with nothing to say: an empty one is not kept by every reader
-NOT_PLANNED = -1  # verdict beyond the last case of a formulation that had fewer
+NONE = "none"  # The value of an attribute without one: some readers drop an attribute that is empty.
+SHRUNK, WITNESS = "shrunk from the random cases", "the witness of a formulation"  # The origins of a counterexample.
+NOT_PLANNED = -1  # The verdict behind the last case of a formulation that had fewer cases.
+NO_CASE = -1  # The number of a case where there is none.
+NOT_MEASURED = 9.969209968386869e36  # netCDF's own fill value for doubles; a NaN in a report was measured.
+MEASURED, IDLE, BREACH = 1, 2, 4  # The bits of `state`.
+STATES: Mapping[str, int] = {"measured": MEASURED, "no_contact_force": IDLE, "breaks_the_contract": BREACH}
 
 
 class Promise(IntEnum):
-    """What the traits say about a property."""
+    """The codes of what a formulation states about a property."""
 
     NO_PROMISE = 0
     PROMISED = 1
-    SAID_TO_FAIL = 2
+    STATED_TO_FAIL = 2
 
     @classmethod
-    def of(cls, promise: bool | None) -> Promise:
-        """The code of `Row.promise`."""
-        return cls.NO_PROMISE if promise is None else cls.PROMISED if promise else cls.SAID_TO_FAIL
+    def from_promise(cls, promise: bool | None) -> Promise:
+        """Return the code of `Row.promise`."""
+        return cls.NO_PROMISE if promise is None else cls.PROMISED if promise else cls.STATED_TO_FAIL
+
+    @property
+    def promise(self) -> bool | None:
+        """The value of `Row.promise`."""
+        return None if self is Promise.NO_PROMISE else self is Promise.PROMISED
 
 
 PROMISES: Mapping[str, int] = {promise.name.lower(): int(promise) for promise in Promise}
 PROVIDED: Mapping[str, int] = {"not_provided": 0, "provided": 1}
+UNSAID = -1  # The code of a part of which the run does not say whether it is provided.
 SIDES: Mapping[str, int] = {"slave": 0, "master": 1}
 
 
-def typeable(name: str) -> str:
-    """The name with only letters, digits, `.`, `_` and `-`, so that a shell and netCDF take it as it is."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("-.") or "_"
+def group_names(property_ids: Iterable[str]) -> dict[str, str]:
+    """Return {property id: group}: `patch.flat.transmission` is the group `/patch/flat/transmission`.
 
-
-def group_of(property_id: str, family: str) -> str:
-    """`/patch/flat_transmission` for the property `patch.flat.transmission` of the family `patch`."""
-    folder = typeable(family).replace(".", "_")
-    folder += "_" if folder in RESERVED else ""
-    return f"/{folder}/{typeable(property_id.removeprefix(f'{family}.')).replace('.', '_')}"
-
-
-def case_id(formulation: str, property_id: str, *, witness: bool = False) -> str:
-    """`vts-me_n_4.patch.flat.transmission`, with `.witness` behind it where only the witness was found."""
-    return typeable(f"{formulation}.{property_id}") + (".witness" if witness else "")
-
-
-def distinct(names: Iterable[str]) -> list[str]:
-    """The names in their order; one that was there before gets `-2`, `-3`, … behind it."""
-    taken: set[str] = set()
-    result = []
-    for name in names:
-        number, free = 1, name
-        while free in taken:
-            number += 1
-            free = f"{name}-{number}"
-        taken.add(free)
-        result.append(free)
-    return result
+    A name that is a folder of others already, or a group of the report itself, gets `_` behind it.
+    """
+    ids = list(property_ids)
+    paths = [tuple(map(typeable, id_.split("."))) for id_ in ids]
+    paths = [(f"{path[0]}_" if path[0] in RESERVED else path[0], *path[1:]) for path in paths]
+    folders = {path[:n] for path in paths for n in range(1, len(path))}
+    names = [f"/{'/'.join(path)}{'_' if path in folders else ''}" for path in paths]
+    return dict(zip(ids, distinct(names), strict=True))
 
 
 def text(words: str) -> str:
-    """The words as UTF-8 can hold them, without NUL, which would cut a netCDF string short."""
+    """Return the words as UTF-8 can hold them, without NUL, which would cut a netCDF string short."""
     return words.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")

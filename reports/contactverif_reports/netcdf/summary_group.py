@@ -2,202 +2,221 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from contactverif.contract.property import Property, Quantity, Verdict, excess
-from contactverif.contract.result import Row, Run
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import ClosestNumber, Result, Row, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 _ROW = ("formulation", "property")
-Rows = Mapping[tuple[str, str], Row]
+Table = dict[str, xr.Variable]
 
 
-@dataclass(frozen=True, slots=True)
-class Worst:
-    """The number that went furthest towards its tolerance, or beyond, among the decided cases of a row."""
+class _Grid:
+    """The rows of a run as a table, formulation by property; None where a property was not checked."""
 
-    case: int
-    quantity: Quantity
-    value: float
-    tolerance: float
+    def __init__(self, run: Run) -> None:
+        self.formulations, self.properties = run.formulations, run.properties
+        rows = run.row_of
+        self._rows = [[rows.get((name, id_)) for id_ in self.properties] for name in self.formulations]
 
+    def each(self, read: Callable[[Row], Any], missing: Any) -> list[list[Any]]:
+        """Return one entry for each row, and `missing` where there is no row."""
+        return [[missing if row is None else read(row) for row in line] for line in self._rows]
 
-def worst(row: Row) -> Worst | None:
-    """The worst number of a row, the first of equals; None where nothing was measured."""
-    found: Worst | None = None
-    most = -1.0
-    for number, outcome in enumerate(row.outcomes):
-        if not outcome.decided or outcome.measurement is None:
-            continue
-        values, tolerances = outcome.measurement.values, outcome.measurement.tolerances
-        for quantity in row.question.quantities:
-            if quantity.name not in values:
-                continue
-            value, tolerance = values[quantity.name], tolerances[quantity.name]
-            if (how_far := excess(quantity, value, tolerance)) > most:
-                found, most = Worst(number, quantity, value, tolerance), how_far
-    return found
+    def count(self, read: Callable[[Row], int], long_name: str) -> xr.Variable:
+        """Return a variable of numbers of cases."""
+        return numbers(_ROW, np.array(self.each(read, 0), dtype=np.int32), long_name, "1")
+
+    def labels(self) -> Table:
+        """Return the names along the two dimensions."""
+        return {
+            "formulation": words(["formulation"], self.formulations, "formulation, as typed on the command line"),
+            "property": words(["property"], list(self.properties), "property, as typed with --property"),
+        }
 
 
-def summary_group(run: Run, rows: Rows, formulations: Sequence[str], questions: Sequence[Property]) -> xr.Dataset:
-    """Counts, verdicts, promises, worst values, what the formulations provide, and what did not load."""
+def root_attributes(run: Run) -> dict[str, Any]:
+    """Return how the run came out, in counts, and where it comes from."""
+    attributes: dict[str, Any] = {
+        "Conventions": schema.CONVENTIONS,
+        "title": schema.TITLE,
+        "schema": schema.SCHEMA,
+        "promises_kept": "true" if run.promises_kept else "false",
+        **{name: np.int32(count) for name, count in _counts(run).items()},
+        "comment": schema.ROOT_NOTE,
+    }
+    origin = {schema.text(name): schema.text(str(value)) for name, value in run.provenance.items()}
+    return attributes | {name: value for name, value in origin.items() if name not in attributes}
+
+
+def _counts(run: Run) -> dict[str, int]:
+    """Return numbers of pairs of a formulation and a property."""
+    judged = (Verdict.PASS, Verdict.FAIL, Verdict.CRASHED)
+    return {
+        "n_properties_planned": len(run.rows),
+        "n_judged": sum(row.verdict in judged for row in run.rows),
+        "n_passed": run.count(Result.PASS),
+        "n_failed": run.count(Result.FAIL),
+        "n_failed_as_stated": run.count(Result.FAILS_AS_STATED),
+        "n_broken_promises": run.count(Result.BROKEN_PROMISE),
+        "n_crashed": run.count(Result.CRASHED),
+        "n_not_judged": run.count(Result.NOT_JUDGED, Result.UNDECIDED),
+        "n_not_applicable": run.count(Result.NOT_APPLICABLE),
+        "n_not_provided": run.count(Result.NOT_PROVIDED),
+        "n_not_loaded": len(run.not_loaded),
+    }
+
+
+def summary_group(run: Run) -> xr.Dataset:
+    """Return counts, verdicts, promises, closest numbers, what the formulations provide, and what did not load."""
     table, attributes = _not_loaded(run)
-    if rows:
-        table |= _row_numbers(rows, formulations, questions)
-        table |= _provided(run, formulations)
+    attributes["comment"] = (
+        "one row for each formulation and property; closest_value is the measured number nearest to its tolerance or "
+        "furthest beyond it, among all decided cases"
+    )
+    grid = _Grid(run)
+    if run.formulations:
+        table |= grid.labels() | _provided(run)
         attributes["parts"] = "\n".join(
             schema.text(f"{name}: ")
-            + ", ".join(f"{part}: {'' if has else 'not '}provided" for part, has in _parts(run, name).items())
-            for name in formulations
+            + ", ".join(f"{part}: {'' if has else 'not '}provided" for part, has in parts.items())
+            for name, parts in run.provided.items()
         )
+    if run.rows:
+        table |= _rows(grid, run) | _closest(grid)
     return xr.Dataset(table, attrs=attributes)
 
 
-def _row_numbers(rows: Rows, formulations: Sequence[str], questions: Sequence[Property]) -> dict[str, xr.Variable]:
-    grid = [[rows.get((name, question.id)) for question in questions] for name in formulations]
-
-    def each(what: Any, missing: Any) -> list[list[Any]]:
-        return [[missing if row is None else what(row) for row in line] for line in grid]
-
-    def count(what: Any, long_name: str, comment: str = "") -> xr.Variable:
-        return numbers(_ROW, np.array(each(what, 0), dtype=np.int32), long_name, "1", comment)
-
-    worsts = [[None if row is None else worst(row) for row in line] for line in grid]
-    table = _labels(formulations, questions)
-    table |= {
-        "property_summary": words(["property"], [question.summary for question in questions], "what is asked"),
+def _rows(grid: _Grid, run: Run) -> Table:
+    summaries = [info.summary for info in run.properties.values()]
+    counts = grid.each(lambda row: [row.tally.verdicts.get(verdict, 0) for verdict in Verdict], [0] * len(Verdict))
+    return {
+        "property_summary": words(["property"], summaries, "the property in one line"),
         "verdict": words(["verdict"], list(schema.VERDICTS), "verdict, as in flag_meanings of row_verdict"),
         "row_verdict": codes(
             _ROW,
-            each(lambda row: row.verdict, schema.NOT_PLANNED),
+            grid.each(lambda row: row.verdict, schema.NOT_PLANNED),
             schema.VERDICTS,
             "verdict on the formulation over all cases",
-            "crashed and fail first, then not judged, then pass; missing where the property was not asked",
+            "crashed and fail first, then not judged, then pass; missing where the property was not checked",
             fill=schema.NOT_PLANNED,
+        ),
+        "result": words(
+            _ROW,
+            grid.each(lambda row: str(row.result), ""),
+            "the verdict beside what the formulation states, as tables and pages show it",
         ),
         "promise": codes(
             _ROW,
-            each(lambda row: schema.Promise.of(row.promise), schema.Promise.NO_PROMISE),
+            grid.each(lambda row: schema.Promise.from_promise(row.promise), schema.Promise.NO_PROMISE),
             schema.PROMISES,
             "what the traits of the formulation say",
-            "said_to_fail names a witness, a case that always runs",
+            "stated_to_fail names a witness, a case that always runs",
         ),
         "unexpected": words(
-            _ROW, each(lambda row: row.unexpected, ""), "why this row makes the run fail", "empty where it does not"
+            _ROW, grid.each(lambda row: row.unexpected, ""), "why this row makes the run fail", "empty if it does not"
         ),
-        "known": words(_ROW, each(lambda row: row.known, ""), "why a failure is known", "empty where none is"),
-        "reason": words(_ROW, each(lambda row: row.reason, ""), "why the verdict is no pass, of the worst case"),
-        "planned": count(lambda row: row.planned, "number of random cases planned"),
-        "judged": count(lambda row: row.judged, "number of random cases that were decided"),
+        "known": words(_ROW, grid.each(lambda row: row.known, ""), "why a failure is known", "empty where none is"),
+        "reason": words(_ROW, grid.each(lambda row: row.reason, ""), "why the verdict is no pass, in the worst case"),
+        "planned": grid.count(lambda row: row.planned, "number of random cases planned"),
+        "judged": grid.count(lambda row: row.judged, "number of random cases that were decided"),
         "count": numbers(
-            [*_ROW, "verdict"],
-            np.array(each(_counts, [0] * len(Verdict)), dtype=np.int32),
-            "number of random cases with each verdict",
-            "1",
+            [*_ROW, "verdict"], np.array(counts, dtype=np.int32), "number of random cases with each verdict", "1"
         ),
     }
-    return table | _worst_numbers(worsts)
 
 
-def _parts(run: Run, formulation: str) -> dict[str, bool]:
-    return {part: run.provided.get(formulation, {}).get(part, False) for part in schema.PARTS}
-
-
-def _provided(run: Run, formulations: Sequence[str]) -> dict[str, xr.Variable]:
-    provided = [list(_parts(run, name).values()) for name in formulations]
+def _provided(run: Run) -> Table:
+    """Return the parts of the contract that each formulation has; missing where the run does not say it."""
+    parts = [
+        [run.provided.get(name, {}).get(part, schema.UNSAID) for part in schema.PARTS] for name in run.formulations
+    ]
     return {
         "part": words(["part"], schema.PARTS, "part of the contract that a plugin may leave out"),
         "provided": codes(
             ["formulation", "part"],
-            provided,
+            parts,
             schema.PROVIDED,
             "whether the formulation has that part",
             "see also parts",
+            fill=schema.UNSAID,
         ),
     }
 
 
-def _not_loaded(run: Run) -> tuple[dict[str, xr.Variable], dict[str, str]]:
-    comment = (
-        "one row for each formulation and property; worst_value is the one nearest to its tolerance or furthest "
-        "beyond it, among the decided cases"
-    )
+def _not_loaded(run: Run) -> tuple[Table, dict[str, str]]:
     if not run.not_loaded:
-        return {}, {"comment": comment}
-    one = ["plugin"]
+        return {}, {}
+    axis = ["plugin"]
+    table = {
+        "not_loaded": words(axis, [entry.formulation for entry in run.not_loaded], "plugin that did not load"),
+        "not_loaded_reason": words(axis, [entry.reason for entry in run.not_loaded], "why it did not load"),
+    }
+    lines = [schema.text(f"{entry.formulation}: not loaded: {entry.reason}") for entry in run.not_loaded]
+    return table, {"not_loaded": "\n".join(lines)}
+
+
+def _closest(grid: _Grid) -> Table:
+    def each(read: Callable[[ClosestNumber], Any], missing: Any) -> list[list[Any]]:
+        return grid.each(lambda row: missing if row.closest is None else read(row.closest), missing)
+
+    units = {unit for line in each(lambda found: found.number.quantity.unit, "") for unit in line} - {""}
+    unit = units.pop() if len(units) == 1 else "see closest_units" if units else schema.RATIO
+    cases = each(lambda found: schema.NO_CASE if found.case is None else found.case, schema.NO_CASE)
+    missing = schema.NOT_MEASURED
     return {
-        "not_loaded": words(one, [entry.formulation for entry in run.not_loaded], "plugin that did not load"),
-        "not_loaded_reason": words(one, [entry.reason for entry in run.not_loaded], "why it did not load"),
-    }, {
-        "comment": comment,
-        "not_loaded": "\n".join(
-            schema.text(f"{entry.formulation}: not loaded: {entry.reason}") for entry in run.not_loaded
+        "closest_value": numbers(
+            _ROW,
+            each(lambda found: found.number.value, missing),
+            "number nearest to its tolerance, or furthest beyond it",
+            unit,
+            "missing where nothing was measured",
+            fill=missing,
+        ),
+        "closest_tolerance": numbers(
+            _ROW, each(lambda found: found.number.tolerance, missing), "tolerance of closest_value", unit, fill=missing
+        ),
+        "closest_quantity": words(_ROW, each(lambda found: found.number.quantity.name, ""), "name of closest_value"),
+        "closest_units": words(_ROW, each(lambda found: found.number.quantity.unit, ""), "unit of closest_value"),
+        "closest_case": numbers(
+            _ROW,
+            np.array(cases, dtype=np.int32),
+            "number of the case with closest_value",
+            "1",
+            "the index along `case` in the group of the property; missing where it is the witness",
+            fill=schema.NO_CASE,
         ),
     }
 
 
-def timing_group(rows: Rows, formulations: Sequence[str], questions: Sequence[Property]) -> xr.Dataset:
-    """Seconds of every row and case, the only numbers that a clock has a say in."""
+def timing_group(run: Run) -> xr.Dataset:
+    """Return the seconds of every row and case, the only numbers that depend on a clock."""
     attributes = {"comment": "wall clock; all that two runs with the same seed may differ in"}
-    if not rows:
+    if not run.rows:
         return xr.Dataset(attrs=attributes)
-    longest = max(len(row.outcomes) for row in rows.values())
-    row_seconds = np.full((len(formulations), len(questions)), np.nan)
-    case_seconds = np.full((*row_seconds.shape, longest), np.nan)
-    for i, name in enumerate(formulations):
-        for j, question in enumerate(questions):
-            if (row := rows.get((name, question.id))) is not None:
-                row_seconds[i, j] = row.seconds
-                case_seconds[i, j, : len(row.outcomes)] = [outcome.seconds for outcome in row.outcomes]
-    table = _labels(formulations, questions)
+    grid = _Grid(run)
+    n_cases = max(len(row.outcomes) for row in run.rows)
+    nothing = [np.nan] * n_cases
+    row_seconds = np.array(grid.each(lambda row: row.seconds, np.nan))
+    case_seconds = grid.each(
+        lambda row: [outcome.seconds for outcome in row.outcomes] + nothing[len(row.outcomes) :], nothing
+    )
+    shape = (*row_seconds.shape, n_cases)
+    table = grid.labels()
     table["row_seconds"] = numbers(
         _ROW, row_seconds, "time spent judging, shrinking excluded", schema.SECONDS, fill=np.nan
     )
     table["case_seconds"] = numbers(
-        [*_ROW, "case"], case_seconds, "time spent judging each case", schema.SECONDS, fill=np.nan
+        [*_ROW, "case"],
+        np.array(case_seconds, dtype=np.float64).reshape(shape),
+        "time spent judging each case",
+        schema.SECONDS,
+        fill=np.nan,
     )
     return xr.Dataset(table, attrs=attributes)
-
-
-def _labels(formulations: Sequence[str], questions: Sequence[Property]) -> dict[str, xr.Variable]:
-    return {
-        "formulation": words(["formulation"], formulations, "formulation, as typed on the command line"),
-        "property": words(["property"], [question.id for question in questions], "property, as typed with --property"),
-    }
-
-
-def _counts(row: Row) -> list[int]:
-    verdicts = [outcome.verdict for outcome in row.outcomes]
-    return [verdicts.count(verdict) for verdict in Verdict]
-
-
-def _worst_numbers(worsts: list[list[Worst | None]]) -> dict[str, xr.Variable]:
-    def each(what: Any, missing: Any) -> list[list[Any]]:
-        return [[missing if entry is None else what(entry) for entry in line] for line in worsts]
-
-    units = {entry.quantity.unit for line in worsts for entry in line if entry is not None} or {schema.RATIO}
-    unit = units.pop() if len(units) == 1 else "see worst_units"
-    return {
-        "worst_value": numbers(
-            _ROW, each(lambda entry: entry.value, np.nan), "worst value", unit, "NaN: nothing decided", fill=np.nan
-        ),
-        "worst_tolerance": numbers(
-            _ROW, each(lambda entry: entry.tolerance, np.nan), "tolerance of the worst value", unit, fill=np.nan
-        ),
-        "worst_quantity": words(_ROW, each(lambda entry: entry.quantity.name, ""), "what worst_value is"),
-        "worst_units": words(_ROW, each(lambda entry: entry.quantity.unit, ""), "unit of worst_value"),
-        "worst_case": numbers(
-            _ROW,
-            np.array(each(lambda entry: entry.case, -1), dtype=np.int32),
-            "number of the case with the worst value",
-            "1",
-            "the index along `case` in the group of the property",
-            fill=-1,
-        ),
-    }

@@ -1,8 +1,8 @@
-"""The three kinds of netCDF variable in a report: numbers with a unit, codes with their meanings, and words.
+"""The kinds of netCDF variable in a report: numbers with a unit, codes with their meanings, flags, and words.
 
 Words are stored as fixed-width UTF-8 characters, not as netCDF strings: a file with variables of type `string` kills
-the process that opens it a second time while it is open (HDFGroup/hdf5#5359, Unidata/netcdf4-python#1444), which is
-what somebody does who looks at a report with xarray and replays a case of it.
+the process that opens it a second time while it is open (HDFGroup/hdf5#5359, Unidata/netcdf4-python#1444). A user does
+that who looks at a report with xarray and replays a case of it.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from contactverif_reports.netcdf.schema import text
 
 Dims = Sequence[str]
-_WORTH_COMPRESSING = 4096  # bytes; a compressed variable costs 2 kB more of bookkeeping
+_WORTH_COMPRESSING = 4096  # Bytes of words from which on they are compressed, which costs 2 kB of bookkeeping.
 
 
 def numbers(
     dims: Dims, values: ArrayLike, long_name: str, units: str, comment: str = "", *, fill: float | None = None
 ) -> xr.Variable:
-    """Numbers of any dtype; `fill` marks what is not there."""
+    """Return numbers of any dtype; `fill` marks what is not there."""
     return _variable(dims, np.asarray(values), {"long_name": long_name, "units": units}, comment, fill)
 
 
@@ -36,7 +36,7 @@ def codes(
     *,
     fill: int | None = None,
 ) -> xr.Variable:
-    """Small integers, each with a meaning of one word."""
+    """Return small integers, each with a meaning of one word."""
     attributes = {
         "long_name": long_name,
         "units": "1",
@@ -46,10 +46,21 @@ def codes(
     return _variable(dims, np.asarray(values, dtype=np.int8), attributes, comment, fill)
 
 
+def flags(dims: Dims, values: ArrayLike, meanings: Mapping[str, int], long_name: str, comment: str = "") -> xr.Variable:
+    """Return small integers whose bits have a meaning of one word each."""
+    attributes = {
+        "long_name": long_name,
+        "units": "1",
+        "flag_masks": np.array(list(meanings.values()), dtype=np.int8),
+        "flag_meanings": " ".join(meanings),
+    }
+    return _variable(dims, np.asarray(values, dtype=np.int8), attributes, comment, None)
+
+
 def words(dims: Dims, values: Any, long_name: str, comment: str = "") -> xr.Variable:
-    """Strings: one for no dimensions, a list for one, nested lists for more."""
+    """Return strings: one for no dimensions, a list for one, nested lists for more."""
     characters = np.strings.encode(np.array(_cleaned(values), dtype=np.str_), "utf-8")
-    width = max(8, 1 << (characters.dtype.itemsize - 1).bit_length())  # few widths, so that few dimensions are needed
+    width = max(8, 1 << (characters.dtype.itemsize - 1).bit_length())  # Few widths need few dimensions.
     return _variable(dims, characters.astype(f"S{width}"), {"long_name": long_name}, comment, None)
 
 
@@ -62,8 +73,10 @@ def _variable(
     is_words = values.dtype.kind == "S"
     if is_words:
         attributes["_Encoding"] = "utf-8"
-    else:
-        encoding["_FillValue"] = None if fill is None else values.dtype.type(fill)
+    elif fill is None:
+        encoding["_FillValue"] = None
+    else:  # As an attribute: as an encoding xarray would write it in place of every NaN.
+        attributes["_FillValue"] = values.dtype.type(fill)
     if values.ndim and not (is_words and values.nbytes < _WORTH_COMPRESSING):
         encoding |= {"zlib": True, "complevel": 4}
     return xr.Variable(dims, values, attributes, encoding)

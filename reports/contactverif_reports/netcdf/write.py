@@ -1,4 +1,4 @@
-"""Writes the report of a run, whole or not at all."""
+"""The writer of reports: a file is written whole, or not at all."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["check_writable", "write"]
 
 
 def write(run: Run, path: str | os.PathLike[str]) -> None:
-    """Writes the report of a run, replacing a file that is there; as `files.whole` does.
+    """Write the report of a run, whole or not at all, in place of a file that is there.
 
     Raises
     ------
     MisuseError
-        If the path cannot be written; the same as `check_writable`.
+        If the path cannot be written.
     """
     from contactverif_reports.netcdf.tree import tree_of
 

@@ -1,0 +1,96 @@
+"""The counterexamples of a run in the terminal: numbers, a drawing of the mesh, and the line that replays it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.table import Table
+from rich.text import Text
+
+from contactverif.cli.console import plain_table
+from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.result import Run
+from contactverif_reports.draw import as_text
+
+
+def failing_examples(run: Run) -> list[Counterexample]:
+    """Return the counterexamples of all rows that fail or crash."""
+    failures = (Verdict.FAIL, Verdict.CRASHED)
+    return [example for example in counterexamples(run).values() if example.row.verdict in failures]
+
+
+def counterexample_text(example: Counterexample, report: Path | None) -> Text:
+    """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
+    row, outcome = example.row, example.outcome
+    which = f"the case {outcome.case.name}" if example.is_witness else "the smallest case found"
+    lines = [
+        f"{row.formulation}, {row.property_id}: {row.result}, {which}",
+        *(f"    {line}" for line in _numbers(row.info, outcome)),
+        *(f"    {line}" for line in as_text(outcome.case).splitlines()),
+    ]
+    if report is not None:
+        lines.append(f"    {example.replay_command(str(report))}")
+    return Text("\n".join(["", *lines]))
+
+
+def how_to_keep(run: Run) -> Text | None:
+    """Say how the drawn cases are stored, so that they can be replayed; None where none was drawn."""
+    if not failing_examples(run):
+        return None
+    seed = run.provenance.get("seed")
+    return Text(f"\nTo keep these cases and replay them, run the same command with --seed {seed} --out FILE.nc\n")
+
+
+def replay_table(example: Counterexample, formulation: str, outcome: Outcome) -> Table:
+    """Return the verdict that the report stores beside the verdict now."""
+    table = plain_table("")
+    for column in ("", "formulation", "verdict", "reason"):
+        table.add_column(column)
+    table.add_row("stored", example.formulation, str(example.verdict), example.reason)
+    table.add_row("now", formulation, str(outcome.verdict), outcome.reason)
+    return table
+
+
+def ending_lines(outcome: Outcome) -> list[str]:
+    """Return how Newton's method ended where a property solved, with advice where it did not converge."""
+    details: Mapping[str, float] = outcome.measurement.details if outcome.measurement is not None else {}
+    lines = []
+    for name, value in details.items():
+        kind, _, solution = name.partition(", ")
+        iterations = details.get(name.replace("end", "iterations", 1))
+        if kind == "end" and iterations is not None:
+            which = f" ({solution})" if solution else ""
+            lines.append(f"Newton's method{which}: {_ending(value, iterations)}")
+    return lines
+
+
+def _ending(value: float, iterations: float) -> str:
+    from contactverif.mechanics.newton import End  # It brings scipy, and is needed only where a property solved.
+
+    end = End(int(value))
+    after = f"after {iterations:g} iteration{'s' * (iterations != 1)}"
+    return f"{end.label} {after}" if end is End.CONVERGED else f"{end.label} {after}: {end.advice}"
+
+
+def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
+    """Return each number beside its tolerance, and how Newton ended; the reason where nothing was measured."""
+    measurement = outcome.measurement
+    if measurement is None:
+        return [outcome.reason]
+    lines = [measurement.broken] if measurement.broken else []
+    for number in checked_numbers(info, measurement):
+        mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity
+        lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
+    others = [_detail(name, value) for name, value in measurement.details.items() if not _is_ending(name)]
+    return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
+
+
+def _is_ending(detail: str) -> bool:
+    return detail.partition(", ")[0] in ("end", "iterations")
+
+
+def _detail(name: str, value: float) -> str:
+    kind, _, solution = name.partition(", ")
+    return f"{kind}{f' ({solution})' if solution else ''}: {value:.3g}"

@@ -1,0 +1,130 @@
+"""The counterexamples of a run: the cases that a report stores whole, so that they can be drawn and judged again.
+
+Each has an id that a shell takes as it is. It is spelled like formulation and property, so that it says what failed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Outcome, Verdict
+from contactverif.contract.result import Row, Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Counterexample:
+    """A case on which a formulation fails, or with which it says that it fails.
+
+    Attributes
+    ----------
+    id : str
+        The id on the command line, `vts-me_n_4.patch.flat.transmission`.
+    row : Row
+        The row that the case belongs to.
+    outcome : Outcome
+        The verdict on the case, with its numbers.
+    """
+
+    id: str
+    row: Row
+    outcome: Outcome
+
+    @property
+    def case(self) -> Case:
+        """The case itself."""
+        return self.outcome.case
+
+    @property
+    def is_witness(self) -> bool:
+        """Whether it is the named case of the formulation; else it was shrunk from the random cases."""
+        return self.row.shrunk is None
+
+    @property
+    def formulation(self) -> str:
+        """The formulation as typed on the command line."""
+        return self.row.formulation
+
+    @property
+    def property_id(self) -> str:
+        """The property as typed on the command line."""
+        return self.row.property_id
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the case."""
+        return self.outcome.verdict
+
+    @property
+    def reason(self) -> str:
+        """The reason why the verdict is no pass."""
+        return self.outcome.reason
+
+    def replay_command(self, report: str) -> str:
+        """Return the command that judges the case again."""
+        return f"contactverif replay {shlex.quote(report)} --case {shlex.quote(self.id)}"
+
+
+def counterexamples(run: Run) -> dict[str, Counterexample]:
+    """Return all counterexamples {id: counterexample}, in the order of the run."""
+    entries = [(row, outcome) for row in run.rows if (outcome := counterexample_of(row)) is not None]
+    ids = distinct(case_id(row.formulation, row.property_id, witness=row.shrunk is None) for row, _ in entries)
+    return {id_: Counterexample(id_, *entry) for id_, entry in zip(ids, entries, strict=True)}
+
+
+def counterexample_of(row: Row) -> Outcome | None:
+    """Return the shrunk case, else a witness that failed or broke its promise, else None."""
+    if row.shrunk is not None or row.witness is None:
+        return row.shrunk
+    failed = row.witness.verdict in (Verdict.FAIL, Verdict.CRASHED)
+    return row.witness if failed or (row.promise is False and row.unexpected) else None
+
+
+def find_counterexample(run: Run, id_: str) -> Counterexample:
+    """Return the counterexample of that id.
+
+    Raises
+    ------
+    MisuseError
+        If there is none; the message names ids that exist.
+    """
+    examples = counterexamples(run)
+    if id_ not in examples:
+        raise MisuseError("--case", repr(id_), _suggestion(id_, list(examples)))
+    return examples[id_]
+
+
+def case_id(formulation: str, property_id: str, *, witness: bool = False) -> str:
+    """Return `vts-me_n_4.patch.flat.transmission`, with `.witness` behind it for a witness."""
+    return typeable(f"{formulation}.{property_id}") + (".witness" if witness else "")
+
+
+def typeable(name: str) -> str:
+    """Return the name with only letters, digits, `.`, `_` and `-`, which a shell and netCDF take as they are."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("-.") or "_"
+
+
+def distinct(names: Iterable[str]) -> list[str]:
+    """Return the names in their order; one that was there before gets `-2`, `-3`, … behind it."""
+    result: list[str] = []
+    for name in names:
+        number, free = 1, name
+        while free in result:
+            number += 1
+            free = f"{name}-{number}"
+        result.append(free)
+    return result
+
+
+def _suggestion(id_: str, ids: Sequence[str]) -> str:
+    if not ids:
+        return "a report with counterexamples; this one has none"
+    near = difflib.get_close_matches(id_, ids, n=3, cutoff=0.4)
+    examples = near or ids[:5]
+    more = f" (and {len(ids) - len(examples)} more)" if len(ids) > len(examples) else ""
+    return f"{'an id like' if near else 'one of'} {', '.join(examples)}{more}"

@@ -1,0 +1,261 @@
+"""The variables that store outcomes: random cases, witnesses and counterexamples are written the same way.
+
+Rule for the next editor: `stored_outcomes` reads all that is written here, and an outcome comes back as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.counterexample import distinct, typeable
+from contactverif.contract.property import Measurement, Outcome, PropertyInfo
+from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.variables import codes, flags, numbers, words
+
+Table = dict[str, xr.Variable]
+
+
+@dataclass(frozen=True, slots=True)
+class SharedNames:
+    """The names that all outcomes of a group share, so that random cases and witnesses have the same dimensions.
+
+    Attributes
+    ----------
+    details : tuple[str, ...]
+        The names of the further numbers, in the order in which they first occur.
+    parameters : tuple[str, ...]
+        The names of the parameters that are one number each.
+    n_iterates : int
+        The length of the longest series.
+    """
+
+    details: tuple[str, ...]
+    parameters: tuple[str, ...]
+    n_iterates: int
+
+    @classmethod
+    def from_outcomes(cls, outcomes: Sequence[Outcome]) -> SharedNames:
+        """Collect the names."""
+        measurements = [outcome.measurement for outcome in outcomes if outcome.measurement is not None]
+        series = [values for measurement in measurements for values in measurement.series.values()]
+        return cls(
+            details=tuple(dict.fromkeys(name for measurement in measurements for name in measurement.details)),
+            parameters=tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.summary.parameters)),
+            n_iterates=max(map(len, series), default=0),
+        )
+
+
+class OutcomeVariables:
+    """Makes variables of outcomes along some dimensions.
+
+    Parameters
+    ----------
+    info : PropertyInfo
+        The property that was checked.
+    outcomes : Sequence[Outcome | None]
+        The outcomes, flat; None where there is none.
+    axes : Mapping[str, int]
+        {dimension: length}; the product of the lengths is the number of outcomes.
+    names : SharedNames
+        The names that all outcomes of the group share.
+    prefix : str
+        The beginning of the names of all variables, such as `witness_`.
+    """
+
+    def __init__(
+        self,
+        info: PropertyInfo,
+        outcomes: Sequence[Outcome | None],
+        axes: Mapping[str, int],
+        names: SharedNames,
+        prefix: str = "",
+    ) -> None:
+        self._info, self._outcomes, self._names, self._prefix = info, outcomes, names, prefix
+        self._dims, self._shape = tuple(axes), tuple(axes.values())
+        self._measurements = [outcome.measurement if outcome is not None else None for outcome in outcomes]
+
+    def table(self, *, with_summaries: bool = True) -> Table:
+        """Return all variables; the summaries of the cases only on request."""
+        table = self._verdicts() | self._values() | self._details() | self._series()
+        if with_summaries:
+            table |= self._summaries()
+        return {f"{self._prefix}{name}": variable for name, variable in table.items()}
+
+    def _verdicts(self) -> Table:
+        verdicts = [schema.NOT_PLANNED if outcome is None else int(outcome.verdict) for outcome in self._outcomes]
+        table = {
+            "verdict": codes(
+                self._dims,
+                self._array(verdicts, np.int8),
+                schema.VERDICTS,
+                "verdict on the case",
+                "missing where there is no such case",
+                fill=schema.NOT_PLANNED,
+            ),
+            "state": flags(
+                self._dims,
+                self._array([_state(outcome) for outcome in self._outcomes], np.int8),
+                schema.STATES,
+                "how the case was measured",
+                "bits: numbers were measured; nothing was in contact; the plugin broke the contract",
+            ),
+        }
+        reasons = ["" if outcome is None else outcome.reason for outcome in self._outcomes]
+        table |= self._words("reason", reasons, "why the verdict is no pass")
+        for name, long_name in (
+            ("undecided", "why a failure would not be the fault of the formulation"),
+            ("broken", "a breach that no number shows"),
+        ):
+            texts = ["" if found is None else getattr(found, name) for found in self._measurements]
+            table |= self._words(name, texts, long_name)
+        return table
+
+    def _words(self, name: str, texts: list[str], long_name: str) -> Table:
+        """Return a variable of words; nothing where all are empty."""
+        if not any(texts):
+            return {}
+        nested = np.array(texts, dtype=object).reshape(self._shape).tolist()
+        return {name: words(self._dims, nested, long_name, "empty where there is nothing to say")}
+
+    def _values(self) -> Table:
+        quantities = self._info.quantities
+        if not quantities:
+            return {}
+        names = [quantity.name for quantity in quantities]
+        units = {quantity.unit for quantity in quantities}
+        unit = units.pop() if len(units) == 1 else "see quantity_units"
+        value, tolerance = (self._by_name(names, kind) for kind in ("values", "tolerances"))
+        return {
+            "value": self._numbers("quantity", value, "measured value", unit, "missing where nothing was measured"),
+            "tolerance": self._numbers(
+                "quantity",
+                tolerance,
+                "tolerance of the value",
+                unit,
+                "made from tolerance_formula; for the side see sense",
+            ),
+        }
+
+    def _details(self) -> Table:
+        if not self._names.details:
+            return {}
+        values = self._by_name(self._names.details, "details")
+        comment = "not judged; the property that measured them knows their units"
+        return {"detail_value": self._numbers("detail", values, "further numbers", schema.UNKNOWN, comment)}
+
+    def _series(self) -> Table:
+        """Return the numbers by iterate; nothing where the property declares none."""
+        table: Table = {}
+        if not self._names.n_iterates:
+            return table
+        for name, safe in zip(self._info.series, safe_names(self._info.series), strict=True):
+            values = np.full((len(self._outcomes), self._names.n_iterates), schema.NOT_MEASURED)
+            for number, found in enumerate(self._measurements):
+                series = found.series.get(name, ()) if found is not None else ()
+                values[number, : len(series)] = series
+            long_name = f"{schema.text(name)} at each iterate"
+            unit = self._info.series[name]
+            table[f"series_{safe}"] = self._numbers("iterate", values, long_name, unit, "missing behind the last one")
+        return table
+
+    def _summaries(self) -> Table:
+        """Return what kind of case each is: sizes, penalty, and parameters that are one number."""
+        summaries = [None if outcome is None else outcome.summary for outcome in self._outcomes]
+
+        def count(read: Callable[[CaseSummary], int], long_name: str) -> xr.Variable:
+            counts = [-1 if summary is None else read(summary) for summary in summaries]
+            return numbers(self._dims, self._array(counts, np.int32), long_name, "1", fill=-1)
+
+        def real(read: Callable[[CaseSummary], float], long_name: str, unit: str) -> xr.Variable:
+            reals = [schema.NOT_MEASURED if summary is None else read(summary) for summary in summaries]
+            return numbers(self._dims, self._array(reals, np.float64), long_name, unit, fill=schema.NOT_MEASURED)
+
+        penalty = "distributed penalty: force per length of the interface, per length of penetration"
+        table = {
+            "n_slave_segments": count(lambda case: case.n_slave_segments, "number of slave segments"),
+            "n_master_segments": count(lambda case: case.n_master_segments, "number of master segments"),
+            "penalty": real(lambda case: case.penalty, penalty, schema.PENALTY),
+            "largest_coordinate": real(
+                lambda case: case.largest_coordinate, "largest coordinate, of state and reference", schema.LENGTH
+            ),
+            "shortest_segment": real(
+                lambda case: case.shortest_segment, "shortest current segment, both sides", schema.LENGTH
+            ),
+        }
+        for name, safe in zip(self._names.parameters, safe_names(self._names.parameters), strict=True):
+
+            def parameter(case: CaseSummary, name: str = name) -> float:
+                return case.parameters.get(name, schema.NOT_MEASURED)
+
+            unit = schema.PARAMETER_UNITS.get(name, schema.UNKNOWN)
+            table[f"parameter_{safe}"] = real(parameter, f"parameter of the case: {schema.text(name)}", unit)
+        case_names = ["" if summary is None else summary.name for summary in summaries]
+        return table | self._words("case_name", case_names, "name of the case")
+
+    def _by_name(self, names: Sequence[str], kind: str) -> FloatArray:
+        """Return numbers by name, (n_outcomes, n_names)."""
+        place = {name: column for column, name in enumerate(names)}
+        values = np.full((len(self._outcomes), len(names)), schema.NOT_MEASURED)
+        for number, found in enumerate(self._measurements):
+            entries: Mapping[str, float] = {} if found is None else getattr(found, kind)
+            for name, value in entries.items():
+                values[number, place[name]] = value
+        return values
+
+    def _numbers(self, axis: str, values: FloatArray, long_name: str, unit: str, comment: str) -> xr.Variable:
+        """Return numbers along the dimensions and one more."""
+        shaped = values.reshape(*self._shape, values.shape[1])
+        return numbers([*self._dims, axis], shaped, long_name, unit, comment, fill=schema.NOT_MEASURED)
+
+    def _array(self, entries: list[Any], dtype: type[np.generic]) -> np.ndarray[Any, Any]:
+        return np.array(entries, dtype=dtype).reshape(self._shape)
+
+
+def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
+    """Return what stands along `quantity`, `detail` and `series`: names, units, formulas and reasons."""
+    table: Table = {}
+    if quantities := info.quantities:
+        axis = ["quantity"]
+        symbols = (
+            "u: unit roundoff; X, S: largest coordinate, of case and state; ℓ: shortest segment; L, D: length and "
+            "diameter of the interface; N: number of segments; g: penetration"
+        )
+        formulas = [quantity.tolerance for quantity in quantities]
+        table |= {
+            "quantity": words(axis, [quantity.name for quantity in quantities], "name of the measured number"),
+            "quantity_units": words(axis, [quantity.unit for quantity in quantities], "unit of value and tolerance"),
+            "tolerance_formula": words(axis, formulas, "formula of the tolerance", symbols),
+            "tolerance_reason": words(axis, [quantity.reason for quantity in quantities], "reason for that formula"),
+            "sense": words(
+                axis, [quantity.sense for quantity in quantities], "relation of value to tolerance in a pass"
+            ),
+        }
+    if names.details:
+        table["detail"] = words(["detail"], names.details, "name of the further number")
+    if info.series:
+        table["series"] = words(["series"], list(info.series), "name of the numbers by iterate, as in series_NAME")
+        table["series_units"] = words(["series"], list(info.series.values()), "unit of the numbers by iterate")
+    if names.parameters:
+        long_name = "name of the parameter, as in parameter_NAME"
+        table["parameter"] = words(["parameter"], names.parameters, long_name)
+    return table
+
+
+def safe_names(names: Sequence[str] | Mapping[str, Any]) -> list[str]:
+    """Return the names as parts of the names of variables, each different."""
+    return distinct(map(typeable, names))
+
+
+def _state(outcome: Outcome | None) -> int:
+    if outcome is None:
+        return 0
+    found: Measurement | None = outcome.measurement
+    measured = 0 if found is None else schema.MEASURED + (schema.IDLE if found.idle else 0)
+    return measured + (schema.BREACH if outcome.breach else 0)

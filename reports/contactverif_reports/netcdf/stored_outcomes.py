@@ -1,0 +1,197 @@
+"""Outcomes as they are read from a report: each is made from the arrays of its group when somebody asks for it.
+
+A report may hold millions of cases. Made all at once, they would take a hundred times the memory of the arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, overload
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.arrays import FloatArray, freeze
+from contactverif.contract.case import Case
+from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.property import Measurement, Outcome, PropertyInfo, Quantity, Verdict
+from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.outcome_variables import safe_names
+
+_REALS = ("penalty", "largest_coordinate", "shortest_segment")
+
+
+class OutcomeArrays:
+    """The outcomes of a group along some dimensions, by their flat number.
+
+    Parameters
+    ----------
+    dataset : xr.Dataset
+        The group, loaded.
+    info : PropertyInfo
+        The property of the group.
+    dims : Sequence[str]
+        The dimensions along which outcomes are counted.
+    prefix : str
+        The beginning of the names of the variables, such as `witness_`.
+
+    Raises
+    ------
+    ValueError
+        If a variable has other dimensions, or a code has no meaning.
+    KeyError
+        If a variable is missing.
+    """
+
+    def __init__(self, dataset: xr.Dataset, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
+        self._dataset, self._dims, self._prefix = dataset, tuple(dims), prefix
+        self.verdicts = self._read("verdict")
+        known = [schema.NOT_PLANNED, *schema.VERDICTS.values()]
+        if not np.isin(self.verdicts, known).all():
+            raise ValueError(f"{prefix}verdict holds a code without a meaning")
+        self._states = self._read("state")
+        self._texts = {name: self._read(name) for name in ("reason", "undecided", "broken") if self._has(name)}
+        self._quantities = [quantity.name for quantity in info.quantities]
+        self._details = _names(dataset, "detail")
+        self._values, self._tolerances, self._detail_values = (
+            self._read(name, axis) if along else np.empty((len(self.verdicts), 0))
+            for name, axis, along in (
+                ("value", "quantity", self._quantities),
+                ("tolerance", "quantity", self._quantities),
+                ("detail_value", "detail", self._details),
+            )
+        )
+        self._series = {
+            name: self._read(f"series_{safe}", "iterate")
+            for name, safe in zip(info.series, safe_names(info.series), strict=True)
+            if self._has(f"series_{safe}")
+        }
+        self._read_summaries()
+
+    def _read_summaries(self) -> None:
+        self._parameters = _names(self._dataset, "parameter")
+        if not self._has("n_slave_segments"):  # Whole cases stand elsewhere.
+            return
+        self._counts = np.column_stack([self._read("n_slave_segments"), self._read("n_master_segments")])
+        columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
+        self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
+        self._case_names = self._read("case_name") if self._has("case_name") else None
+
+    def outcome(self, number: int, case: Case | None = None, seconds: float = 0.0) -> Outcome | None:
+        """Return an outcome, with the whole case if it is given; None where there is none."""
+        verdict = int(self.verdicts[number])
+        if verdict == schema.NOT_PLANNED:
+            return None
+        state = int(self._states[number])
+        return Outcome(
+            self._summary(number) if case is None else case,
+            Verdict(verdict),
+            self._text("reason", number),
+            self._measurement(number, idle=bool(state & schema.IDLE)) if state & schema.MEASURED else None,
+            seconds=seconds,
+            breach=bool(state & schema.BREACH),
+        )
+
+    def _summary(self, number: int) -> CaseSummary:
+        n_slave, n_master = self._counts[number].tolist()
+        penalty, largest, shortest, *parameters = self._reals[number].tolist()
+        name = "" if self._case_names is None else str(self._case_names[number])
+        return CaseSummary(n_slave, n_master, penalty, largest, shortest, _present(self._parameters, parameters), name)
+
+    def _measurement(self, number: int, *, idle: bool) -> Measurement:
+        return Measurement(
+            _present(self._quantities, self._values[number].tolist()),
+            _present(self._quantities, self._tolerances[number].tolist()),
+            undecided=self._text("undecided", number),
+            broken=self._text("broken", number),
+            details=_present(self._details, self._detail_values[number].tolist()) if self._details else {},
+            series={
+                name: freeze(values[number, :length], np.float64)
+                for name, values in self._series.items()
+                if (length := _length(values[number]))
+            },
+            idle=idle,
+        )
+
+    def _text(self, name: str, number: int) -> str:
+        return str(self._texts[name][number]) if name in self._texts else ""
+
+    def _has(self, name: str) -> bool:
+        return f"{self._prefix}{name}" in self._dataset.variables
+
+    def _read(self, name: str, *axes: str) -> np.ndarray[Any, Any]:
+        """Return a variable as an array (n_outcomes, *axes)."""
+        variable = self._dataset.variables[f"{self._prefix}{name}"]
+        if variable.dims != (*self._dims, *axes):
+            raise ValueError(f"{self._prefix}{name} has the dimensions {variable.dims}")
+        values: np.ndarray[Any, Any] = variable.values
+        return values.reshape(-1, *values.shape[len(self._dims) :])
+
+
+class StoredOutcomes(Sequence[Outcome]):
+    """The outcomes of one row, in the order of the run.
+
+    Parameters
+    ----------
+    arrays : OutcomeArrays
+        The outcomes of all formulations.
+    first, n_cases : int
+        The flat number of the first outcome, and the number of outcomes.
+    seconds : FloatArray, shape (n_cases,)
+        The time that each took.
+    """
+
+    def __init__(self, arrays: OutcomeArrays, first: int, n_cases: int, seconds: FloatArray) -> None:
+        self._arrays, self._first, self._n_cases, self._seconds = arrays, first, n_cases, seconds
+
+    def __len__(self) -> int:
+        return self._n_cases
+
+    @overload
+    def __getitem__(self, number: int) -> Outcome: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
+    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
+        if isinstance(number, slice):
+            return tuple(self[n] for n in range(*number.indices(self._n_cases)))
+        if not -self._n_cases <= number < self._n_cases:
+            raise IndexError(number)
+        number %= self._n_cases
+        outcome = self._arrays.outcome(self._first + number, seconds=float(self._seconds[number]))
+        assert outcome is not None
+        return outcome
+
+
+def read_info(dataset: xr.Dataset) -> PropertyInfo:
+    """Return the property of a group.
+
+    Raises
+    ------
+    KeyError
+        If an attribute or variable is missing.
+    """
+    columns = ("quantity", "quantity_units", "tolerance_formula", "tolerance_reason", "sense")
+    needs = str(dataset.attrs["needs"])
+    return PropertyInfo(
+        str(dataset.attrs["property_id"]),
+        str(dataset.attrs["family"]),
+        str(dataset.attrs["summary"]),
+        tuple(Quantity(*row) for row in zip(*(_names(dataset, name) for name in columns), strict=True)),
+        needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
+        series=dict(zip(_names(dataset, "series"), _names(dataset, "series_units"), strict=True)),
+    )
+
+
+def _names(dataset: xr.Dataset, name: str) -> list[str]:
+    return [str(word) for word in dataset.variables[name].values] if name in dataset.variables else []
+
+
+def _present(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    """Return {name: value} without what was not measured."""
+    return {name: value for name, value in zip(names, values, strict=True) if value != schema.NOT_MEASURED}
+
+
+def _length(series: FloatArray) -> int:
+    """Return the number of iterates in front of the padding."""
+    present = np.flatnonzero(series != schema.NOT_MEASURED)
+    return int(present[-1]) + 1 if len(present) else 0

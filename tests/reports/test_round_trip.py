@@ -1,0 +1,241 @@
+"""A run comes back from its report as it was: every table, page and comparison is the same from memory and from a file.
+
+Rule for the next editor: what a new table or page shows belongs into `everything_shown`.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+from made import ERROR, SLOPE, awkward, flat, outcome, question, small_run
+from rich.console import Console, RenderableType
+
+from contactverif.cli.changes_tables import ChangesTable, regressions_text
+from contactverif.cli.comparison_tables import errors_table, iterations_table, last_line, results_table
+from contactverif.cli.counterexample_text import counterexample_text, failing_examples, how_to_keep
+from contactverif.cli.run_tables import RunTable, summary
+from contactverif.contract.counterexample import counterexamples
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.result import NotLoaded, Result, Row, Run
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import run as verify
+from contactverif_reports.compare.cells import Cell
+from contactverif_reports.compare.comparison import Comparison
+from contactverif_reports.compare.regression import Changes, NamedRun
+from contactverif_reports.html.comparison_page import changes_page, comparison_page
+from contactverif_reports.html.report_page import report_page
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import case_ids, read_run
+from contactverif_reports.netcdf.write import write
+
+
+def hard_run() -> Run:
+    """Rows that are hard to store: NaN, kinks, breaches, series with gaps, no quantities, fewer cases than planned."""
+    info = question("newton.history", "newton", ERROR, SLOPE)
+    info = replace(info, series={"residual": "N", "a/b ′": "1"}, needs=frozenset({"pair", "tangent"}))
+    case, other = flat([2, 2], [4]), flat([1, 1, 2], [2, 2])
+    series = {"residual": np.array([1.0, np.nan, 1e-9, np.nan]), "a/b ′": np.array([np.inf])}
+    good = Measurement({"force error": 1e-15, "slope": 2.0}, {"force error": 1e-12, "slope": 1.9}, series=series)
+    details = {"iterations": 4.0, "end": 1.0, "x": np.nan}
+    outcomes = (
+        Outcome(case, Verdict.PASS, "", good, 0.5),
+        Outcome(
+            other, Verdict.FAIL, "force error is nan", Measurement({"force error": np.nan}, {"force error": 1e-12})
+        ),
+        Outcome(case, Verdict.UNDECIDED, "a kink", replace(good, undecided="a kink", idle=True), 0.25),
+        Outcome(case, Verdict.UNDECIDED, "roundoff", replace(good, undecided="roundoff")),
+        Outcome(case, Verdict.UNDECIDED, "a kink", replace(good, undecided="a kink")),
+        Outcome(other, Verdict.FAIL, "changed its input", replace(good, broken="changed its input", series={})),
+        Outcome(other, Verdict.FAIL, "breaks the contract: shape (3,)", None, breach=True),
+        Outcome(awkward(), Verdict.PASS, "", Measurement({}, {}, details={"end": 0.0, "iterations": 3.0})),
+        Outcome(case, Verdict.PASS, "", Measurement({}, {"slope": 1.9}, details=details)),
+    )
+    rows = [
+        Row("mine", info, Verdict.FAIL, True, reason="breaks the contract", planned=12, outcomes=outcomes,
+            shrunk=outcomes[6], seconds=3.0),
+        Row("mine", question("a.b", "a"), Verdict.NOT_JUDGED, None, reason="0 of 9 cases judged", planned=9),
+        Row("mine", question("patch", "patch", ERROR), Verdict.PASS, False, planned=1, outcomes=(outcome(case, 0.0),),
+            witness=replace(outcome(case, 0.0), case_or_summary=awkward())),
+        Row("mine", question("patch.x", "patch", ERROR), Verdict.FAIL, None, known="issue 7", planned=1,
+            outcomes=(outcome(case, 0.5),), shrunk=outcome(case, 0.5)),
+        Row("yours", info, Verdict.PASS, True, planned=1, outcomes=outcomes[:1]),
+        Row("yours", question("patch", "patch", ERROR), Verdict.NOT_APPLICABLE, None, reason="no springs"),
+    ]  # fmt: skip
+    parts = {"pair": True, "tangent": False, "contact_points": True}
+    return Run(tuple(rows), (), {"mine": parts, "yours": parts, "idle": parts}, {"seed": "1", "examples": "9"})
+
+
+def real_run() -> Run:
+    """Two formulations as `verify` finds them, one of which fails as it states."""
+    subjects = [load_formulation(name) for name in ("vts-ppt", "nts")]
+    return verify(subjects, load_properties(["patch.flat.*", "newton.*", "purity"]), examples=4, seed=3)
+
+
+RUNS: dict[str, Callable[[], Run]] = {
+    "small": small_run,
+    "passing": lambda: small_run(passing=True),
+    "hard": hard_run,
+    "nothing": lambda: Run((), (NotLoaded("mine", "no such module"),), {}, {"seed": "1"}),
+    "real": real_run,
+}
+
+
+@pytest.fixture(params=RUNS)
+def live(request: pytest.FixtureRequest) -> Run:
+    return RUNS[request.param]()
+
+
+@pytest.fixture
+def stored(live: Run, tmp_path: Path) -> Run:
+    write(live, tmp_path / "report.nc")
+    return read_run(tmp_path / "report.nc")
+
+
+def text_of(content: RenderableType, width: int = 100) -> str:
+    console = Console(width=width, record=True, file=None, quiet=True, highlight=False, markup=False)
+    console.print(content)
+    return console.export_text(styles=True)
+
+
+def everything_shown(run: Run) -> dict[str, str]:
+    """All that somebody is shown of a run, by name."""
+    shown = {"page": report_page(run, "report.nc"), "last line": text_of(summary(run))}
+    shown |= {f"table, {width} columns": text_of(RunTable(run), width) for width in (80, 140)}
+    shown |= {example.id: text_of(counterexample_text(example, Path("r.nc"))) for example in failing_examples(run)}
+    shown["advice"] = str(how_to_keep(run))
+    for reference in run.formulations[:1] if run.rows else ():
+        comparison = Comparison.from_run(run, reference)
+        tables = (results_table, errors_table, iterations_table, last_line)
+        shown |= {table.__name__: text_of(table(comparison)) for table in tables}
+        shown["comparison"] = comparison_page(comparison, (), (), ())
+    named = NamedRun.from_run("r.nc", run)
+    changes = Changes.between(named, named)
+    shown |= {"changes": text_of(ChangesTable(changes)), "regressions": text_of(regressions_text(changes))}
+    return shown | {"page of changes": changes_page(changes, counterexamples(run))}
+
+
+def test_a_report_that_is_read_and_written_again_is_the_same(stored: Run, tmp_path: Path) -> None:
+    write(stored, tmp_path / "again.nc")
+    assert same_data(tmp_path / "report.nc", tmp_path / "again.nc") == []
+
+
+def test_all_that_is_shown_is_the_same_from_memory_and_from_a_file(live: Run, stored: Run) -> None:
+    ours, theirs = everything_shown(live), everything_shown(stored)
+    assert list(ours) == list(theirs)
+    for name, text in ours.items():
+        assert text == theirs[name], name
+
+
+def test_what_is_counted_is_the_same(live: Run, stored: Run) -> None:
+    assert stored.promises_kept is live.promises_kept
+    assert [stored.count(result) for result in Result] == [live.count(result) for result in Result]
+    assert (stored.formulations, list(stored.properties)) == (live.formulations, list(live.properties))
+    assert stored.provided == live.provided
+    assert stored.provenance == live.provenance
+    for ours, theirs in zip(live.rows, stored.rows, strict=True):
+        assert (ours.verdict, ours.promise, ours.known, ours.reason) == (
+            theirs.verdict, theirs.promise, theirs.known, theirs.reason,
+        )  # fmt: skip
+        assert (ours.planned, ours.judged, ours.undecided, ours.breach) == (
+            theirs.planned, theirs.judged, theirs.undecided, theirs.breach,
+        )  # fmt: skip
+        assert ours.tally.reasons == theirs.tally.reasons
+        assert (ours.info.quantities, ours.info.needs, ours.info.series, ours.info.summary) == (
+            theirs.info.quantities, theirs.info.needs, theirs.info.series, theirs.info.summary,
+        )  # fmt: skip
+
+
+def test_every_outcome_comes_back(live: Run, stored: Run) -> None:
+    for ours, theirs in zip(live.rows, stored.rows, strict=True):
+        for our, their in zip(ours.outcomes, theirs.outcomes, strict=True):
+            assert same_outcome(our, their), (ours.property_id, our, their)
+        assert (ours.witness is None) is (theirs.witness is None)
+        if ours.witness is not None and theirs.witness is not None:
+            assert same_outcome(ours.witness, theirs.witness)
+
+
+def same_outcome(a: Outcome, b: Outcome) -> bool:
+    """Whether all but the time is the same; NaN is NaN, and a mapping has no order."""
+    return (a.verdict, a.reason, a.breach, repr(a.summary)) == (b.verdict, b.reason, b.breach, repr(b.summary)) and (
+        facts(a.measurement) == facts(b.measurement)
+    )
+
+
+def facts(measurement: Measurement | None) -> object:
+    if measurement is None:
+        return None
+    numbers = (measurement.values, measurement.tolerances, measurement.details)
+    series = {name: np.asarray(values).tobytes() for name, values in measurement.series.items()}
+    return [repr(sorted(entry.items())) for entry in numbers], series, measurement.undecided, measurement.broken
+
+
+def test_the_cases_of_a_row_are_a_sequence(tmp_path: Path) -> None:
+    write(hard_run(), tmp_path / "report.nc")
+    outcomes = read_run(tmp_path / "report.nc").rows[0].outcomes
+    assert len(outcomes) == 9
+    assert outcomes[-1].verdict is Verdict.PASS
+    assert [one.verdict for one in outcomes[5:7]] == [Verdict.FAIL, Verdict.FAIL]
+    with pytest.raises(IndexError):
+        outcomes[9]
+    with pytest.raises(MisuseError, match="case: found the summary of a case; needed a counterexample"):
+        _ = outcomes[0].case
+
+
+def test_a_number_that_was_not_measured_has_no_margin() -> None:
+    """A tolerance without its value is no failure; a value that is NaN is one."""
+    cell = Cell.from_row(hard_run().rows[0])
+    assert cell.margins[0] == pytest.approx(0.95)
+    assert np.isinf(cell.margins[[1, 5, 6]]).all()
+    assert np.isnan(cell.margins[[2, 3, 4, 7, 8]]).all()
+
+
+def test_the_counts_say_whether_anything_was_judged(tmp_path: Path) -> None:
+    """A run whose only property fails as announced keeps its promises, and says that nothing passed."""
+    run = small_run()
+    write(replace(run, rows=run.rows[3:4], not_loaded=()), tmp_path / "report.nc")
+    with netCDF4.Dataset(tmp_path / "report.nc") as file:
+        assert file.promises_kept == "true"
+        counts = {name: int(file.getncattr(name)) for name in file.ncattrs() if name.startswith("n_")}
+    assert counts.pop("n_properties_planned") == counts.pop("n_judged") == counts.pop("n_failed_as_stated") == 1
+    assert set(counts.values()) == {0}
+
+
+def test_counterexamples_are_those_of_the_run(tmp_path: Path) -> None:
+    write(small_run(), tmp_path / "report.nc")
+    assert case_ids(tmp_path / "report.nc") == list(counterexamples(small_run()))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.95])
+def test_a_report_that_was_cut_is_damaged_and_nothing_worse(tmp_path: Path, share: float) -> None:
+    write(small_run(), tmp_path / "report.nc")
+    whole = (tmp_path / "report.nc").read_bytes()
+    (tmp_path / "cut.nc").write_bytes(whole[: int(share * len(whole))])
+    for _ in range(2):  # a file that is not closed crashes the process at the second time
+        with pytest.raises(MisuseError, match=r"cut.nc") as caught:
+            read_run(tmp_path / "cut.nc")
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["row_verdict", "planned", "promise", "reason"])
+def test_a_report_that_lacks_something_is_damaged(tmp_path: Path, name: str) -> None:
+    write(small_run(), tmp_path / "report.nc")
+    shutil.copy(tmp_path / "report.nc", tmp_path / "lacking.nc")
+    with netCDF4.Dataset(tmp_path / "lacking.nc", "a") as file:
+        file["summary"].renameVariable(name, "gone")
+    with pytest.raises(MisuseError, match="needed an undamaged report"):
+        read_run(tmp_path / "lacking.nc")
+
+
+def test_a_code_without_a_meaning_is_damage(tmp_path: Path) -> None:
+    write(small_run(), tmp_path / "report.nc")
+    with netCDF4.Dataset(tmp_path / "report.nc", "a") as file:
+        file["patch/flat/transmission/verdict"][0, 0] = 77
+    with pytest.raises(MisuseError, match="verdict holds a code without a meaning"):
+        read_run(tmp_path / "report.nc")
