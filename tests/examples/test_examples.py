@@ -36,7 +36,7 @@ PROMISES = {
     "newton_trace": [r"vts-ppt\n(?s:.*?)converged: ", r"vts-me\n(?s:.*)2-cycle: "],
     "own_mesh": [r"2 slave segments on 2 master segments", r"vts-me +patch\.flat\.transmission +fail"],
     "own_scene": [r"converged after \d iterations", r"largest pressure in the block: \d+"],
-    "read_report": [r"vts-me: largest error [1-9]e-01", r"vts-ppt: largest error [1-9]e-1\d"],
+    "read_report": [r"vts-me: largest error \de\+\d\d tolerances", r"vts-ppt: largest error \de-\d\d tolerances"],
     "smallest_failing_mesh": [r"1 slave segment on 2 master segments", r"error of a nodal force 0\.\d+"],
 }
 
