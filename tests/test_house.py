@@ -277,7 +277,7 @@ def test_a_file_name_says_which_file_is_meant() -> None:
 
 
 # What the house may measure. `pytest tests/test_house.py -s -k measure` prints what it does measure.
-MOST_FUNCTIONS_ABOVE_TEN = 30  # Functions with a cyclomatic complexity above 10, by radon: at the end 25.
+MOST_FUNCTIONS_ABOVE_TEN = 25  # Functions with a cyclomatic complexity above 10, by radon.
 MOST_ARGUMENTS = 13  # Arguments of one function, `self` not counted: at the end 12.
 MOST_LONG_FILES = 8  # Files with more than LONG lines, of more than 160.
 LONG = 400
