@@ -13,8 +13,6 @@ from page_text import plain, sentence, table
 from repository_pages import relink
 
 FOLDER = Path("reports") / "paper"
-# What the variables of /statements were called before, {name now: name before}.
-_FORMER = {"place": "figure", "claim": "says", "result": "found", "agreement": "verdict", "figure": "drawing"}
 
 
 def paper_figures(root: Path) -> dict[str, Path]:
@@ -28,14 +26,10 @@ def paper_page(root: Path) -> str:
     with xr.open_datatree(root / FOLDER / "paper.nc") as tree:
         statements = tree["statements"].to_dataset().load()
         captions = _captions(tree)
-    if "claim" not in statements:
-        statements = statements.rename({"figure": "place"}).rename(
-            {former: name for name, former in _FORMER.items() if name != "place"}
-        )
     meanings = str(statements.agreement.attrs["flag_meanings"]).split()
     verdicts = [meanings[int(code)].replace("_", " ") for code in statements.agreement.values]
     counts = [(word.replace("_", " "), verdicts.count(word.replace("_", " "))) for word in meanings]
-    conditions = statements.condition.values if "condition" in statements else [""] * len(verdicts)
+    conditions = statements.condition.values
     rows = []
     for number, verdict in enumerate(verdicts):
         place, claim, result = (str(statements[name].values[number]) for name in ("place", "claim", "result"))
