@@ -146,7 +146,7 @@ def test_equal_reports_have_no_regression(ask: Ask, reports: Path) -> None:
     answer = ask(reports / "old.nc", reports / "same.nc")
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"patch.flat.transmission +pass .* 0 +12 +0 +\d", answer.out)
-    assert answer.out.rstrip().endswith("nothing got worse")
+    assert answer.out.rstrip().endswith("Nothing got worse.")
 
 
 def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
 def test_other_seeds_are_compared_as_distributions_and_it_is_said(ask: Ask, reports: Path) -> None:
     answer = ask(reports / "old.nc", reports / "other.nc")
     assert answer.status == 0
-    assert "all rows asked other cases: their errors are compared as distributions" in answer.out
+    assert "all rows have other cases: their errors are compared as distributions" in answer.out
 
 
 def test_a_report_needs_no_ending_and_a_formulation_is_none(
@@ -250,7 +250,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
         ("old.nc", ["-p", "purity"], r"--property: found 'purity'; needed one of patch.flat.transmission"),
         ("old.nc", ["--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
         ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
-        ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0; needed schema 1"),
+        ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0, which an older .*; needed schema 2; .*"),
         (
             "damaged.nc",
             [],

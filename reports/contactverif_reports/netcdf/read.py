@@ -137,9 +137,9 @@ def _check_schema(root: xr.Dataset, path: str) -> None:
     if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
     version = str(root.attrs["schema"])
-    if version == "1":
+    if version.isdecimal() and int(version) < int(schema.SCHEMA):
         needed = f"schema {schema.SCHEMA}; run the same command again to write the report anew"
-        raise MisuseError(_ARGUMENT, f"{path} of schema 1, which an older contactverif wrote", needed)
+        raise MisuseError(_ARGUMENT, f"{path} of schema {version}, which an older contactverif wrote", needed)
     if version != schema.SCHEMA:
         raise MisuseError(
             _ARGUMENT, f"{path} of schema {version}", f"schema {schema.SCHEMA}; install a newer contactverif"
