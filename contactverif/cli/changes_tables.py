@@ -44,9 +44,9 @@ class ChangesTable:
             yield changed_errors(changes)
         if changes.iterations:
             yield changed_iterations(changes)
-        for where, names in (("only in the old", changes.gone), ("only in the new", changes.added)):
+        for label, names in (("only in the old", changes.removed), ("only in the new", changes.added)):
             if names:
-                yield Text(f"{where}: {'; '.join(names)}")
+                yield Text(f"{label}: {'; '.join(names)}")
 
 
 def changed_results(changes: Changes) -> Table:

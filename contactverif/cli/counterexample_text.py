@@ -24,9 +24,9 @@ def failing_examples(run: Run) -> list[Counterexample]:
 def counterexample_text(example: Counterexample, report: Path | None) -> Text:
     """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
     row, outcome = example.row, example.outcome
-    which = f"the case {outcome.case.name}" if example.is_witness else "the smallest case found"
+    description = f"the case {outcome.case.name}" if example.is_witness else "the smallest case found"
     lines = [
-        f"{row.formulation}, {row.property_id}: {row.result}, {which}",
+        f"{row.formulation}, {row.property_id}: {row.result}, {description}",
         *(f"    {line}" for line in _numbers(row.info, outcome)),
         *(f"    {line}" for line in as_text(outcome.case).splitlines()),
     ]
@@ -61,8 +61,8 @@ def ending_lines(outcome: Outcome) -> list[str]:
         kind, _, solution = name.partition(", ")
         iterations = details.get(name.replace("end", "iterations", 1))
         if kind == "end" and iterations is not None:
-            which = f" ({solution})" if solution else ""
-            lines.append(f"Newton's method{which}: {_ending(value, iterations)}")
+            label = f" ({solution})" if solution else ""
+            lines.append(f"Newton's method{label}: {_ending(value, iterations)}")
     return lines
 
 

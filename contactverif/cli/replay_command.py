@@ -44,7 +44,7 @@ def replay(
     from contactverif.cli.console import show
     from contactverif.cli.counterexample_text import ending_lines, replay_table
     from contactverif.contract.property import Verdict
-    from contactverif.run.one_case import judged, the_formulation, the_property
+    from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case
 
@@ -56,7 +56,7 @@ def replay(
     example = read_case(report, case)
     subject = the_formulation(formulation or example.formulation)
     question = the_property(example.property_id)
-    outcome = judged(question, example.case, subject)
+    outcome = judge_if_applicable(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written
         draw_outcome(subject, question, outcome, picture, argument="--out")
     typer.echo(as_text(example.case))

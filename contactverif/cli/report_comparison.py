@@ -47,7 +47,7 @@ def compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFi
     ids = _select(every, globs)
     runs = [NamedRun.from_run(str(path), run.only(ids)) for path, run in zip(paths, (old, new), strict=True)]
     changes = Changes.between(*runs)
-    if not changes.changes and not changes.lost:
+    if not changes.changes and not changes.no_longer_loaded:
         kind = "property" if set(old.formulations) & set(new.formulations) else "formulation"
         names = " and ".join(", ".join(_names(run.run, kind)) or "nothing" for run in runs)
         raise MisuseError("NEW.nc", f"no {kind} that OLD.nc has too ({names})", "two reports with something in common")

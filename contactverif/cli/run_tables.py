@@ -91,8 +91,8 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str]) -> Text:
 
 
 def _name(row: Row) -> str:
-    why = f" ({row.unexpected})" if row.result is Result.BROKEN_PROMISE else ""
-    return f"{row.formulation} {row.property_id}{why}"
+    reason = f" ({row.unexpected})" if row.result is Result.BROKEN_PROMISE else ""
+    return f"{row.formulation} {row.property_id}{reason}"
 
 
 def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:

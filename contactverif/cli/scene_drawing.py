@@ -16,7 +16,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import has_bodies
-from contactverif.run.one_case import judged, the_formulation, the_property
+from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
 from contactverif.run.registry import formulation_names, load_formulation
 from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
@@ -109,7 +109,7 @@ def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFile
     if len(names) > 1:
         raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
     subject, question = the_formulation((names or [stored.formulation])[0]), the_property(stored.property_id)
-    outcome = judged(question, stored.case, subject)
+    outcome = judge_if_applicable(question, stored.case, subject)
     if not files.paths:
         typer.echo(as_text(stored.case))
     for picture in files.pictures():

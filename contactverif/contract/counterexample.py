@@ -42,7 +42,7 @@ class Counterexample:
 
     @property
     def is_witness(self) -> bool:
-        """Whether it is the named case of the formulation; else it was shrunk from the random cases."""
+        """Return whether it is the named case of the formulation; otherwise it was shrunk from the random cases."""
         return self.row.shrunk is None
 
     @property

@@ -120,7 +120,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PropertyInfo:
-    """What a reader of results needs to know of a property: plain data, which a report stores.
+    """The description of a property for a reader of results: plain data, which a report stores.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class Outcome:
 
     @property
     def decided(self) -> bool:
-        """Whether the case counts as judged."""
+        """Return whether the case counts as judged."""
         return self.verdict in DECIDED
 
     @property

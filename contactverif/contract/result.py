@@ -104,7 +104,7 @@ def _closer(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """What one formulation made of one property.
+    """The result of one formulation on one property.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class Row:
 
     @property
     def breach(self) -> bool:
-        """Whether the plugin broke the contract somewhere, which fails a run whatever the formulation states."""
+        """Return whether the plugin broke the contract somewhere, which fails a run whatever the formulation states."""
         return self.tally.breach
 
     @property
@@ -181,7 +181,7 @@ class Row:
 
     @property
     def unexpected(self) -> str:
-        """Why this row makes the run fail; empty if it does not."""
+        """The reason why this row makes the run fail; empty if it does not."""
         match self.verdict:
             case Verdict.CRASHED:
                 return "" if self.known else "crashed"
@@ -226,7 +226,7 @@ class NotLoaded:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """All that one run found.
+    """The results of one run.
 
     Attributes
     ----------
@@ -267,7 +267,7 @@ class Run:
 
     @property
     def promises_kept(self) -> bool:
-        """Whether every promise is kept, every property was judged, and every plugin loaded."""
+        """Return whether every promise is kept, every property was judged, and every plugin loaded."""
         return bool(self.rows) and not self.not_loaded and not self.unexpected
 
     def count(self, *results: Result) -> int:

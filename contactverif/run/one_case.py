@@ -1,4 +1,4 @@
-"""One formulation, one property, asked for by name and put together: what replaying and drawing a case share."""
+"""Load one formulation and one property by name, and judge one case: replaying and drawing a case share this."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactverif.run.registry import load_formulation, load_properties
 
 
 def the_formulation(name: str) -> Subject:
-    """The formulation of that name, with its options.
+    """Return the formulation of that name, with its options.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def the_formulation(name: str) -> Subject:
 
 
 def the_property(property_id: str) -> Property:
-    """The property of that id.
+    """Return the property of that id.
 
     Raises
     ------
@@ -40,8 +40,8 @@ def the_property(property_id: str) -> Property:
     return question
 
 
-def judged(question: Property, case: Case, subject: Subject) -> Outcome:
-    """The outcome of a case; also where the property cannot be asked of the formulation."""
+def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
+    """Judge a case; if the property does not apply to the formulation, return an outcome that says so."""
     if reason := question.applicable(subject.traits):
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
@@ -50,7 +50,7 @@ def judged(question: Property, case: Case, subject: Subject) -> Outcome:
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
-    """Nodal forces (n_nodes, dim) to draw; None where the plugin gives none, or has multipliers: no case holds any."""
+    """Return nodal forces (n_nodes, dim) to draw; None if the plugin returns none or has multipliers."""
     try:
         formulation = subject.for_case(case)
         if formulation.n_multipliers(case.interface):

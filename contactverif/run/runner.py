@@ -40,7 +40,7 @@ Phase = Literal["drawing", "judging", "shrinking"]
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is with one property of one formulation.
+    """The progress of a run with one property of one formulation.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Progress:
     phase : Phase
         The kind of work.
     count, planned : int
-        The number of cases that are finished, and of all; shrinking may end early.
+        The numbers of finished cases and of all cases; shrinking may end early.
     """
 
     formulation: str
@@ -128,10 +128,10 @@ def run(
     )
 
 
-def _check_once(what: str, names: Sequence[str]) -> None:
+def _check_once(argument: str, names: Sequence[str]) -> None:
     for name, times in Counter(names).items():
         if times > 1:
-            raise MisuseError(what, f"{name} {times} times", "each of them once")
+            raise MisuseError(argument, f"{name} {times} times", "each of them once")
 
 
 def _check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoaded]) -> None:
@@ -188,7 +188,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What all rows of a run share; `cases` fills up with the cases of each property."""
+    """The data that all rows of a run share; `cases` fills up with the cases of each property."""
 
     examples: int
     seed: int

@@ -65,8 +65,16 @@ def run_comparison(
         The formulations to compare.
     properties : Sequence[Property | NotLoaded]
         The properties to check.
-    profile, examples, seed, interface, scene, progress
-        The same arguments as of `contactverif.run.runner.run`.
+    profile : Profile | str
+        The number and size of the cases, as in `contactverif.run.runner.run`.
+    examples, seed : int | None
+        The number of cases and the seed of their search, as in `run`.
+    interface : Interface | None
+        The interface to check on, as in `run`.
+    scene : Case | None
+        The scene to check on, as in `run`.
+    progress : Callable[[Progress], None] | None
+        A function that is called as the run advances, as in `run`.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from contactverif.contract.errors import MisuseError
 
 
 def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument: str = "path") -> Path:
-    """The path, if its name ends as a file of that kind does.
+    """Return the path if its name ends as a file of that kind does.
 
     Raises
     ------
@@ -26,44 +26,46 @@ def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument
 
 
 def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: str = "FILE.nc") -> None:
-    """Says before something takes long what would stop its file from being written after it.
+    """Check before a long computation that its file can be written afterwards.
 
     Parameters
     ----------
+    path : str or os.PathLike[str]
+        The file to be written.
     argument : str
-        How the caller calls the path.
+        The name of the argument in error messages.
     form : str
-        What a name of such a file looks like.
+        The form of such a file's name in error messages.
 
     Raises
     ------
     MisuseError
         If there is no such folder, nothing may be written there, or the path is no ordinary file.
     """
-    found = os.fspath(path)
+    name = os.fspath(path)
     target = Path(path).resolve()
-    if not found or found.endswith(os.sep):
-        raise MisuseError(argument, f"{found!r}, which names no file", f"the name of a file, {form}")
+    if not name or name.endswith(os.sep):
+        raise MisuseError(argument, f"{name!r}, which names no file", f"the name of a file, {form}")
     if target.is_dir():
-        raise MisuseError(argument, f"{found}, a folder", f"the name of a file, {form}")
+        raise MisuseError(argument, f"{name}, a folder", f"the name of a file, {form}")
     if target.exists() and not target.is_file():
-        raise MisuseError(argument, f"{found}, which is no ordinary file", f"the name of a file, {form}")
+        raise MisuseError(argument, f"{name}, which is no ordinary file", f"the name of a file, {form}")
     if not target.parent.is_dir():
-        raise MisuseError(argument, f"{found} in {target.parent}, which is no folder", "a folder that exists")
+        raise MisuseError(argument, f"{name} in {target.parent}, which is no folder", "a folder that exists")
     if target.exists() and not os.access(target, os.W_OK):
-        raise MisuseError(argument, f"{found}, which is write-protected", "a file that may be replaced")
+        raise MisuseError(argument, f"{name}, which is write-protected", "a file that may be replaced")
     part = _part(target)
     try:
         part.touch()
         part.unlink()
     except OSError as error:
         raise MisuseError(
-            argument, f"{found}: {error.strerror}", "a folder that may be written to, and a name of usual length"
+            argument, f"{name}: {error.strerror}", "a folder that may be written to, and a name of usual length"
         ) from error
 
 
 def made_folder(folder: Path, argument: str) -> None:
-    """Makes the folder, and those above it, if it is not there.
+    """Make the folder, and those above it, if it does not exist.
 
     Raises
     ------
@@ -80,7 +82,7 @@ def made_folder(folder: Path, argument: str) -> None:
 
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary file to write to, which takes the place of `path` when the block ends well.
+    """Open a block with a temporary file, which replaces `path` when the block ends without an error.
 
     Whatever stops it (an exception, a signal, a full disk) leaves the file that was there as it was; a temporary
     `.NAME.PID.part` that a killed process left behind is removed by the next one that writes the same name.
@@ -102,7 +104,7 @@ def _part(target: Path) -> Path:
 
 
 def _remove_stale(target: Path) -> None:
-    """Removes what killed processes left of their files of the same name."""
+    """Remove the temporary files of the same name that killed processes left behind."""
     name = re.compile(rf"\.{re.escape(target.name)}\.(\d+)\.part")
     for entry in target.parent.iterdir():
         match = name.fullmatch(entry.name)
@@ -121,7 +123,7 @@ def _alive(pid: int) -> bool:
 
 
 def _sync(path: Path) -> None:
-    """Has the operating system put the file, or the names in the folder, on the disk."""
+    """Let the operating system write the file, or the names in the folder, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -216,7 +216,7 @@ def test_many_formulations_are_folded_and_few_counterexamples_drawn(
 
 def test_a_strip_tells_how_many_keep_the_tolerance() -> None:
     values = np.array([0.0, 1e-9, 0.5, 1.0, 2.0, 1e5, np.inf, np.nan])
-    axis = Axis.of([values])
+    axis = Axis.from_margins([values])
     assert axis.most == 5
     numbers = axis.bins(values[:-1])
     tolerance = -margins.LEAST * 2
@@ -231,7 +231,7 @@ def test_a_strip_tells_how_many_keep_the_tolerance() -> None:
 
 
 def test_a_strip_of_nothing_is_nothing() -> None:
-    axis = Axis.of([np.array([]), np.array([np.nan, 0.0])])
+    axis = Axis.from_margins([np.array([]), np.array([np.nan, 0.0])])
     assert strip(np.array([np.nan]), axis) == Markup("")
     assert axis.most == 2
     ElementTree.fromstring(ticks(axis))

@@ -541,9 +541,9 @@ def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> N
     old = stored({("nts", "purity"): one, ("vts-me", "purity"): one, ("nts", "scaling"): one})
     new = stored({("nts", "purity"): one, ("nts", "newton.order"): one}, {"vts-me": "no module", "other": "no module"})
     found = Changes.between(old, new)
-    assert found.gone == ("vts-me", "scaling")
+    assert found.removed == ("vts-me", "scaling")
     assert found.added == ("newton.order",)
-    assert found.lost == {"vts-me": "no module"}
+    assert found.no_longer_loaded == {"vts-me": "no module"}
     assert found.regressions == ("vts-me: not loaded any more: no module",)
 
 

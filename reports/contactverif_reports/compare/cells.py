@@ -30,13 +30,13 @@ class Cell:
     Attributes
     ----------
     row : Row
-        What one formulation made of one property.
+        The result of one formulation on one property.
     verdicts : IntArray, shape (n_cases,)
         Codes of `Verdict` of the random cases.
     margins : FloatArray, shape (n_cases,)
-        Of each case the number closest to its tolerance or furthest beyond it, over that tolerance (the inverse for
-        "at least"): above 1 fails. Infinite where a case fails without such a number (a crash, a NaN, a breach); NaN
-        where nothing was decided or measured.
+        The number of each case that is closest to its tolerance or furthest beyond it, over that tolerance (the
+        inverse for "at least"): above 1 fails. Infinite where a case fails without such a number (a crash, a NaN, a
+        breach); NaN where nothing was decided or measured.
     orders : FloatArray, shape (n_cases,)
         Order of one Newton step; NaN where the property measures none.
     details : Mapping[str, FloatArray]
@@ -99,7 +99,7 @@ class Cell:
 
     @property
     def unexpected(self) -> str:
-        """Why the row makes a run fail; empty if it does not."""
+        """The reason why the row makes a run fail; empty if it does not."""
         return self.row.unexpected
 
     @property
@@ -141,14 +141,14 @@ class _Facts(NamedTuple):
 
 
 def _facts(info: PropertyInfo, outcome: Outcome) -> _Facts:
-    found = outcome.measurement
-    closest = max(checked_numbers(info, found), key=lambda number: number.ratio, default=None)
+    measurement = outcome.measurement
+    closest = max(checked_numbers(info, measurement), key=lambda number: number.ratio, default=None)
     case = outcome.summary
     return _Facts(
         verdict=int(outcome.verdict),
         margin=margin(outcome.verdict, nan if closest is None else closest.ratio),
-        order=nan if found is None else found.values.get(ORDER, nan),
-        details={} if found is None else found.details,
+        order=nan if measurement is None else measurement.values.get(ORDER, nan),
+        details={} if measurement is None else measurement.details,
         closest=closest if outcome.decided else None,
         kind=(
             case.n_slave_segments,
@@ -254,7 +254,7 @@ class Paired:
 def _median_ratio(a: FloatArray, b: FloatArray) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = [np.log(np.fmax(margins, 1.0)) for margins in (a, b)]
-        logs = np.where(a == b, 0.0, beyond[0] - beyond[1])  # Where both are equal, both may be infinite.
+        logs = np.where(a == b, 0.0, beyond[0] - beyond[1])  # Equal values may both be infinite.
         return float(np.exp(np.median(logs))) if len(logs) else nan
 
 

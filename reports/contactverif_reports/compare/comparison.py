@@ -127,7 +127,7 @@ class Comparison:
 
     @property
     def promises_kept(self) -> bool:
-        """Whether every candidate was checked and keeps all that it promises."""
+        """Return whether every candidate was checked and keeps all that it promises."""
         return not self.unexpected and not self.not_loaded and len(self.formulations) > 1
 
 
@@ -213,12 +213,15 @@ def count_iterations(cells: Sequence[Cell]) -> list[Iterations]:
     """
     names = sorted({name for cell in cells for name in cell.details if name.partition(", ")[0] == ITERATIONS})
     return [
-        _iterations(cell, name, _converged(cells[0], name)) for name in names for cell in cells if name in cell.details
+        _iterations(cell, name, _converged_counts(cells[0], name))
+        for name in names
+        for cell in cells
+        if name in cell.details
     ]
 
 
 def _iterations(cell: Cell, name: str, reference: FloatArray) -> Iterations:
-    counts = _converged(cell, name)
+    counts = _converged_counts(cell, name)
     converged = counts[~np.isnan(counts)]
     n_both = min(len(counts), len(reference))
     with np.errstate(invalid="ignore"):  # A comparison with NaN is False, as it should be.
@@ -238,7 +241,7 @@ def _iterations(cell: Cell, name: str, reference: FloatArray) -> Iterations:
     )
 
 
-def _converged(cell: Cell, name: str) -> FloatArray:
+def _converged_counts(cell: Cell, name: str) -> FloatArray:
     """Return the iterations of the cases that converged, NaN for the others; empty where the property keeps none."""
     if name not in cell.details:
         return np.zeros(0)

@@ -57,9 +57,9 @@ class Change:
     paired : Paired | None
         The new beside the old, case by case; None where the cases are not the same.
     regressions : tuple[str, ...]
-        What got worse, in words; empty where nothing did.
+        The regressions, in words; empty if there is none.
     noteworthy : tuple[str, ...]
-        What is worth a look and no regression, in words.
+        The changes that are worth a look and no regression, in words.
     """
 
     old: Cell
@@ -70,7 +70,7 @@ class Change:
 
     @property
     def better(self) -> bool:
-        """Whether the row passes now, and did not."""
+        """Return whether the row passes now, and did not before."""
         return self.new.verdict is Verdict.PASS and self.old.verdict is not Verdict.PASS
 
     @property
@@ -118,28 +118,29 @@ class Changes:
         The runs.
     changes : tuple[Change, ...]
         The rows that both have.
-    gone, added : tuple[str, ...]
-        What only the old, only the new report has: names of formulations, ids of properties, or rows.
-    lost : Mapping[str, str]
-        {name: reason} of what the old report has, and the new one could not load.
+    removed, added : tuple[str, ...]
+        The entries of the old report only, and of the new report only: names of formulations, ids of properties, or
+        rows.
+    no_longer_loaded : Mapping[str, str]
+        {name: reason} of the plugins that the old report has and the new run could not load.
     """
 
     old: NamedRun
     new: NamedRun
     changes: tuple[Change, ...]
-    gone: tuple[str, ...]
+    removed: tuple[str, ...]
     added: tuple[str, ...]
-    lost: Mapping[str, str]
+    no_longer_loaded: Mapping[str, str]
 
     @property
     def regressions(self) -> tuple[str, ...]:
-        """All that got worse: a line for each row, and for each plugin that was lost."""
+        """The regressions: a line for each row, and for each plugin that does not load any more."""
         lines = [_line(change, change.regressions) for change in self.changes if change.regressions]
-        return (*lines, *(f"{name}: not loaded any more: {reason}" for name, reason in self.lost.items()))
+        return (*lines, *(f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items()))
 
     @property
     def noteworthy(self) -> tuple[str, ...]:
-        """All that is worth a look though it did not get worse: a line for each row."""
+        """The changes that are worth a look and no regression: a line for each row."""
         return tuple(_line(change, change.noteworthy) for change in self.changes if change.noteworthy)
 
     @property
@@ -147,7 +148,7 @@ class Changes:
         """Newton iterations (old, new) that changed, on the same cases."""
         paired = [change for change in self.changes if change.paired is not None]
         return tuple(
-            lines for change in paired for lines in paired_iterations(change.old, change.new) if _moved(*lines)
+            lines for change in paired for lines in paired_iterations(change.old, change.new) if _has_changed(*lines)
         )
 
     @classmethod
@@ -164,9 +165,9 @@ class Changes:
                 for key, cell in old.cells.items()
                 if key in new.cells
             ),
-            gone=_only(old, new),
+            removed=_only(old, new),
             added=_only(new, old),
-            lost={
+            no_longer_loaded={
                 name: reason
                 for name, reason in new.not_loaded.items()
                 if name in (*old.run.formulations, *old.run.properties) and name not in old.not_loaded
@@ -219,8 +220,8 @@ def same_cases(old: Cell, new: Cell) -> bool:
 def _verdicts(old: Cell, new: Cell) -> Sequence[str]:
     if new.verdict is not old.verdict and (old.verdict is Verdict.PASS or new.verdict is Verdict.CRASHED):
         reason = new.row.reason
-        why = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
-        return [f"{old.verdict} → {new.verdict}{why}"]
+        detail = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
+        return [f"{old.verdict} → {new.verdict}{detail}"]
     if new.unexpected and not old.unexpected:
         return [f"promises kept → {new.unexpected}"]
     return []
@@ -247,22 +248,22 @@ def _fewer(old: Cell, new: Cell) -> Sequence[str]:
     """Return a line if fewer cases are judged, and one for each solution that converges less often."""
     n = min(len(old.verdicts), len(new.verdicts))
     lines = []
-    lost, back = _exchanged(old.decided[:n], new.decided[:n])
-    if lost - back > few(n):
-        lines.append(f"{lost} of the same {n} cases were judged and are undecided now{_back(back)}")
+    worse, better = _count_changes(old.decided[:n], new.decided[:n])
+    if worse - better > few(n):
+        lines.append(f"{worse} of the same {n} cases were judged and are undecided now{_back(better)}")
     ends = [name for name in old.details if name in new.details and name.partition(", ")[0] == END]
     for name in ends:
         before, after = old.details[name][:n], new.details[name][:n]
         both = ~(np.isnan(before) | np.isnan(after))
-        lost, back = _exchanged(both & (before == CONVERGED), both & (after == CONVERGED))
+        worse, better = _count_changes(both & (before == CONVERGED), both & (after == CONVERGED))
         n_both, solution = int(both.sum()), name.partition(", ")[2]
-        if lost - back > wandering(n_both):
+        if worse - better > wandering(n_both):
             solutions = f"{n_both} solutions{f' ({solution})' if solution else ''}"
-            lines.append(f"{lost} of the same {solutions} converged and do not any more{_back(back)}")
+            lines.append(f"{worse} of the same {solutions} converged and do not any more{_back(better)}")
     return lines
 
 
-def _exchanged(before: BoolArray, after: BoolArray) -> tuple[int, int]:
+def _count_changes(before: BoolArray, after: BoolArray) -> tuple[int, int]:
     return int((before & ~after).sum()), int((~before & after).sum())
 
 
@@ -292,7 +293,7 @@ def _line(change: Change, words: Sequence[str]) -> str:
     return f"{change.new.formulation}, {change.new.property_id}: {'; '.join(words)}"
 
 
-def _moved(old: Iterations, new: Iterations) -> bool:
+def _has_changed(old: Iterations, new: Iterations) -> bool:
     return bool(new.fewer or new.more or old.converged != new.converged)
 
 

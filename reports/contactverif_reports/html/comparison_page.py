@@ -65,7 +65,7 @@ def comparison_page(
     str
         HTML that needs no other file.
     """
-    axis = Axis.of(cell.margins for cell in comparison.cells.values())
+    axis = Axis.from_margins(cell.margins for cell in comparison.cells.values())
     return render(
         "compare.html.j2",
         found=comparison,
@@ -98,7 +98,7 @@ def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> st
     str
         HTML that needs no other file.
     """
-    axis = Axis.of(cell.margins for change in changes.changes for cell in (change.old, change.new))
+    axis = Axis.from_margins(cell.margins for change in changes.changes for cell in (change.old, change.new))
     return render(
         "changes.html.j2",
         changes=changes,

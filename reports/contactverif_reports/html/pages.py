@@ -46,7 +46,7 @@ _INLINED = re.compile(r'<svg data-figure="(\w+)".*?</svg>', re.S)
 
 
 def render(template_name: str, *, package: str = "contactverif_reports.html", **context: Any) -> str:
-    """The template of that name (`report.html.j2`) filled in.
+    """Fill in the template of that name (`report.html.j2`).
 
     What is not `Markup` is escaped; a name that the template asks for and the context lacks is an error. A figure that
     stands in the page several times gets ids of its own each time.
@@ -55,7 +55,7 @@ def render(template_name: str, *, package: str = "contactverif_reports.html", **
 
 
 def check_page(path: str | os.PathLike[str], argument: str = "--out") -> None:
-    """Says before something takes long what would stop the page from being written after it.
+    """Check before a long computation that its page can be written afterwards.
 
     Raises
     ------
@@ -67,12 +67,16 @@ def check_page(path: str | os.PathLike[str], argument: str = "--out") -> None:
 
 
 def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out") -> None:
-    """Writes a page, whole or not at all, as UTF-8.
+    """Write a page, whole or not at all, as UTF-8.
 
     Parameters
     ----------
+    path : str or os.PathLike[str]
+        The file to write.
+    html : str
+        The page.
     argument : str
-        How the caller calls the path.
+        The name of the argument in error messages.
 
     Raises
     ------
@@ -88,15 +92,17 @@ def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out")
 
 
 def svg_inline(figure: Figure, label: str = "") -> Markup:
-    """A matplotlib figure as an `<svg>` element for a page: no prolog, no background, as wide as there is room.
+    """Turn a figure into an `<svg>` element for a page: no prolog, no background, as wide as there is room.
 
     The same figure gives the same bytes. Text stays text: it is selected, searched and read aloud, and a page of many
     figures stays small; widths were computed with a wide font, so that another one fits too.
 
     Parameters
     ----------
+    figure : Figure
+        A figure of matplotlib.
     label : str
-        What a reader hears who does not see it; without one the figure is decoration beside its caption.
+        The text that a screen reader reads aloud; without one the figure is decoration beside its caption.
     """
     import matplotlib
 
@@ -113,7 +119,7 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for a reader: few digits, a true minus sign, – for NaN."""
+    """Format a number for a reader: few digits, a true minus sign, – for NaN."""
     if value != value:
         return "–"
     plain = re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
@@ -122,7 +128,7 @@ def number(value: float, digits: int = 3) -> str:
 
 @cache
 def _environment(package: str = "contactverif_reports.html") -> Environment:
-    """Templates of a package; those of this one, such as `base.html.j2`, are there for all."""
+    """Return the templates of a package and of this one, such as `base.html.j2`."""
     packages = dict.fromkeys([package, "contactverif_reports.html"])
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),
@@ -137,7 +143,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
 
 
 def _remove_strangers(root: ElementTree.Element) -> None:
-    """Takes out what would reach beyond the figure, in a page: metadata, and a style sheet for every element."""
+    """Remove the parts that affect the page beyond the figure: metadata, and a style sheet for every element."""
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
@@ -145,7 +151,7 @@ def _remove_strangers(root: ElementTree.Element) -> None:
 
 
 def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
-    """Keeps the ids that something refers to, each behind the prefix, and drops the others."""
+    """Put the prefix before each id that some element refers to, and remove the other ids."""
     references = re.compile(r"url\(#([^)]+)\)")
     used: set[str] = set()
     for element in root.iter():
@@ -159,8 +165,8 @@ def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
                 used.update(references.findall(value))
                 element.set(name, references.sub(rf"url(#{prefix}-\1)", value))
     for element in root.iter():
-        if (own := element.attrib.pop("id", None)) in used:
-            element.set("id", f"{prefix}-{own}")
+        if (id_ := element.attrib.pop("id", None)) in used:
+            element.set("id", f"{prefix}-{id_}")
     root.set("data-figure", prefix)
 
 
@@ -178,12 +184,12 @@ def _root_attributes(root: ElementTree.Element, label: str) -> dict[str, str]:
 
 
 def _with_distinct_ids(html: str) -> str:
-    """Figures that are there more than once refer to their own parts, not to those of the first."""
-    seen: dict[str, int] = {}
+    """Make the ids distinct, so that a repeated figure refers to its own parts, not to those of the first."""
+    counts: dict[str, int] = {}
 
-    def own(match: re.Match[str]) -> str:
+    def with_own_ids(match: re.Match[str]) -> str:
         name = match[1]
-        seen[name] = seen.get(name, 0) + 1
-        return match[0] if seen[name] == 1 else match[0].replace(name, f"{name}-{seen[name]}")
+        counts[name] = counts.get(name, 0) + 1
+        return match[0] if counts[name] == 1 else match[0].replace(name, f"{name}-{counts[name]}")
 
-    return _INLINED.sub(own, html)
+    return _INLINED.sub(with_own_ids, html)

@@ -119,7 +119,7 @@ class Section:
 
     @property
     def counts(self) -> str:
-        """How many properties have which result, in words."""
+        """The numbers of properties with each result, in words."""
         results = [line.row.result for line in self.lines]
         return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
@@ -140,7 +140,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
         HTML that needs no other file.
     """
     cells = {key: Cell.from_row(row) for key, row in run.row_of.items()}
-    axis = Axis.of(cell.margins for cell in cells.values())
+    axis = Axis.from_margins(cell.margins for cell in cells.values())
     examples = _examples(run, os.fspath(path))
     return render(
         "report.html.j2",

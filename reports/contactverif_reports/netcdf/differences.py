@@ -75,6 +75,6 @@ def _difference(a: Any, b: Any) -> str:
         differ = (bits[0] != bits[1]).reshape(-1, first.itemsize).any(axis=1).reshape(first.shape)
     if not differ.any():
         return ""
-    where = tuple(int(index[0]) for index in np.nonzero(np.atleast_1d(differ)))
-    values = f"{np.atleast_1d(first)[where]!s} and {np.atleast_1d(second)[where]!s}"
-    return values if not first.ndim else f"{values} at {where}, and {int(differ.sum()) - 1} more"
+    index = tuple(int(places[0]) for places in np.nonzero(np.atleast_1d(differ)))
+    values = f"{np.atleast_1d(first)[index]!s} and {np.atleast_1d(second)[index]!s}"
+    return values if not first.ndim else f"{values} at {index}, and {int(differ.sum()) - 1} more"

@@ -113,7 +113,7 @@ class OutcomeVariables:
             ("undecided", "why a failure would not be the fault of the formulation"),
             ("broken", "a breach that no number shows"),
         ):
-            texts = ["" if found is None else getattr(found, name) for found in self._measurements]
+            texts = ["" if item is None else getattr(item, name) for item in self._measurements]
             table |= self._words(name, texts, long_name)
         return table
 
@@ -157,8 +157,8 @@ class OutcomeVariables:
             return table
         for name, safe in zip(self._info.series, safe_names(self._info.series), strict=True):
             values = np.full((len(self._outcomes), self._names.n_iterates), schema.NOT_MEASURED)
-            for number, found in enumerate(self._measurements):
-                series = found.series.get(name, ()) if found is not None else ()
+            for number, measurement in enumerate(self._measurements):
+                series = measurement.series.get(name, ()) if measurement is not None else ()
                 values[number, : len(series)] = series
             long_name = f"{schema.text(name)} at each iterate"
             unit = self._info.series[name]
@@ -203,8 +203,8 @@ class OutcomeVariables:
         """Return numbers by name, (n_outcomes, n_names)."""
         place = {name: column for column, name in enumerate(names)}
         values = np.full((len(self._outcomes), len(names)), schema.NOT_MEASURED)
-        for number, found in enumerate(self._measurements):
-            entries: Mapping[str, float] = {} if found is None else getattr(found, kind)
+        for number, measurement in enumerate(self._measurements):
+            entries: Mapping[str, float] = {} if measurement is None else getattr(measurement, kind)
             for name, value in entries.items():
                 values[number, place[name]] = value
         return values
@@ -256,6 +256,6 @@ def safe_names(names: Sequence[str] | Mapping[str, Any]) -> list[str]:
 def _state(outcome: Outcome | None) -> int:
     if outcome is None:
         return 0
-    found: Measurement | None = outcome.measurement
-    measured = 0 if found is None else schema.MEASURED + (schema.IDLE if found.idle else 0)
+    measurement: Measurement | None = outcome.measurement
+    measured = 0 if measurement is None else schema.MEASURED + (schema.IDLE if measurement.idle else 0)
     return measured + (schema.BREACH if outcome.breach else 0)

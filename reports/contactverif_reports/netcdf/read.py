@@ -98,8 +98,8 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
     """
     name = os.fspath(path)
     if not Path(path).is_file():
-        what = "which is a folder" if Path(path).is_dir() else "which does not exist"
-        raise MisuseError(_ARGUMENT, f"{name}, {what}", _NEEDED)
+        reason = "which is a folder" if Path(path).is_dir() else "which does not exist"
+        raise MisuseError(_ARGUMENT, f"{name}, {reason}", _NEEDED)
     try:
         groups = xr.open_groups(
             Path(path).resolve(),
@@ -111,8 +111,8 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
             concat_characters=decode,
         )
     except _DAMAGE as error:
-        found = f"{name}, which is no netCDF file or a damaged one ({_one_line(error)})"
-        raise MisuseError(_ARGUMENT, found, "a report (netCDF-4)") from error
+        description = f"{name}, which is no netCDF file or a damaged one ({_one_line(error)})"
+        raise MisuseError(_ARGUMENT, description, "a report (netCDF-4)") from error
     try:
         try:
             _check_schema(groups["/"], name)
@@ -125,8 +125,8 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
     except MisuseError:
         raise
     except _DAMAGE as error:
-        found = f"{name}, which cannot be read ({_one_line(error)})"
-        raise MisuseError(_ARGUMENT, found, "an undamaged report") from error
+        description = f"{name}, which cannot be read ({_one_line(error)})"
+        raise MisuseError(_ARGUMENT, description, "an undamaged report") from error
 
 
 def _one_line(error: Exception) -> str:
@@ -172,7 +172,7 @@ class _Reader:
         run = Run(
             rows=tuple(row for rows in by_formulation for row in rows.values()),
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
-            provided=self._provided(formulations),
+            provided=self._provided_parts(formulations),
         )
         written = root_attributes(run)
         origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
@@ -224,7 +224,7 @@ class _Reader:
             raise ValueError("case_seconds is too short")
         return seconds
 
-    def _provided(self, formulations: list[str]) -> dict[str, dict[str, bool]]:
+    def _provided_parts(self, formulations: list[str]) -> dict[str, dict[str, bool]]:
         if "provided" not in self._summary:
             return {}
         provided = {}

@@ -82,7 +82,7 @@ def summary_group(run: Run) -> xr.Dataset:
     )
     grid = _Grid(run)
     if run.formulations:
-        table |= grid.labels() | _provided(run)
+        table |= grid.labels() | _provided_parts(run)
         attributes["parts"] = "\n".join(
             schema.text(f"{name}: ")
             + ", ".join(f"{part}: {'' if has else 'not '}provided" for part, has in parts.items())
@@ -132,7 +132,7 @@ def _rows(grid: _Grid, run: Run) -> Table:
     }
 
 
-def _provided(run: Run) -> Table:
+def _provided_parts(run: Run) -> Table:
     """Return the parts of the contract that each formulation has; missing where the run does not say it."""
     parts = [
         [run.provided.get(name, {}).get(part, schema.UNSAID) for part in schema.PARTS] for name in run.formulations
@@ -166,24 +166,30 @@ def _closest(grid: _Grid) -> Table:
     def each(read: Callable[[ClosestNumber], Any], missing: Any) -> list[list[Any]]:
         return grid.each(lambda row: missing if row.closest is None else read(row.closest), missing)
 
-    units = {unit for line in each(lambda found: found.number.quantity.unit, "") for unit in line} - {""}
+    units = {unit for line in each(lambda closest: closest.number.quantity.unit, "") for unit in line} - {""}
     unit = units.pop() if len(units) == 1 else "see closest_units" if units else schema.RATIO
-    cases = each(lambda found: schema.NO_CASE if found.case is None else found.case, schema.NO_CASE)
+    cases = each(lambda closest: schema.NO_CASE if closest.case is None else closest.case, schema.NO_CASE)
     missing = schema.NOT_MEASURED
     return {
         "closest_value": numbers(
             _ROW,
-            each(lambda found: found.number.value, missing),
+            each(lambda closest: closest.number.value, missing),
             "number nearest to its tolerance, or furthest beyond it",
             unit,
             "missing where nothing was measured",
             fill=missing,
         ),
         "closest_tolerance": numbers(
-            _ROW, each(lambda found: found.number.tolerance, missing), "tolerance of closest_value", unit, fill=missing
+            _ROW,
+            each(lambda closest: closest.number.tolerance, missing),
+            "tolerance of closest_value",
+            unit,
+            fill=missing,
         ),
-        "closest_quantity": words(_ROW, each(lambda found: found.number.quantity.name, ""), "name of closest_value"),
-        "closest_units": words(_ROW, each(lambda found: found.number.quantity.unit, ""), "unit of closest_value"),
+        "closest_quantity": words(
+            _ROW, each(lambda closest: closest.number.quantity.name, ""), "name of closest_value"
+        ),
+        "closest_units": words(_ROW, each(lambda closest: closest.number.quantity.unit, ""), "unit of closest_value"),
         "closest_case": numbers(
             _ROW,
             np.array(cases, dtype=np.int32),

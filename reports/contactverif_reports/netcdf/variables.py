@@ -59,7 +59,7 @@ def flags(dims: Dims, values: ArrayLike, meanings: Mapping[str, int], long_name:
 
 def words(dims: Dims, values: Any, long_name: str, comment: str = "") -> xr.Variable:
     """Return strings: one for no dimensions, a list for one, nested lists for more."""
-    characters = np.strings.encode(np.array(_cleaned(values), dtype=np.str_), "utf-8")
+    characters = np.strings.encode(np.array(_clean_text(values), dtype=np.str_), "utf-8")
     width = max(8, 1 << (characters.dtype.itemsize - 1).bit_length())  # Few widths need few dimensions.
     return _variable(dims, characters.astype(f"S{width}"), {"long_name": long_name}, comment, None)
 
@@ -82,5 +82,5 @@ def _variable(
     return xr.Variable(dims, values, attributes, encoding)
 
 
-def _cleaned(values: Any) -> Any:
-    return text(values) if isinstance(values, str) else [_cleaned(value) for value in values]
+def _clean_text(values: Any) -> Any:
+    return text(values) if isinstance(values, str) else [_clean_text(value) for value in values]
