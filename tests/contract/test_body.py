@@ -1,4 +1,4 @@
-"""What a body is made of, and every way in which it cannot be one, each with its line."""
+"""The parts of a body, and a one-line message for every input that makes no body."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def test_a_body_is_a_read_only_copy() -> None:
             getattr(body, name)[0] = 0
 
 
-def changed(name: str, **entries: Any) -> dict[str, Any]:
-    """The attribute of the block with some of its entries replaced: {"3,1": 7.0} or {"3": (0, 1)}."""
+def changed_attribute(name: str, **entries: Any) -> dict[str, Any]:
+    """Replace some entries of an attribute of the block: {"3,1": 7.0} or {"3": (0, 1)}."""
     values = getattr(BLOCK, name).copy()
     for place, value in entries.items():
         values[tuple(map(int, place[1:].split("_")))] = value
@@ -84,25 +84,25 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "E text": ({"young": "1e4"}, "young: found '1e4'; needed Young's"),
     "E true": ({"young": True}, "young: found True; needed Young's"),
     "E two": ({"young": np.array([1.0, 2.0])}, r"young: found array\(\[1., 2.\]\); needed Young's"),
-    "nodes nan": (changed("nodes", _4_1=np.nan), "nodes: found NaN or infinity; needed finite numbers"),
-    "nodes inf": (changed("nodes", _4_1=-np.inf), "nodes: found NaN or infinity; needed finite numbers"),
+    "nodes nan": (changed_attribute("nodes", _4_1=np.nan), "nodes: found NaN or infinity; needed finite numbers"),
+    "nodes inf": (changed_attribute("nodes", _4_1=-np.inf), "nodes: found NaN or infinity; needed finite numbers"),
     "nodes 3d": ({"nodes": np.zeros((9, 3))}, r"nodes: found shape \(9, 3\); needed shape \(n, 2\)"),
     "nodes flat": ({"nodes": np.zeros(18)}, r"nodes: found shape \(18,\); needed shape \(n, 2\)"),
     "nodes complex": ({"nodes": BLOCK.nodes * 1j}, "nodes: found dtype complex128; needed float64"),
     "nodes ragged": ({"nodes": [[0, 1], [2]]}, "nodes: found rows of different lengths; needed an array"),
     "node in no cell": (with_node((5, 5)), "nodes: found node 9 in no cell; needed every node in a cell"),
     "clockwise": ({"cells": BLOCK.cells[:, ::-1]}, "cells: found cell 0, which is clockwise, folded or flat; needed"),
-    "one clockwise": (changed("cells", _2=[3, 6, 7, 4]), "cells: found cell 2, which is clockwise"),
-    "folded": (changed("nodes", _4=(3.5, 3.5)), "cells: found cell 1, which is clockwise, folded or flat"),
-    "flat": (changed("nodes", _4=(2.0, 1.0)), "cells: found cell 1, which is clockwise, folded or flat"),
-    "bow tie": (changed("cells", _0=[0, 1, 3, 4]), "cells: found cell 0, which is clockwise, folded or flat"),
+    "one clockwise": (changed_attribute("cells", _2=[3, 6, 7, 4]), "cells: found cell 2, which is clockwise"),
+    "folded": (changed_attribute("nodes", _4=(3.5, 3.5)), "cells: found cell 1, which is clockwise, folded or flat"),
+    "flat": (changed_attribute("nodes", _4=(2.0, 1.0)), "cells: found cell 1, which is clockwise, folded or flat"),
+    "bow tie": (changed_attribute("cells", _0=[0, 1, 3, 4]), "cells: found cell 0, which is clockwise, folded or flat"),
     "cells float": ({"cells": BLOCK.cells * 1.0}, "cells: found dtype float64; needed int64"),
     "cells of 5": ({"cells": np.zeros((2, 5), int)}, r"cells: found shape \(2, 5\); needed shape \(n, 4\)"),
     "cells flat": ({"cells": np.arange(4)}, r"cells: found shape \(4,\); needed shape \(n, 4\)"),
     "cells ragged": ({"cells": [[0, 1, 4, 3], [1, 2, 5]]}, "cells: found rows of different lengths; needed an array"),
     "cells text": ({"cells": "quads"}, r"cells: found shape \(\); needed shape \(n, 4\)"),
-    "cells beyond": (changed("cells", _3_2=9), "cells: found node number 9; needed numbers from 0 to 8"),
-    "cells below": (changed("cells", _3_2=-1), "cells: found node number -1; needed numbers from 0 to 8"),
+    "cells beyond": (changed_attribute("cells", _3_2=9), "cells: found node number 9; needed numbers from 0 to 8"),
+    "cells below": (changed_attribute("cells", _3_2=-1), "cells: found node number -1; needed numbers from 0 to 8"),
     "cell twice": (
         {"cells": np.vstack([BLOCK.cells, BLOCK.cells[2:3]])},
         "cells: found two cells on the same side of an edge; needed cells that do not overlap",
@@ -124,13 +124,13 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "fixed as numbers": ({"fixed": np.ones((9, 2))}, "fixed: found dtype float64; needed bool"),
     "fixed short": ({"fixed": BLOCK.fixed[:3]}, r"fixed: found shape \(3, 2\); needed shape \(9, 2\)"),
     "imposed short": ({"imposed": np.zeros(9)}, r"imposed: found shape \(9,\); needed shape \(9, 2\)"),
-    "imposed nan": (changed("imposed", _7_1=np.nan), "imposed: found NaN or infinity; needed finite"),
+    "imposed nan": (changed_attribute("imposed", _7_1=np.nan), "imposed: found NaN or infinity; needed finite"),
     "imposed on a free one": (
-        changed("imposed", _1_1=0.1),
+        changed_attribute("imposed", _1_1=0.1),
         "imposed: found a displacement of a free component; needed 0 where nothing is fixed",
     ),
     "load short": ({"load": np.zeros((9, 1))}, r"load: found shape \(9, 1\); needed shape \(9, 2\)"),
-    "load inf": (changed("load", _1_1=np.inf), "load: found NaN or infinity; needed finite"),
+    "load inf": (changed_attribute("load", _1_1=np.inf), "load: found NaN or infinity; needed finite"),
     "load text": ({"load": np.full((9, 2), "a")}, "load: found dtype <U1; needed float64"),
     "long axis": ({"axis": (1.0, 1e-5)}, r"axis: found \(1.0, 1e-05\); needed a unit vector"),
     "no axis": ({"axis": (0.0, 0.0)}, r"axis: found \(0.0, 0.0\); needed a unit vector"),
@@ -141,7 +141,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 
 
 def only_line(error: pytest.ExceptionInfo[MisuseError]) -> str:
-    """The message, which has one line and says what was found and what is needed."""
+    """Return the message, which has one line and says what was found and what is needed."""
     line = str(error.value)
     assert "\n" not in line
     assert ": found " in line

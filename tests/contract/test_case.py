@@ -16,9 +16,9 @@ PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1) + np.array([0, -0.5] * 3 + [0, 0] * 2)
 
 
-def same(one: Case, other: Case) -> bool:
-    """Whether two cases agree bit by bit."""
-    arrays, others = one.to_arrays(), other.to_arrays()
+def same(case: Case, other: Case) -> bool:
+    """Return whether two cases agree bit by bit."""
+    arrays, others = case.to_arrays(), other.to_arrays()
     return arrays.keys() == others.keys() and all(
         arrays[name].dtype == others[name].dtype
         and arrays[name].shape == others[name].shape

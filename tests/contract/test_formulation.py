@@ -71,8 +71,8 @@ def test_entries_of_a_pattern_may_number_more_than_unknowns() -> None:
 
 
 def test_same_as() -> None:
-    one = Pairing({"a": np.array([1, 2]), "b": np.array([True])})
-    assert one.same_as(Pairing(dict(reversed(list(one.items())))))
+    pairing = Pairing({"a": np.array([1, 2]), "b": np.array([True])})
+    assert pairing.same_as(Pairing(dict(reversed(list(pairing.items())))))
     for other in (
         {"a": np.array([1, 3]), "b": np.array([True])},
         {"a": np.array([[1, 2]]), "b": np.array([True])},
@@ -80,8 +80,8 @@ def test_same_as() -> None:
         {"a": np.array([1, 2])},
         {},
     ):
-        assert not one.same_as(Pairing(other))
-        assert not Pairing(other).same_as(one)
+        assert not pairing.same_as(Pairing(other))
+        assert not Pairing(other).same_as(pairing)
     assert Pairing({}).same_as(Pairing({}))
 
 

@@ -24,7 +24,7 @@ def interface(nodes: object, slave: Surface | None = None, master: Surface | Non
 NODES = np.array([[0.0, 0], [1, 0], [2, 0], [2, 1], [0, 1]])
 
 
-def moved(node: int, *place: float) -> np.ndarray:
+def moved_nodes(node: int, *place: float) -> np.ndarray:
     nodes = NODES.copy()
     nodes[node] = place
     return nodes
@@ -58,9 +58,9 @@ def test_neighbours_and_order_agree_on_random_chains() -> None:
         segments = np.vstack([np.column_stack([piece[:-1], piece[1:]]) for piece in pieces])
         chains = Surface(segments[random.permutation(len(segments))])
         assert sorted(chains.chain_order.tolist()) == list(range(len(chains)))
-        for one, other in zip(chains.chain_order[:-1], chains.chain_order[1:], strict=True):
-            follows = chains.segments[one, 1] == chains.segments[other, 0]
-            assert follows == (chains.neighbours[one, 1] == other) == (chains.neighbours[other, 0] == one)
+        for segment, other in zip(chains.chain_order[:-1], chains.chain_order[1:], strict=True):
+            follows = chains.segments[segment, 1] == chains.segments[other, 0]
+            assert follows == (chains.neighbours[segment, 1] == other) == (chains.neighbours[other, 0] == segment)
         assert (chains.neighbours < 0).sum() == 2 * len(pieces)
 
 
@@ -81,25 +81,25 @@ def test_swapped_twice_is_the_identity() -> None:
 
 
 def test_at_keeps_the_segments() -> None:
-    elsewhere = PAIR.at(2 * PAIR.nodes)
-    assert elsewhere.slave is PAIR.slave
-    assert np.array_equal(elsewhere.nodes, 2 * PAIR.nodes)
+    stretched = PAIR.at(2 * PAIR.nodes)
+    assert stretched.slave is PAIR.slave
+    assert np.array_equal(stretched.nodes, 2 * PAIR.nodes)
 
 
 def test_everything_is_a_read_only_copy() -> None:
     nodes, segments = NODES.copy(), np.array([[0, 1], [1, 2]])
-    made = interface(nodes, Surface(segments))
+    original = interface(nodes, Surface(segments))
     nodes[:], segments[:] = 9, 9
-    assert np.array_equal(made.nodes, NODES)
-    for array in (made.nodes, made.slave.segments, made.slave.neighbours, made.slave.chain_order):
+    assert np.array_equal(original.nodes, NODES)
+    for array in (original.nodes, original.slave.segments, original.slave.neighbours, original.slave.chain_order):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     with pytest.raises(AttributeError):
-        made.nodes = NODES  # type: ignore[misc]
+        original.nodes = NODES  # type: ignore[misc]
 
 
 def test_nodes_of_both_sides_may_coincide() -> None:
-    assert interface(moved(3, 2, 0)).nodes[2].tolist() == [2, 0]
+    assert interface(moved_nodes(3, 2, 0)).nodes[2].tolist() == [2, 0]
 
 
 SURFACES = {
@@ -124,8 +124,11 @@ def test_wrong_surfaces(segments: object, message: str) -> None:
 
 
 INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
-    "nan": (lambda: interface(moved(1, np.nan, 0)), r"nodes: found node 1 at \(nan, 0.0\); needed finite coordinates"),
-    "infinity": (lambda: interface(moved(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
+    "nan": (
+        lambda: interface(moved_nodes(1, np.nan, 0)),
+        r"nodes: found node 1 at \(nan, 0.0\); needed finite coordinates",
+    ),
+    "infinity": (lambda: interface(moved_nodes(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
     "three coordinates": (
         lambda: interface(np.zeros((5, 3))),
         r"nodes: found an array of shape \(5, 3\); needed shape",
@@ -136,15 +139,15 @@ INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
     "text": (lambda: interface(NODES.astype(str)), "nodes: found dtype <U32; needed real numbers"),
     "no surface": (lambda: Interface(NODES, [[0, 1]], surface((3, 4))), "slave: found a list; needed a Surface"),  # type: ignore[arg-type]
     "zero length": (
-        lambda: interface(moved(1, 0, 0)),
+        lambda: interface(moved_nodes(1, 0, 0)),
         "slave: found segment 0 of zero length; needed two different end",
     ),
-    "zero length of the master": (lambda: interface(moved(4, 2, 1)), "master: found segment 0 of zero length"),
+    "zero length of the master": (lambda: interface(moved_nodes(4, 2, 1)), "master: found segment 0 of zero length"),
     "coincident": (
-        lambda: interface(moved(2, 0, 0)),
+        lambda: interface(moved_nodes(2, 0, 0)),
         r"slave: found coincident nodes 0, 2 at \(0.0, 0.0\); needed one node a place on each surface",
     ),
-    "minus zero": (lambda: interface(moved(2, -0.0, 0)), "slave: found coincident nodes 0, 2"),
+    "minus zero": (lambda: interface(moved_nodes(2, -0.0, 0)), "slave: found coincident nodes 0, 2"),
     "master first": (
         lambda: interface(NODES, surface((3, 4)), surface((0, 1), (1, 2))),
         "slave: found nodes 3, 4; needed the first node numbers, 0 … 1, each used",
@@ -171,7 +174,7 @@ def test_wrong_interfaces(make: Callable[[], Interface], message: str) -> None:
 
 def test_an_error_says_argument_found_and_needed() -> None:
     with pytest.raises(MisuseError) as caught:
-        interface(moved(1, 0, 0))
+        interface(moved_nodes(1, 0, 0))
     error = caught.value
     assert (error.argument, error.found) == ("slave", "segment 0 of zero length")
     assert str(error) == f"slave: found {error.found}; needed {error.needed}"

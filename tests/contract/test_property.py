@@ -25,48 +25,51 @@ QUESTION = Property(
 )
 
 
-def measured(
-    defect: float = 0.5, slope: float = 2.0, *, held_to: tuple[float, float] = (1.0, 1.9), **more: str
+def measurement(
+    defect: float = 0.5, slope: float = 2.0, *, tolerances: tuple[float, float] = (1.0, 1.9), **more: str
 ) -> Measurement:
     values = {"defect": defect, "slope": slope}
-    return Measurement(values, dict(zip(values, held_to, strict=True)), **more)  # type: ignore[arg-type]
+    return Measurement(values, dict(zip(values, tolerances, strict=True)), **more)  # type: ignore[arg-type]
 
 
 def test_a_pass_has_no_reason() -> None:
-    assert judge(QUESTION, measured()) == (Verdict.PASS, "")
-    assert judge(QUESTION, measured(1.0, 1.9)) == (Verdict.PASS, "")
+    assert judge(QUESTION, measurement()) == (Verdict.PASS, "")
+    assert judge(QUESTION, measurement(1.0, 1.9)) == (Verdict.PASS, "")
 
 
 def test_a_failure_says_value_and_tolerance() -> None:
-    assert judge(QUESTION, measured(1.5)) == (Verdict.FAIL, "defect 1.5, at most 1")
-    assert judge(QUESTION, measured(slope=1.5)) == (Verdict.FAIL, "slope 1.5, at least 1.9")
-    assert judge(QUESTION, measured(1.5, 1.5)) == (Verdict.FAIL, "defect 1.5, at most 1; slope 1.5, at least 1.9")
+    assert judge(QUESTION, measurement(1.5)) == (Verdict.FAIL, "defect 1.5, at most 1")
+    assert judge(QUESTION, measurement(slope=1.5)) == (Verdict.FAIL, "slope 1.5, at least 1.9")
+    assert judge(QUESTION, measurement(1.5, 1.5)) == (Verdict.FAIL, "defect 1.5, at most 1; slope 1.5, at least 1.9")
 
 
 def test_a_breach_that_no_number_tells() -> None:
-    assert judge(QUESTION, measured(broken="changed its input")) == (Verdict.FAIL, "changed its input")
-    assert judge(QUESTION, measured(2.0, broken="changed its input"))[1].startswith("changed its input; defect 2")
+    assert judge(QUESTION, measurement(broken="changed its input")) == (Verdict.FAIL, "changed its input")
+    assert judge(QUESTION, measurement(2.0, broken="changed its input"))[1].startswith("changed its input; defect 2")
 
 
 def test_a_doubt_excuses_a_failure_and_spoils_no_pass() -> None:
-    assert judge(QUESTION, measured(1.5, undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
-    assert judge(QUESTION, measured(undecided="a kink")) == (Verdict.PASS, "")
-    assert judge(QUESTION, measured(broken="it printed", undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
+    assert judge(QUESTION, measurement(1.5, undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
+    assert judge(QUESTION, measurement(undecided="a kink")) == (Verdict.PASS, "")
+    assert judge(QUESTION, measurement(broken="it printed", undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf, np.float64(nan)])
 def test_what_is_not_finite_fails_before_anything_is_compared(value: float) -> None:
-    assert judge(QUESTION, measured(value)) == (Verdict.FAIL, f"defect is {value}")
-    assert judge(QUESTION, measured(slope=value)) == (Verdict.FAIL, f"slope is {value}")
-    assert judge(QUESTION, measured(5.0, value)) == (Verdict.FAIL, f"slope is {value}")
-    assert judge(QUESTION, measured(value, undecided="a kink"))[0] is Verdict.FAIL
-    assert judge(QUESTION, measured(0.0, value, held_to=(nan, nan))) == (Verdict.FAIL, f"slope is {value}")
+    assert judge(QUESTION, measurement(value)) == (Verdict.FAIL, f"defect is {value}")
+    assert judge(QUESTION, measurement(slope=value)) == (Verdict.FAIL, f"slope is {value}")
+    assert judge(QUESTION, measurement(5.0, value)) == (Verdict.FAIL, f"slope is {value}")
+    assert judge(QUESTION, measurement(value, undecided="a kink"))[0] is Verdict.FAIL
+    assert judge(QUESTION, measurement(0.0, value, tolerances=(nan, nan))) == (Verdict.FAIL, f"slope is {value}")
 
 
 @pytest.mark.parametrize("tolerance", [nan, inf, -inf, np.float64(nan)])
 @pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 1e300])
 def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value: float, tolerance: float) -> None:
-    of_defect, of_slope = measured(value, held_to=(tolerance, 1.9)), measured(slope=value, held_to=(1.0, tolerance))
+    of_defect, of_slope = (
+        measurement(value, tolerances=(tolerance, 1.9)),
+        measurement(slope=value, tolerances=(1.0, tolerance)),
+    )
     assert judge(QUESTION, of_defect) == (Verdict.UNDECIDED, f"the tolerance of defect is {tolerance}")
     assert judge(QUESTION, of_slope) == (Verdict.UNDECIDED, f"the tolerance of slope is {tolerance}")
     assert excess(MOST, value, tolerance) == inf
@@ -74,8 +77,8 @@ def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value:
 
 
 def test_a_failure_stands_whatever_the_other_tolerance() -> None:
-    assert judge(QUESTION, measured(2.0, held_to=(1.0, nan))) == (Verdict.FAIL, "defect 2, at most 1")
-    assert judge(QUESTION, measured(broken="it printed", held_to=(nan, nan))) == (Verdict.FAIL, "it printed")
+    assert judge(QUESTION, measurement(2.0, tolerances=(1.0, nan))) == (Verdict.FAIL, "defect 2, at most 1")
+    assert judge(QUESTION, measurement(broken="it printed", tolerances=(nan, nan))) == (Verdict.FAIL, "it printed")
 
 
 def test_a_quantity_may_be_left_unmeasured() -> None:

@@ -43,17 +43,17 @@ class Springs:
         return sparse.csr_array(self.penalty * np.eye(z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
-        one, places = np.zeros(1), np.zeros((1, 2))
+        zero, places = np.zeros(1), np.zeros((1, 2))
         none = np.zeros(1, dtype=np.int64)
-        return ContactPoints(none, one, none, one, places, places, one, one, one, one > 0, one, one)
+        return ContactPoints(none, zero, none, zero, places, places, zero, zero, zero, zero > 0, zero, zero)
 
 
 def subject(**parts: Any) -> Subject:
     return Subject("springs", lambda *, penalty: Springs(penalty, **parts))
 
 
-def asked(verb: str, **parts: Any) -> Any:
-    """What comes over the counter when the verb is asked of springs with some parts replaced."""
+def answer_to(verb: str, **parts: Any) -> Any:
+    """Return the checked answer to the verb by springs with some parts replaced."""
     guarded = subject(**parts).for_case(CASE)
     pairing = guarded.pair(PAIR, Z) if verb != "pair" else None
     return guarded.pair(PAIR, Z) if verb == "pair" else getattr(guarded, verb)(PAIR, pairing, Z)
@@ -71,12 +71,12 @@ def test_a_correct_plugin() -> None:
     springs = subject()
     assert springs.provides == {"pair", "tangent", "contact_points"}
     assert springs.traits.tangent == "exact"
-    pairing = asked("pair")
+    pairing = answer_to("pair")
     assert isinstance(pairing, Pairing)
     assert pairing["active"].sum() == (Z > 0).sum()
-    assert asked("residual").tolist() == (10 * Z).tolist()
-    assert asked("tangent").toarray().tolist() == (10 * np.eye(10)).tolist()
-    assert asked("contact_points").gap.tolist() == [0]
+    assert answer_to("residual").tolist() == (10 * Z).tolist()
+    assert answer_to("tangent").toarray().tolist() == (10 * np.eye(10)).tolist()
+    assert answer_to("contact_points").gap.tolist() == [0]
 
 
 def test_the_penalty_in_the_kind_of_the_formulation() -> None:
@@ -107,17 +107,17 @@ def test_a_part_that_is_none_is_not_provided() -> None:
 @pytest.mark.parametrize("dtype", [np.float64, np.complex128])
 def test_a_batch_equals_a_loop(dtype: type) -> None:
     states = BATCH.astype(dtype)
-    seen: list[int] = []
+    dimensions: list[int] = []
 
     def residual(_: Interface, __: Pairing, z: Any) -> Any:
-        seen.append(z.ndim)
+        dimensions.append(z.ndim)
         return z * np.roll(z, 1, axis=-1)
 
     answers = {}
     for batched in (False, True):
         guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
         answers[batched] = guarded.residual(PAIR, None, states)
-    assert seen == [1] * 6 + [3]
+    assert dimensions == [1] * 6 + [3]
     assert answers[True].shape == states.shape
     assert answers[True].dtype == dtype
     assert np.array_equal(answers[True], answers[False])
@@ -126,7 +126,7 @@ def test_a_batch_equals_a_loop(dtype: type) -> None:
 @pytest.mark.parametrize("verb", ["pair", "residual", "tangent", "contact_points"])
 def test_a_plugin_that_raises(verb: str) -> None:
     with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$") as caught:
-        asked(verb, **{verb: raising})
+        answer_to(verb, **{verb: raising})
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
     assert isinstance(caught.value, ContractError)
     assert not isinstance(caught.value, MisuseError)
@@ -138,7 +138,7 @@ def test_a_plugin_that_writes_to_its_input(verb: str) -> None:
         more[-1][0] = 1.0
 
     with pytest.raises(PluginError, match=f"^{verb}: ValueError: assignment destination is read-only"):
-        asked(verb, **{verb: writing})
+        answer_to(verb, **{verb: writing})
     z = Z.copy()
     with pytest.raises(PluginError):
         subject(residual=writing).for_case(CASE).residual(PAIR, None, z)
@@ -146,16 +146,16 @@ def test_a_plugin_that_writes_to_its_input(verb: str) -> None:
 
 
 def test_a_plugin_that_writes_to_the_interface_or_the_pairing() -> None:
-    def writing(where: Callable[..., Any]) -> Callable[..., Any]:
+    def writing(target: Callable[..., Any]) -> Callable[..., Any]:
         def residual(*arguments: Any) -> Any:
-            where(*arguments)[...] = 0
+            target(*arguments)[...] = 0
             return arguments[-1]
 
         return residual
 
-    for where in (lambda i, p, z: i.nodes, lambda i, p, z: i.slave.segments, lambda i, p, z: p["active"]):
+    for target in (lambda i, p, z: i.nodes, lambda i, p, z: i.slave.segments, lambda i, p, z: p["active"]):
         with pytest.raises(PluginError, match="read-only"):
-            asked("residual", residual=writing(where))
+            answer_to("residual", residual=writing(target))
 
 
 NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, -np.inf, Z)
@@ -194,7 +194,7 @@ NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, 
 )
 def test_a_wrong_answer(verb: str, answer: Any, error: type[ContractError], message: str) -> None:
     with pytest.raises(error, match=message):
-        asked(verb, **{verb: always(answer)})
+        answer_to(verb, **{verb: always(answer)})
 
 
 def test_one_bad_state_of_a_batch() -> None:

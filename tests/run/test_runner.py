@@ -28,7 +28,7 @@ ERROR = Quantity("error", "1", "1e-6", "a number for a test")
 
 
 def a_case(size: int, name: str = "") -> Case:
-    """An interface of `size` segments a side, which is all that the formulations here look at."""
+    """Return a case with `size` segments a side; the formulations here look at nothing else."""
     x = np.arange(size + 1.0)
     sides = [np.column_stack([x, 0 * x]), np.column_stack([x[::-1], 0 * x])]
     interface = Interface.from_chains(*sides)
@@ -39,8 +39,8 @@ def sizes(most: int = 60) -> st.SearchStrategy[Case]:
     return st.integers(1, most).map(a_case)
 
 
-def measured(case: Case, subject: Subject) -> Measurement:
-    """The residual against what it ought to be, 0."""
+def measure_residual(case: Case, subject: Subject) -> Measurement:
+    """Measure the residual, which should be 0."""
     formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     forces = formulation.residual(case.interface, pairing, case.z)
@@ -48,7 +48,13 @@ def measured(case: Case, subject: Subject) -> Measurement:
 
 
 ZERO = Property(
-    "patch.zero", "patch", "No force.", (ERROR,), lambda _: sizes(), measured, lambda traits: traits.passes_flat_patch
+    "patch.zero",
+    "patch",
+    "No force.",
+    (ERROR,),
+    lambda _: sizes(),
+    measure_residual,
+    lambda traits: traits.passes_flat_patch,
 )
 
 
@@ -80,8 +86,8 @@ def raising_from(least: int) -> Callable[[int], float]:
     return answer
 
 
-def one_row(who: Subject, question: Property = ZERO, **options: Any) -> Row:
-    [row] = run([who], [question], **{"examples": 40, "seed": 1, **options}).rows
+def one_row(formulation: Subject, question: Property = ZERO, **options: Any) -> Row:
+    [row] = run([formulation], [question], **{"examples": 40, "seed": 1, **options}).rows
     return row
 
 
@@ -92,12 +98,12 @@ def segments(outcome: Outcome | None) -> int:
 
 @pytest.fixture
 def witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
-    def named(name: str) -> Case:
+    def find_case(name: str) -> Case:
         if name != "C":
             raise MisuseError("case", repr(name), "C")
         return a_case(7, "C")
 
-    monkeypatch.setattr(runner, "named_case", named)
+    monkeypatch.setattr(runner, "named_case", find_case)
 
 
 def test_as_many_different_cases_are_judged_as_asked() -> None:
@@ -129,7 +135,7 @@ def test_all_planned_cases_are_judged_before_one_is_shrunk() -> None:
         (step.phase for step in log), key=["drawing", "judging", "shrinking"].index
     )
     judging = [step for step in log if step.phase == "judging"]
-    assert [(step.count, step.planned) for step in judging] == [(done, 40) for done in range(1, 41)]
+    assert [(step.count, step.planned) for step in judging] == [(count, 40) for count in range(1, 41)]
     assert {(step.formulation, step.property_id) for step in log} == {("mine", "patch.zero")}
     assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 20
 
@@ -209,23 +215,23 @@ def test_hypothesis_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("promise", [True, False, None])
 @pytest.mark.usefixtures("witnesses")
 def test_a_crash_is_an_outcome_that_fails_the_run(promise: bool | None) -> None:
-    who = subject(raising_from(8), passes_flat_patch=promise, witnesses={"patch.zero": "C"})
-    row = one_row(who)
+    formulation = subject(raising_from(8), passes_flat_patch=promise, witnesses={"patch.zero": "C"})
+    row = one_row(formulation)
     assert (row.verdict, row.judged, row.unexpected) == (Verdict.CRASHED, 40, "crashed")
     assert row.reason == "exception: residual: IndexError: segment 8"
     assert segments(row.shrunk) == 8
 
 
 @pytest.mark.parametrize(
-    ("error", "how"), [(MemoryError("full"), "memory"), (SystemExit(3), "exit: residual: SystemExit: 3")]
+    ("error", "beginning"), [(MemoryError("full"), "memory"), (SystemExit(3), "exit: residual: SystemExit: 3")]
 )
-def test_how_it_crashed_is_said(error: BaseException, how: str) -> None:
+def test_how_it_crashed_is_said(error: BaseException, beginning: str) -> None:
     def answer(size: int) -> float:
         raise error
 
     outcome = judge_case(ZERO, a_case(1), subject(answer))
     assert outcome.verdict is Verdict.CRASHED
-    assert outcome.reason.startswith(how)
+    assert outcome.reason.startswith(beginning)
 
 
 @pytest.mark.parametrize("promise", [True, False, None])
@@ -317,7 +323,7 @@ def test_a_broken_promise_fails_the_run_and_a_missing_one_does_not() -> None:
 
 @pytest.mark.parametrize(("undecided", "verdict"), [(10, Verdict.PASS), (11, Verdict.NOT_JUDGED)])
 def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, verdict: Verdict) -> None:
-    def sometimes(case: Case, who: Subject) -> Measurement:
+    def sometimes(case: Case, subject: Subject) -> Measurement:
         return Measurement({"error": 1.0 * (case.seed <= undecided)}, {"error": 0.5}, "a kink")
 
     question = replace(
@@ -351,7 +357,7 @@ def test_a_promise_about_a_missing_part_is_broken() -> None:
 
 def test_the_given_interface_reaches_the_strategy() -> None:
     interface = a_case(4).interface
-    question = replace(ZERO, cases=lambda given: sizes(3) if given is interface else None)
+    question = replace(ZERO, cases=lambda argument: sizes(3) if argument is interface else None)
     assert one_row(subject(), question, interface=interface).planned == 3
 
 
@@ -370,15 +376,15 @@ def test_a_known_failure_that_matches_nothing_is_an_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         ({"profile": "nightl"}, r"profile: found 'nightl'; .* nearest: nightly"),
         ({"examples": 0}, "examples: found 0; needed at least 1"),
         ({"seed": -1}, "seed: found -1"),
     ],
 )
-def test_impossible_requests_are_said(options: dict[str, Any], told: str) -> None:
-    with pytest.raises(MisuseError, match=told):
+def test_impossible_requests_are_said(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(MisuseError, match=message):
         one_row(subject(), **options)
 
 
@@ -390,18 +396,18 @@ def test_nothing_is_asked_twice() -> None:
 
 
 def test_what_did_not_load_fails_the_run_and_the_others_run() -> None:
-    lost = [NotLoaded("other", "ImportError: x"), NotLoaded("patch.other", "ImportError: y")]
-    found = run([lost[0], subject()], [ZERO, lost[1]], examples=5, seed=1, known={"patch.other": "lost"})
-    assert [row.formulation for row in found.rows] == ["mine"]
-    assert found.not_loaded == tuple(lost)
-    assert not found.promises_kept
+    not_loaded = [NotLoaded("other", "ImportError: x"), NotLoaded("patch.other", "ImportError: y")]
+    result = run([not_loaded[0], subject()], [ZERO, not_loaded[1]], examples=5, seed=1, known={"patch.other": "lost"})
+    assert [row.formulation for row in result.rows] == ["mine"]
+    assert result.not_loaded == tuple(not_loaded)
+    assert not result.promises_kept
     assert run([subject()], [ZERO], examples=5, seed=1).promises_kept
 
 
 def test_a_run_knows_what_is_provided_and_where_it_comes_from() -> None:
-    found = run([subject()], [ZERO], profile="ci", examples=5)
-    assert found.provided == {"mine": {"pair": False, "tangent": False, "contact_points": False}}
-    facts = found.provenance
+    result = run([subject()], [ZERO], profile="ci", examples=5)
+    assert result.provided == {"mine": {"pair": False, "tangent": False, "contact_points": False}}
+    facts = result.provenance
     assert (facts["profile"], facts["examples"], facts["seed"]) == ("ci", "5", "0")
     assert facts["numpy_version"] == np.__version__
     assert facts.keys() >= {"commit", "platform", "created", "command", "python_version", "contactverif_version"}
@@ -409,8 +415,8 @@ def test_a_run_knows_what_is_provided_and_where_it_comes_from() -> None:
 
 
 def test_a_fresh_seed_can_be_given_again() -> None:
-    def answer(found: Run) -> Any:
-        return found.provenance["seed"], [segments(outcome) for outcome in found.rows[0].outcomes]
+    def answer(result: Run) -> Any:
+        return result.provenance["seed"], [segments(outcome) for outcome in result.rows[0].outcomes]
 
     first = answer(run([subject()], [ZERO], examples=20))
     assert answer(run([subject()], [ZERO], examples=20, seed=int(first[0]))) == first
@@ -428,7 +434,7 @@ def test_our_own_mistake_comes_out_with_the_case(late: bool) -> None:
     """While judging and while shrinking: the property, not the plugin, raises."""
     failed = False
 
-    def mistaken(case: Case, who: Subject) -> Measurement:
+    def mistaken(case: Case, subject: Subject) -> Measurement:
         nonlocal failed
         if failed or not late:
             raise ZeroDivisionError("in a property")
@@ -447,13 +453,13 @@ def test_an_interrupt_comes_through(call: int) -> None:
     """In the judging (of 40 cases) and in the shrinking."""
     calls = iter(range(1, 10**6))
 
-    def interrupted(size: int) -> float:
+    def interrupt(size: int) -> float:
         if next(calls) == call:
             raise KeyboardInterrupt
         return 1.0 if size >= 20 else 0.0
 
     with pytest.raises(KeyboardInterrupt):
-        one_row(subject(interrupted))
+        one_row(subject(interrupt))
 
 
 def test_a_stored_case_is_judged_again() -> None:
