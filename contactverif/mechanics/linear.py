@@ -97,9 +97,11 @@ def scale_factors(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray
 
     Returns
     -------
-    rows, columns : FloatArray, shape (n,)
-        The factors of rows and of columns, 1 for forces and positions. The factor of a multiplier's column is the
-        pressure or force that has as much effect as a unit of displacement.
+    rows : FloatArray, shape (n,)
+        The factors of rows, 1 for forces.
+    columns : FloatArray, shape (n,)
+        The factors of columns, 1 for positions. The factor of a multiplier's column is the pressure or force that has
+        as much effect as a unit of displacement.
     """
     bulk, transfer = abs(matrix[:n_positions, :n_positions]), abs(matrix[:n_positions, n_positions:])
     stiffest, widest = (float(part.max()) if min(part.shape) else 0.0 for part in (bulk, transfer))

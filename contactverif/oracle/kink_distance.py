@@ -72,13 +72,15 @@ def kink_margin(
         that segment to the ends of the area crosses the same nodes. Never more than ℓ/8, with ℓ the shortest master
         segment.
 
-    Notes ----- Points are convex combinations of nodes, so a difference d of two places changes by 2r, and the tangent
-    of a segment of length l turns by at most 1.05 (2r/l) while r ≤ l/8. Thus d·t changes by less than 3r (1 + |d|/l),
-    and each decision of that form gets the margin |d·t| / 3(1 + |d|/l). The bisector at a vertex, whose direction is
-    the mean of two, has the mean of both 1/l. For gaps the overshoot of the foot replaces |d|, since a line moves by r
-    (1 + 2 overshoot/l) there. Other pairs of segments get a quarter of the difference of the distances, which changes
-    by 4r. The bound is conservative by a factor of about 2. It is computed in floats and means nothing below roundoff,
-    some u X.
+    Notes
+    -----
+    Points are convex combinations of nodes, so a difference d of two places changes by 2r, and the tangent of a segment
+    of length l turns by at most 1.05 (2r/l) while r ≤ l/8. Thus d·t changes by less than 3r (1 + |d|/l), and each
+    decision of that form gets the margin |d·t| / 3(1 + |d|/l). The bisector at a vertex, whose direction is the mean of
+    two, has the mean of both 1/l. For gaps the overshoot of the foot replaces |d|, since a line moves by r (1 + 2
+    overshoot/l) there. Other pairs of segments get a quarter of the difference of the distances, which changes by 4r.
+    The bound is conservative by a factor of about 2. It is computed in floats and means nothing below roundoff, some u
+    X.
     """
     nodes = np.asarray(z, dtype=np.float64)[: interface.n_unknowns].reshape(-1, 2)
     valid = (np.asarray(slave_segment) >= 0) & np.isfinite(c)

@@ -222,7 +222,7 @@ def load_scene(text: str, argument: str = "--scene") -> Scene:
         if option not in defaults:
             error = unknown_name_error(f"{argument}: option of {text!r}", option, defaults)
             raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(defaults)}")
-        if needed := _needed(name, option, value):
+        if needed := _describe_need(name, option, value):
             raise MisuseError(f"{argument}: {option} of {text!r}", repr(value), needed)
     return make_scene(name, **options)
 
@@ -254,7 +254,7 @@ def make_scene(name: str, **options: Any) -> Scene:
         if option not in defaults:
             raise unknown_name_error(f"option of scene {name}", option, defaults)
         is_default = value is None and defaults[option] is None
-        if not is_default and (needed := _needed(name, option, value)):
+        if not is_default and (needed := _describe_need(name, option, value)):
             raise MisuseError(f"{option} of scene {name}", repr(value), needed)
     return _maker(name)(**options)
 
@@ -379,7 +379,7 @@ def make_blocks(
     )
 
 
-def _needed(name: str, option: str, value: Any) -> str:
+def _describe_need(name: str, option: str, value: Any) -> str:
     """Return what the option of a scene needs instead of the value; empty if the value is right."""
     if option == "sides":
         return "" if value in ("rollers", "free") else "rollers or free"

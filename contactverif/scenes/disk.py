@@ -107,11 +107,15 @@ def disk_on_foundation(
 
     Parameters
     ----------
+    problem : DiskProblem
+        The radius, the force, the materials and the penalty.
     refine : int
         The number of parts that each side of each cell is divided into.
     lowered : float | None
         The depth to which the disk is pushed in the first guess; by default a²/2R with the half-width a that Hertz on a
         Winkler layer has, so that what is in contact hardly changes afterwards.
+    name : str
+        The name of the scene.
 
     Raises
     ------
@@ -187,6 +191,8 @@ def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, 
 
     Parameters
     ----------
+    radius : float
+        The radius of the disk.
     fine : float
         Segments within |x| ≤ fine are equally long, and are the contact edges; so are those of the block above.
     refine : int

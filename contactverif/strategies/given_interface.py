@@ -17,10 +17,10 @@ _MODES = st.lists(st.integers(-8, 8), min_size=1, max_size=6)  # amplitudes of w
 
 
 def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
-    """The slave moved along the normal into a uniform penetration of 2^-10 to 2^-1 of the shortest segment.
+    """Return states whose slave is moved along the normal into a uniform penetration.
 
-    None unless both surfaces are straight and parallel up to 64 u X, face each other, and each slave chain lies over
-    one master chain.
+    The penetration is 2^-10 to 2^-1 of the shortest segment. The result is None unless both surfaces are straight and
+    parallel up to 64 u X, face each other, and each slave chain lies over one master chain.
     """
     nodes, n_slave = interface.nodes, interface.n_slave_nodes
     ends = nodes[interface.slave.segments]
@@ -56,7 +56,7 @@ def _flat_states(
 
 
 def _stretches(surface: Surface, along: FloatArray) -> list[tuple[float, float]]:
-    """From where to where each open chain goes."""
+    """Return where each open chain begins and where it ends, as coordinates along the line."""
     previous, following = surface.neighbours[surface.chain_order].T
     begins = along[surface.segments[surface.chain_order[previous < 0], 0]]
     ends = along[surface.segments[surface.chain_order[following < 0], 1]]
@@ -70,7 +70,11 @@ def _forward(surface: Surface, along: FloatArray, way: int, roundoff: float) -> 
 
 @st.composite
 def states(draw: DrawFn, interface: Interface, smooth: bool) -> Case:
-    """Waves of all nodes, a push of the slave as a whole until its deepest node penetrates, and a coprime offset."""
+    """Draw a state of the interface.
+
+    All nodes move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is
+    added.
+    """
     quarters, unit = draw(depths()), draw(depth_units())
     slave_waves, master_waves = draw(_MODES), draw(_MODES)
     penalty, seed = draw(penalties()), draw(seeds())
@@ -91,7 +95,7 @@ def _shortest_segment(interface: Interface) -> float:
 
 
 def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
-    """Displacements (n, 2): Σ a_k/8 cos(k π s + k) along the longer side of the box, alternating components."""
+    """Return displacements (n, 2): Σ a_k/8 cos(k π s + k) along the longer side of the box, alternating components."""
     box = np.ptp(nodes, axis=0)
     axis = int(np.argmax(box))
     place = (nodes[:, axis] - nodes[:, axis].min()) / box[axis]
@@ -102,7 +106,7 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
 
 
 def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:
-    """Translation (2,) of the slave that brings its deepest node to the penetration `depth`."""
+    """Return the translation (2,) of the slave that brings its deepest node to the penetration `depth`."""
     ends = positions[interface.master.segments]  # (n_segments, 2 ends, dim)
     along = ends[:, 1] - ends[:, 0]
     length = np.hypot(*along.T)

@@ -58,12 +58,21 @@ def assemble_panels(
 
     Parameters
     ----------
+    panels : Sequence[Panel]
+        The panels, from left to right.
+    motion : Motion
+        The scale of the whole, and the rigid motion of its state.
     shuffle : int
         0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
 
     Returns
     -------
-    The interface, scaled but not moved; z (n_unknowns,), scaled and moved; the x (n_nodes,) before the motion, scaled.
+    interface : Interface
+        The interface, scaled but not moved.
+    z : FloatArray, shape (n_unknowns,)
+        The state, scaled and moved.
+    along : FloatArray, shape (n_nodes,)
+        The x of the nodes before the motion, scaled.
     """
     offsets = _offsets(panels)
     slaves, masters, references = (

@@ -18,7 +18,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.mechanics.scene import has_bodies
+from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.scenes.blocks import is_uniform, overhangs, two_blocks
 from contactverif.scenes.catalogue import MODERATE_PENALTY
@@ -93,7 +93,7 @@ def _two_blocks(draw: DrawFn) -> Case:
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
     strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
     x = _grid(slave)
-    return _case(x, _cut(master, x[-1]), layers, young, poisson, motion, seed, strain=strain)
+    return _scene(x, _cut(master, x[-1]), layers, young, poisson, motion, strain=strain).case(seed=seed)
 
 
 @st.composite
@@ -112,18 +112,17 @@ def _variants(draw: DrawFn) -> Case:
     unit = float(x[-1]) / 4 if ratio != 1.0 else 1.0
     if position:
         x = x - position / POSITIONS * min(float(master_x[1] - master_x[0]), beside[0])
-    return _case(
+    scene = _scene(
         x,
         master_x,
         tuple([unit * height for height in side] for side in layers),
         (1.0, ratio),
         poisson,
         Placing((float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))),
-        seed,
         pressure=strain * min(1.0, ratio),
         rigid_master=VARIANTS[variant] == "rigid master",
-        variant=variant,
     )
+    return replace(scene, facts={**scene.facts, "variant": np.array(float(variant))}).case(seed=seed)
 
 
 @st.composite
@@ -143,7 +142,7 @@ def _dead_zones(draw: DrawFn) -> Case:
     stiff = draw(st.sampled_from([MODERATE_PENALTY, 1.0, 100.0]))
     master_x = begin + _cut(master, float(end - begin))
     pressure = strain * min(young)
-    return _case(x, master_x, layers, young, poisson, motion, seed, pressure=pressure, stiff=stiff)
+    return _scene(x, master_x, layers, young, poisson, motion, pressure=pressure, stiff=stiff).case(seed=seed)
 
 
 @st.composite
@@ -158,26 +157,28 @@ def _tilted_blocks(draw: DrawFn) -> Case:
     # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
     moved = x + sevenths / 7 + np.resize([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4
     master_x = _cut(master, x[-1] + 4) - 1
-    return _case(moved, master_x, layers, young, poisson, motion, seed, strain=strain, tilt=tilt / 13, stiff=stiff)
+    scene = _scene(moved, master_x, layers, young, poisson, motion, strain=strain, tilt=tilt / 13, stiff=stiff)
+    return scene.case(seed=seed)
 
 
-def _case(
+def _scene(
     slave_x: FloatArray,
     master_x: FloatArray,
     layers: Sequence[Sequence[float]],
     young: tuple[float, float],
     poisson: tuple[float, float],
     placing: Motion | Placing,
-    seed: int,
     *,
     strain: float = 0.0,
     pressure: float | None = None,
     tilt: float = 0.0,
     stiff: float = MODERATE_PENALTY,
     rigid_master: bool = False,
-    variant: int | None = None,
-) -> Case:
-    """`strain` and `tilt` make an imposed approach of the slave's top, unless a pressure is given."""
+) -> Scene:
+    """Return the scene of the two blocks.
+
+    `strain` and `tilt` make an imposed approach of the slave's top, unless a pressure is given.
+    """
     if isinstance(placing, Motion):
         place = Placing(tuple(placing.direction.tolist()), placing.shift, placing.scale)
     else:
@@ -185,7 +186,7 @@ def _case(
     slave_y, master_y = _grid(layers[0]), _grid(layers[1])
     approach = None if pressure is not None else strain * (slave_y[-1] + master_y[-1])
     segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * place.scale
-    scene = two_blocks(
+    return two_blocks(
         Rectangle(slave_x, slave_y, young=young[0], poisson=poisson[0]),
         Rectangle(master_x, master_y - master_y[-1], young=young[1], poisson=poisson[1]),
         penalty=stiff * (young[0] if rigid_master else min(young)) / segment,
@@ -195,9 +196,6 @@ def _case(
         rigid_master=rigid_master,
         placing=place,
     )
-    if variant is not None:
-        scene = replace(scene, facts={**scene.facts, "variant": np.array(float(variant))})
-    return scene.case(seed=seed)
 
 
 def _grid(segments: Sequence[float]) -> FloatArray:
