@@ -1,4 +1,4 @@
-"""What is kept beside the code stays true: workflows, citation, version, tables of contents.
+"""The files beside the code stay true: workflows, citation, version, tables of contents.
 
 A table of contents lists every heading of the second level below "## Contents", and each of its links leads somewhere.
 `python tests/test_habits.py FILE …` writes the table into files that have none, or a wrong one.

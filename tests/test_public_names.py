@@ -84,7 +84,7 @@ def test_importing_the_package_imports_nothing_that_takes_long() -> None:
 
 
 def homes() -> list[ModuleType]:
-    """The modules in which public names are defined."""
+    """Return the modules in which public names are defined."""
     things = [getattr(importlib.import_module(module), name) for module, name in NAMES]
     return [sys.modules[name] for name in sorted({thing.__module__ for thing in things})]
 

@@ -54,7 +54,7 @@ squared_gap = skfem.BilinearForm(_squared_gap)
 
 
 def penalty_blocks(upper: Any, lower: Any, penalty: float) -> list[list[Any]]:
-    """The penalty's share of the stiffness, [[upper-upper, upper-lower], [lower-upper, lower-lower]]."""
+    """Return the penalty's share of the stiffness, [[upper-upper, upper-lower], [lower-upper, lower-lower]]."""
     (trace_1, facets_1), (trace_2, facets_2) = (
         mesh.trace(side, mtype=skfem.MeshLine, project=lambda p: p[:1])
         for mesh, side in ((upper, "bottom"), (lower, "top"))
@@ -64,16 +64,16 @@ def penalty_blocks(upper: Any, lower: Any, penalty: float) -> list[list[Any]]:
         skfem.FacetBasis(
             mesh,
             ELEMENT,
-            facets=facets[of],
-            quadrature=elementwise_quadrature(trace, common, of, intorder=2),
+            facets=facets[own_facets],
+            quadrature=elementwise_quadrature(trace, common, own_facets, intorder=2),
         )
-        for mesh, trace, facets, of in ((upper, trace_1, facets_1, of_1), (lower, trace_2, facets_2, of_2))
+        for mesh, trace, facets, own_facets in ((upper, trace_1, facets_1, of_1), (lower, trace_2, facets_2, of_2))
     ]
     return [[squared_gap.assemble(bases[j], bases[i], idx=(j, i), penalty=penalty) for j in range(2)] for i in range(2)]
 
 
 def exact_pressure(blocks: TwoBlocks) -> float:
-    """The uniform pressure: two columns that cannot widen and the penalty, as springs in series."""
+    """Return the uniform pressure: two columns that cannot widen and the penalty, as springs in series."""
     compliance = 1 / blocks.penalty
     for y, young, nu in zip((blocks.slave_y, blocks.master_y), blocks.young, blocks.poisson, strict=True):
         compliance += (y[-1] - y[0]) * (1 + nu) * (1 - 2 * nu) / (young * (1 - nu))
@@ -81,7 +81,7 @@ def exact_pressure(blocks: TwoBlocks) -> float:
 
 
 def solve(blocks: TwoBlocks) -> float:
-    """Largest |sigma - sigma_exact| / p over the Gauss points of both blocks."""
+    """Return the largest |sigma - sigma_exact| / p over the Gauss points of both blocks."""
     meshes = [
         skfem.MeshQuad.init_tensor(x, y).with_defaults()
         for x, y in ((blocks.slave_x, blocks.slave_y), (blocks.master_x, blocks.master_y))
@@ -98,8 +98,8 @@ def solve(blocks: TwoBlocks) -> float:
     fixed = [basis.get_dofs({"left", "right"}).all("u^1") for basis in bases]
     u = np.zeros(upper.N + lower.N)
     u[pushed] = -blocks.approach
-    held = np.concatenate([pushed, fixed[0], upper.N + fixed[1], upper.N + lower.get_dofs("bottom").all("u^2")])
-    u = skfem.solve(*skfem.condense(skfem.bmat(stiffness, "csr"), x=u, D=held))
+    prescribed = np.concatenate([pushed, fixed[0], upper.N + fixed[1], upper.N + lower.get_dofs("bottom").all("u^2")])
+    u = skfem.solve(*skfem.condense(skfem.bmat(stiffness, "csr"), x=u, D=prescribed))
 
     pressure, worst = exact_pressure(blocks), 0.0
     for basis, part, (lam, mu), nu in zip(bases, np.split(u, [upper.N]), lame, blocks.poisson, strict=True):

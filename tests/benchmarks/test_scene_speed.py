@@ -1,4 +1,4 @@
-"""How long a random patch test takes, everything included, and beside the script that a user would have written.
+"""Time a random patch test, everything included, and the same test in a script that a user would have written.
 
 The ratios are printed; no verdict hangs on a clock.
 """
@@ -31,27 +31,27 @@ N_MESHES = 40
 
 
 def formulation(name: str = "vts-ppt") -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject)
-    return found
+    subject = load_formulation(name)
+    assert isinstance(subject, Subject)
+    return subject
 
 
 def meshes() -> list[TwoBlocks]:
     """Random pairs of blocks of equal width, integer nodes, 1 to 6 segments a side and 1 to 3 layers."""
     random = np.random.default_rng(1)
-    found = []
+    pairs = []
     for _ in range(N_MESHES):
         width = int(random.integers(6, 25))
         inner = [random.choice(np.arange(1, width), int(random.integers(0, 6)), replace=False) for _ in range(2)]
         slave_x, master_x = (np.sort(np.concatenate([[0, width], nodes])).astype(float) for nodes in inner)
         layers = [np.concatenate([[0], np.cumsum(random.integers(1, 5, random.integers(1, 4)))]) for _ in range(2)]
         slave_y, master_y = layers[0].astype(float), (layers[1] - layers[1][-1]).astype(float)
-        found.append(TwoBlocks(slave_x, slave_y, master_x, master_y, (1.0, 3.0), (0.3, 0.2), 0.1, 10.0))
-    return found
+        pairs.append(TwoBlocks(slave_x, slave_y, master_x, master_y, (1.0, 3.0), (0.3, 0.2), 0.1, 10.0))
+    return pairs
 
 
-def posed(blocks: TwoBlocks) -> Scene:
-    """The same two blocks as a scene."""
+def make_scene(blocks: TwoBlocks) -> Scene:
+    """Return the two blocks as a scene."""
     return two_blocks(
         Rectangle(blocks.slave_x, blocks.slave_y, young=blocks.young[0], poisson=blocks.poisson[0]),
         Rectangle(blocks.master_x, blocks.master_y, young=blocks.young[1], poisson=blocks.poisson[1]),
@@ -60,31 +60,35 @@ def posed(blocks: TwoBlocks) -> Scene:
     )
 
 
-def solved_by_us(blocks: TwoBlocks, subject: Subject) -> float:
-    """What the plain script does: mesh, bodies, solution, and the stresses held against the exact ones."""
-    scene = posed(blocks)
+def solve_as_scene(blocks: TwoBlocks, subject: Subject) -> float:
+    """Do what the plain script does: mesh, bodies, solution, and the comparison of the stresses with the exact ones."""
+    scene = make_scene(blocks)
     trace = solve(scene, subject.with_penalty(blocks.penalty))
     return stress_error(scene, scene.stresses(trace.solution), exact_pressure(blocks))
 
 
-def judged_by_us(blocks: TwoBlocks, subject: Subject) -> float:
-    """All that the property asks: forces on both sides, gaps, pressures, tolerances."""
-    return measure_at_penalty(posed(blocks).case(), subject, blocks.penalty).values["stress error"]
+def judge_as_property(blocks: TwoBlocks, subject: Subject) -> float:
+    """Compute all that the property needs: forces on both sides, gaps, pressures, tolerances."""
+    return measure_at_penalty(make_scene(blocks).case(), subject, blocks.penalty).values["stress error"]
 
 
 def test_beside_the_plain_script(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     benchmark.group = "the same two blocks, solved and held against the exact stress"
     subject, every = formulation(), meshes()
-    for way in (lambda blocks: solved_by_us(blocks, subject), lambda blocks: judged_by_us(blocks, subject), plain):
+    for way in (
+        lambda blocks: solve_as_scene(blocks, subject),
+        lambda blocks: judge_as_property(blocks, subject),
+        plain,
+    ):
         assert max(way(blocks) for blocks in every) < 1e-11
     mine, whole, theirs = interleaved(
-        lambda: [solved_by_us(blocks, subject) for blocks in every],
-        lambda: [judged_by_us(blocks, subject) for blocks in every],
+        lambda: [solve_as_scene(blocks, subject) for blocks in every],
+        lambda: [judge_as_property(blocks, subject) for blocks in every],
         lambda: [plain(blocks) for blocks in every],
         repeats=1,
     )
     benchmark.extra_info["plain script over ours"] = theirs / mine
-    benchmark(lambda: solved_by_us(every[0], subject))
+    benchmark(lambda: solve_as_scene(every[0], subject))
     with capsys.disabled():
         print(
             f"\n{N_MESHES} pairs of blocks, meshes a second: ours {N_MESHES / mine:.0f} (judged by all quantities "
@@ -99,36 +103,36 @@ def test_one_random_patch_test(benchmark: Any, capsys: pytest.CaptureFixture[str
     subject = formulation()
     cases = draw_cases(block_cases(), seed="0", examples=N_MESHES).cases
 
-    def forgotten() -> None:
+    def clear_caches() -> None:
         scene_of.cache_clear()
         condense.cache_clear()
 
-    def judged() -> None:
-        forgotten()
+    def judge_all() -> None:
+        clear_caches()
         for case in cases:
             judge_case(FLAT_SOLVE, case, subject)
 
-    def condensed() -> None:
-        forgotten()
+    def condense_all() -> None:
+        clear_caches()
         for case in cases:
             assert len(scene_of(case).condensed_bodies) == 2
 
-    def solved() -> None:
+    def solve_all() -> None:
         for case in cases:
             solve(scene_of(case), subject.for_case(case))
 
-    drawn, whole, bodies, newton = interleaved(
-        lambda: draw_cases(block_cases(), seed="0", examples=N_MESHES), judged, condensed, solved, repeats=1
+    drawing, whole, bodies, newton = interleaved(
+        lambda: draw_cases(block_cases(), seed="0", examples=N_MESHES), judge_all, condense_all, solve_all, repeats=1
     )
-    judged()
+    judge_all()
     again = interleaved(lambda: [judge_case(FLAT_SOLVE, case, subject) for case in cases], repeats=1)[0]
-    benchmark(judged)
-    drawn, whole, bodies, newton, again = (1e3 * time / N_MESHES for time in (drawn, whole, bodies, newton, again))
-    benchmark.extra_info |= {"drawing, ms": drawn, "judging, ms": whole}
+    benchmark(judge_all)
+    drawing, whole, bodies, newton, again = (1e3 * time / N_MESHES for time in (drawing, whole, bodies, newton, again))
+    benchmark.extra_info |= {"drawing, ms": drawing, "judging, ms": whole}
     with capsys.disabled():
         print(
-            f"\nOne random patch test, everything included: {drawn + whole:.2f} ms = {drawn:.2f} drawing (hypothesis, "
-            f"mesh, scene) + {whole:.2f} judging at two penalties. Of these: scene from its case and condensation "
-            f"{bodies:.2f}, Newton at one penalty {newton:.2f}. With bodies that another formulation has condensed: "
-            f"judging {again:.2f}"
+            f"\nOne random patch test, everything included: {drawing + whole:.2f} ms = {drawing:.2f} drawing "
+            f"(hypothesis, mesh, scene) + {whole:.2f} judging at two penalties. Of these: scene from its case and "
+            f"condensation {bodies:.2f}, Newton at one penalty {newton:.2f}. With bodies that another formulation "
+            f"has condensed: judging {again:.2f}"
         )

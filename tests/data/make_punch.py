@@ -9,7 +9,7 @@ import gmsh
 
 
 def block(corners, divisions, quads):
-    """A structured rectangle; returns its lines and its surface."""
+    """Add a structured rectangle and return its lines and its surface."""
     geo = gmsh.model.geo
     points = [geo.addPoint(x, y, 0) for x, y in corners]
     lines = [geo.addLine(points[k], points[(k + 1) % 4]) for k in range(4)]

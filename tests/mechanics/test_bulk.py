@@ -25,8 +25,8 @@ from contactverif.scenes.blocks import exact_unknowns, two_blocks
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 
 
-def distorted(body: Body, seed: int = 0) -> Body:
-    """The block with its inner nodes moved, and random nodal forces and imposed displacements."""
+def distort(body: Body, seed: int = 0) -> Body:
+    """Return the block with its inner nodes moved, and random nodal forces and imposed displacements."""
     random = np.random.default_rng(seed)
     inside = np.ones(len(body.nodes), bool)
     inside[np.unique(boundary_edges(body))] = False
@@ -36,19 +36,19 @@ def distorted(body: Body, seed: int = 0) -> Body:
 
 
 def boundary_edges(body: Body) -> FloatArray:
-    """The edges (n, 2) that one cell alone has."""
+    """Return the edges (n, 2) that one cell alone has."""
     edges = np.sort(np.stack([body.cells, np.roll(body.cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     every, counts = np.unique(edges, axis=0, return_counts=True)
     return every[counts == 1]
 
 
 def in_triangles(body: Body) -> Body:
-    """The same body, each quadrilateral cut in two."""
+    """Cut each quadrilateral of a body in two."""
     return replace(body, cells=np.vstack([body.cells[:, [0, 1, 2]], body.cells[:, [0, 2, 3]]]))
 
 
 def a_block(**more: Any) -> Body:
-    """A block of nine cells; options are those of `Rectangle`, `Placing` and `block`."""
+    """Return a block of nine cells; options are those of `Rectangle`, `Placing` and `block`."""
     options = {"contact": "bottom", "young": 3.0, "poisson": 0.3, "approach": 0.1} | more
     material = {name: options.pop(name) for name in ("young", "poisson")}
     placing = Placing(**{name: options.pop(name) for name in ("axis", "shift") if name in options})
@@ -57,20 +57,20 @@ def a_block(**more: Any) -> Body:
 
 BODIES = {
     "rectangles": a_block(),
-    "quadrilaterals": distorted(a_block()),
-    "triangles": in_triangles(distorted(a_block())),
-    "rotated": distorted(a_block(axis=LEANING, shift=(1, -2))),
-    "rotated triangles": in_triangles(distorted(a_block(axis=LEANING))),
-    "top": distorted(a_block(contact="top")),
-    "free sides": distorted(a_block(approach=None, pressure=2.0, free_sides=True)),
-    "nearly incompressible": distorted(a_block(poisson=0.499)),
-    "auxetic": distorted(a_block(poisson=-0.9)),
+    "quadrilaterals": distort(a_block()),
+    "triangles": in_triangles(distort(a_block())),
+    "rotated": distort(a_block(axis=LEANING, shift=(1, -2))),
+    "rotated triangles": in_triangles(distort(a_block(axis=LEANING))),
+    "top": distort(a_block(contact="top")),
+    "free sides": distort(a_block(approach=None, pressure=2.0, free_sides=True)),
+    "nearly incompressible": distort(a_block(poisson=0.499)),
+    "auxetic": distort(a_block(poisson=-0.9)),
 }
 every_body = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 
 
 def by_skfem(body: Body) -> FloatArray:
-    """K (2 n_nodes, 2 n_nodes) in global axes, assembled form by form; unknown 2 × node + component."""
+    """Return K (2 n_nodes, 2 n_nodes) in global axes, assembled form by form; unknown 2 × node + component."""
     triangles = body.cells.shape[1] == 3
     kind, element = (skfem.MeshTri, skfem.ElementTriP1()) if triangles else (skfem.MeshQuad, skfem.ElementQuad1())
     mesh = kind(np.ascontiguousarray(body.nodes.T), np.ascontiguousarray(body.cells.T))
@@ -81,7 +81,7 @@ def by_skfem(body: Body) -> FloatArray:
 
 
 def size_over_cell(body: Body) -> float:
-    """X over the shortest edge of a cell: what a relative error of a coordinate becomes in a gradient."""
+    """Return X over the shortest edge of a cell: what a relative error of a coordinate becomes in a gradient."""
     corners = body.nodes[body.cells]
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
     return float(np.abs(body.nodes).max() / edges.min())
@@ -110,7 +110,7 @@ def test_rigid_motions_cost_no_energy(body: Body) -> None:
 
 
 def parts(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Numbers of the unknowns that are free on the contact boundary, free elsewhere, and fixed."""
+    """Return the numbers of the unknowns that are free on the contact boundary, free elsewhere, and fixed."""
     kind = np.where(np.isin(np.arange(len(body.nodes)), body.contact)[:, None], 0, 1) * np.ones((1, 2), int)
     kind = np.where(body.fixed, 2, kind).reshape(-1)
     unknowns, interior, fixed = (np.flatnonzero(kind == number) for number in range(3))
@@ -143,7 +143,7 @@ def test_condensed_and_recovered_is_the_full_solution(body: Body, factor: float)
     unknowns, interior, fixed = parts(body)
     body = replace(body, imposed=np.where(body.fixed, np.arange(body.fixed.size).reshape(-1, 2) / 7, 0.0))
     matrix, u = by_skfem_in_body_axes(body), factor * body.imposed.reshape(-1)
-    pushed = np.random.default_rng(1).normal(size=len(unknowns))  # by somebody else, on the contact boundary
+    pushed = np.random.default_rng(1).normal(size=len(unknowns))  # Forces of somebody else on the contact boundary.
     right = factor * body.load.reshape(-1) - matrix @ u
     right[unknowns] += pushed
     free = np.sort(np.concatenate([unknowns, interior]))
@@ -192,10 +192,12 @@ def test_bodies_without_unknowns_or_without_an_inside() -> None:
     assert floor.stiffness.shape == (0, 0)
     assert floor.displacements(np.zeros(0), 0.5).tolist() == [[-0.125, 0.25]] * 3
     assert floor.stresses(np.zeros(0)).shape == (0, 1, 3)
-    held = block(Rectangle([0, 1], [0, 1]), contact="bottom", approach=0.0)  # one cell: the sides and the top are held
-    layer = condense(held)
+    fixed_body = block(
+        Rectangle([0, 1], [0, 1]), contact="bottom", approach=0.0
+    )  # one cell: the sides and the top are held
+    layer = condense(fixed_body)
     assert layer.unknowns.tolist() == [1, 3]
-    expected = by_skfem(held)[np.ix_([1, 3], [1, 3])]
+    expected = by_skfem(fixed_body)[np.ix_([1, 3], [1, 3])]
     assert np.abs(layer.stiffness - expected).max() <= 4 * UNIT_ROUNDOFF * expected.max()
 
 
@@ -207,15 +209,15 @@ def test_stresses_of_a_linear_field(body: Body) -> None:
     """All nodes moved as u = A x: the stress is C : sym A, whatever the cells."""
     gradient = np.array([[0.3, -0.7], [0.2, 0.5]])
     u = body.nodes @ gradient.T
-    held = replace(body, fixed=np.ones(body.fixed.shape, bool), imposed=u @ body.frame)
+    fixed_body = replace(body, fixed=np.ones(body.fixed.shape, bool), imposed=u @ body.frame)
     strain = (gradient + gradient.T) / 2
     lame, shear = lame_parameters(body.young, body.poisson)
     stress = body.frame.T @ (lame * np.trace(strain) * np.eye(2) + 2 * shear * strain) @ body.frame
-    found = condense(held).stresses(np.zeros(0))
-    assert (len(found), found.shape[2]) == (len(body.cells), 3)
+    stresses = condense(fixed_body).stresses(np.zeros(0))
+    assert (len(stresses), stresses.shape[2]) == (len(body.cells), 3)
     bound = 4 * UNIT_ROUNDOFF * size_over_cell(body) * body.oedometric_modulus
-    assert np.abs(found - [stress[0, 0], stress[1, 1], stress[0, 1]]).max() <= bound
-    assert np.abs(condense(held).stresses(np.zeros(0), 0.5) - found / 2).max() <= bound
+    assert np.abs(stresses - [stress[0, 0], stress[1, 1], stress[0, 1]]).max() <= bound
+    assert np.abs(condense(fixed_body).stresses(np.zeros(0), 0.5) - stresses / 2).max() <= bound
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0), LEANING, (0.0, -1.0)], ids=["upright", "leaning", "hanging"])
@@ -245,7 +247,7 @@ def test_stresses_of_a_uniform_pressure(axis: tuple[float, float], cells: str) -
 
 
 def with_a_loose_part(seed: int) -> Body:
-    """The block, and a second one that nobody holds, somewhere else."""
+    """Return the block, and a second one that nobody holds, somewhere else."""
     random = np.random.default_rng(seed)
     body, n = a_block(poisson=float(random.uniform(0, 0.45))), int(random.integers(2, 5))
     other = block(Rectangle(np.arange(n) * random.uniform(0.3, 3), np.arange(3.0)), contact="top", approach=0.0)
@@ -290,14 +292,14 @@ def test_what_is_loose_is_said() -> None:
     flat = block(Rectangle([0, 1, 2], [0, 1]), contact="bottom", pressure=1.0, name="punch")
     bent = replace(flat, nodes=np.where(np.arange(6)[:, None] == 1, (1.0, -0.25), flat.nodes))
     none = np.zeros_like(flat.fixed)
-    one = none.copy()
-    one[4, 0] = True
+    single_support = none.copy()
+    single_support[4, 0] = True
     up = none.copy()
     up[:, 1] = True
     assert loose_modes(flat) == []
     assert loose_modes(replace(flat, fixed=none)) == ["move along its first axis"]
     assert loose_modes(replace(flat, fixed=up)) == ["move along its first axis"]
-    assert loose_modes(replace(flat, fixed=one)) == []  # contact holds the rest
+    assert loose_modes(replace(flat, fixed=single_support)) == []  # contact holds the rest
     assert loose_modes(replace(bent, fixed=none)) == []  # a wedge cannot slide
     ring = np.array([[cos(angle), sin(angle)] for angle in np.arange(8) * np.pi / 4])
     numbers = np.arange(8)
@@ -328,18 +330,18 @@ WEDGE = skfem.MeshTri(
 )
 
 
-def made(mesh: Any = QUADS, **more: Any) -> Body:
-    given: Mapping[str, Any] = {"contact": "bottom", "supports": {"top": "both"}} | more
-    return body_from_mesh(mesh, **given)
+def make_body(mesh: Any = QUADS, **more: Any) -> Body:
+    options: Mapping[str, Any] = {"contact": "bottom", "supports": {"top": "both"}} | more
+    return body_from_mesh(mesh, **options)
 
 
 def edges_at(body: Body) -> list[list[list[float]]]:
-    """The contact edges by where they are, sorted."""
+    """Return the contact edges by the positions of their nodes, sorted."""
     return sorted(body.nodes[body.contact].tolist())
 
 
 def test_a_body_from_quadrilaterals() -> None:
-    body = made(
+    body = make_body(
         supports={"top": "across", "left": "along", "right": "both"},
         displacements={"top": (0.0, -0.25)},
         pressures={"left": 2.0},
@@ -360,7 +362,7 @@ def test_a_body_from_quadrilaterals() -> None:
 def test_a_body_from_triangles() -> None:
     sides = np.diff(WEDGE.p.T[WEDGE.t.T], axis=1)
     assert {*np.sign(np.linalg.det(sides))} == {-1, 1}  # skfem sorts the nodes of a cell, whichever way it then runs
-    body = made(WEDGE, contact="base", supports={"wall": "along"}, pressures={"slope": 2.0, "wall": 1.0})
+    body = make_body(WEDGE, contact="base", supports={"wall": "along"}, pressures={"slope": 2.0, "wall": 1.0})
     assert edges_at(body) == [[[0, 0], [2, 0]], [[2, 0], [4, 0]]]
     corners = body.nodes[body.cells]
     assert (np.linalg.det(np.diff(corners, axis=1)) > 0).all()
@@ -375,19 +377,22 @@ def test_clockwise_cells_are_turned() -> None:
     turned[:, 1] = turned[::-1, 1]
     mixed = skfem.MeshQuad(QUADS.p, turned).with_defaults()
     assert (mixed.t[:, 1] != QUADS.t[:, 1]).any()
-    difference = dense(assemble_stiffness(made(mixed))[0]) - dense(assemble_stiffness(made())[0])
-    assert np.abs(difference).max() <= 4 * UNIT_ROUNDOFF * assemble_stiffness(made())[0].max()
-    assert edges_at(made(mixed)) == edges_at(made())
+    difference = dense(assemble_stiffness(make_body(mixed))[0]) - dense(assemble_stiffness(make_body())[0])
+    assert np.abs(difference).max() <= 4 * UNIT_ROUNDOFF * assemble_stiffness(make_body())[0].max()
+    assert edges_at(make_body(mixed)) == edges_at(make_body())
 
 
 def test_a_body_from_a_mesh_is_the_block_of_the_same_grid() -> None:
-    drawn = block(Rectangle([0, 1, 2.5], [0, 1, 1.75], young=3.0, poisson=0.2), contact="bottom", pressure=2.0)
-    meshed = made(supports={"left": "along", "right": "along"}, pressures={"top": 2.0}, young=3.0, poisson=0.2)
-    order = [int(np.flatnonzero((meshed.nodes == node).all(axis=1))[0]) for node in drawn.nodes]
-    assert np.array_equal(meshed.fixed[order], drawn.fixed)
-    assert np.array_equal(meshed.load[order], drawn.load)
+    rectangle_body = block(Rectangle([0, 1, 2.5], [0, 1, 1.75], young=3.0, poisson=0.2), contact="bottom", pressure=2.0)
+    meshed = make_body(supports={"left": "along", "right": "along"}, pressures={"top": 2.0}, young=3.0, poisson=0.2)
+    order = [int(np.flatnonzero((meshed.nodes == node).all(axis=1))[0]) for node in rectangle_body.nodes]
+    assert np.array_equal(meshed.fixed[order], rectangle_body.fixed)
+    assert np.array_equal(meshed.load[order], rectangle_body.load)
     unknowns = (2 * np.array(order)[:, None] + np.arange(2)).reshape(-1)
-    ours, theirs = dense(assemble_stiffness(drawn)[0]), dense(assemble_stiffness(meshed)[0])[np.ix_(unknowns, unknowns)]
+    ours, theirs = (
+        dense(assemble_stiffness(rectangle_body)[0]),
+        dense(assemble_stiffness(meshed)[0])[np.ix_(unknowns, unknowns)],
+    )
     assert np.abs(ours - theirs).max() <= 4 * UNIT_ROUNDOFF * ours.max()
 
 
@@ -458,8 +463,8 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize(("given", "message"), WRONG.values(), ids=WRONG)
-def test_wrong_meshes_of_a_body(given: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize(("options", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_meshes_of_a_body(options: dict[str, Any], message: str) -> None:
     with pytest.raises(MisuseError) as error:
-        made(**given)
+        make_body(**options)
     assert str(error.value) == message

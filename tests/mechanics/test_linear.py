@@ -15,7 +15,7 @@ KINDS = pytest.mark.parametrize("kind", [np.array, sparse.csr_array])
 
 
 def saddle(constraints: FloatArray, stiffness: float = 1.0) -> FloatArray:
-    """Four springs in a row, each to its neighbours and to the ground, and constraints (m, 4) on them."""
+    """Return the matrix of four springs, each to its neighbours and the ground, and of constraints (m, 4) on them."""
     springs = stiffness * (3 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
     m = len(constraints)
     return np.block([[springs, constraints.T], [constraints, np.zeros((m, m))]])
@@ -66,8 +66,8 @@ def test_constraints_that_contradict_each_other_are_not_averaged(kind: Any) -> N
 def test_positions_that_nothing_holds_are_singular(kind: Any) -> None:
     between = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 0]])  # a spring and a constraint between two free nodes
     assert linear.solve_step(kind(between), np.array([1.0, -1, 0]), 2).change is None
-    held = np.array([[1.0, -1, 1], [-1, 1, 0], [1, 0, 0]])
-    assert linear.solve_step(kind(held), np.array([1.0, -1, 0]), 2).change is not None
+    grounded = np.array([[1.0, -1, 1], [-1, 1, 0], [1, 0, 0]])
+    assert linear.solve_step(kind(grounded), np.array([1.0, -1, 0]), 2).change is not None
 
 
 @KINDS
@@ -94,5 +94,5 @@ def test_a_nearly_singular_matrix_is_told_also_where_its_null_vector_is_orthogon
     """The usual estimate begins with equal entries, and sees nothing of it."""
     vector = np.array(nothing) / np.linalg.norm(nothing)
     matrix = np.eye(4) - (1 - 1e-14) * np.outer(vector, vector)
-    found = linear.solve_step(sparse.csr_array(matrix), vector, 4)
-    assert found.condition < 1e-13
+    step = linear.solve_step(sparse.csr_array(matrix), vector, 4)
+    assert step.condition < 1e-13

@@ -31,21 +31,21 @@ ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-
 
 
 def subject(name: str) -> Subject:
-    found = load_formulation(name)
-    assert isinstance(found, Subject)
-    return found
+    formulation = load_formulation(name)
+    assert isinstance(formulation, Subject)
+    return formulation
 
 
 def on(name: str, scene: Scene) -> CheckedFormulation:
     return subject(name).for_case(scene.case())
 
 
-def solved(name: str, scene: Scene, **how: Any) -> Trace:
-    return solve(scene, on(name, scene), **how)
+def solve_named(name: str, scene: Scene, **options: Any) -> Trace:
+    return solve(scene, on(name, scene), **options)
 
 
 def mean_pressure(scene: Scene, q: FloatArray) -> tuple[float, float]:
-    """Mean normal stress of each body over its Gauss points, as a pressure."""
+    """Return the mean normal stress of each body over its Gauss points, as a pressure."""
     upper, lower = (-stresses[..., 1] for stresses in scene.stresses(q))
     return float(upper.mean()), float(lower.mean())
 
@@ -67,14 +67,14 @@ MASTERS = {"one": [0.0, 8.0], "matching": [0.0, 2, 4, 8], "b": [0.0, 4, 8], "cro
     ],
 )
 def test_the_pressure_of_two_pressed_blocks(name: str, master: str) -> None:
-    """p = Δ/(H1/M1 + H2/M2 + 1/ε̂), on a pair of meshes that each formulation can do."""
+    """The pressure is p = Δ/(H1/M1 + H2/M2 + 1/ε̂), on a pair of meshes that each formulation can do."""
     scene = two_blocks(
         Rectangle([0, 2, 4, 8], [0, 2, 6], young=1, poisson=0.3),
         Rectangle(MASTERS[master], [-4, -2, 0], young=3, poisson=0.2),
         penalty=10,
         approach=0.1,
     )
-    trace = solved(name, scene)
+    trace = solve_named(name, scene)
     assert trace.end is End.CONVERGED
     upper, lower = mean_pressure(scene, trace.solution)
     assert abs(upper - 0.017369727047) <= 1e-12  # The exact pressure was computed by hand.
@@ -91,8 +91,8 @@ def test_the_pressure_of_two_pressed_blocks(name: str, master: str) -> None:
 # --- every end --------------------------------------------------------------------------------------------------
 
 
-def documented(trace: Trace, scene: Scene) -> None:
-    """Shapes and meanings, whatever the end."""
+def check_trace(trace: Trace, scene: Scene) -> None:
+    """Check the shapes and meanings of all that a trace has, whatever its end."""
     n = len(trace.q)
     assert trace.scene is scene
     assert trace.q.shape == (n, scene.n_free)
@@ -114,10 +114,13 @@ def documented(trace: Trace, scene: Scene) -> None:
 
 
 class Springs:
-    """Springs on both sides whether open or not: forces stiffness × (z − Z), said to have another tangent."""
+    """Springs on both sides whether open or not: forces stiffness × (z − Z).
 
-    def __init__(self, penalty: float, said: float = 1.0, noise: float = 0.0) -> None:
-        self.penalty, self.said, self.noise = penalty, said, noise
+    The tangent is the right one times `tangent_factor`.
+    """
+
+    def __init__(self, penalty: float, tangent_factor: float = 1.0, noise: float = 0.0) -> None:
+        self.penalty, self.tangent_factor, self.noise = penalty, tangent_factor, noise
         self.traits = Traits()
 
     def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
@@ -126,17 +129,17 @@ class Springs:
         return self.penalty * (moved + self.noise * np.abs(z) * rough)
 
     def tangent(self, interface: Interface, pairing: Any, z: Any) -> Any:
-        return self.said * self.penalty * np.eye(z.size)
+        return self.tangent_factor * self.penalty * np.eye(z.size)
 
 
-def springs(scene: Scene, **how: float) -> CheckedFormulation:
-    return Subject("springs", lambda *, penalty: Springs(penalty, **how)).with_penalty(1e4)
+def springs(scene: Scene, **options: float) -> CheckedFormulation:
+    return Subject("springs", lambda *, penalty: Springs(penalty, **options)).with_penalty(1e4)
 
 
 def test_converged() -> None:
     scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
-    trace = solved("vts-ppt", scene)
-    documented(trace, scene)
+    trace = solve_named("vts-ppt", scene)
+    check_trace(trace, scene)
     assert trace.end is End.CONVERGED
     assert (trace.factors == 1).all()
     assert trace.changes[0] == -1
@@ -147,8 +150,8 @@ def test_converged() -> None:
 
 def test_a_two_cycle_is_named() -> None:
     scene = catalogue.make_scene("c", penalty=1e4)
-    trace = solved("vts-me", scene)
-    documented(trace, scene)
+    trace = solve_named("vts-me", scene)
+    check_trace(trace, scene)
     assert trace.end is End.CYCLE
     assert np.abs(trace.q[-1] - trace.q[-3]).max() <= 2.0**-20 * np.abs(trace.q[-1] - trace.q[-2]).max()
     assert (trace.changes[-2:] > 0).all()  # two pairings take turns
@@ -165,8 +168,8 @@ def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
         monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     for degrees, poisson, refine in ((0.0, 0.3, 1), (10.0, 0.2, 3), (33.0, 0.45, 1), (77.0, 0.0, 2)):
         scene = catalogue.make_scene(name, lowered=-0.1, degrees=degrees, poisson=poisson, refine=refine)
-        trace = solved("vts-ppt", scene)
-        documented(trace, scene)
+        trace = solve_named("vts-ppt", scene)
+        check_trace(trace, scene)
         assert trace.end is End.SINGULAR
         assert trace.n_iterations == 0
         assert trace.conditions[-1] <= scene.n_free * UNIT_ROUNDOFF
@@ -190,8 +193,8 @@ def test_a_stiff_contact_is_not_singular(dense: bool, monkeypatch: pytest.Monkey
 
 def test_iterates_that_leave() -> None:
     scene = catalogue.make_scene("c")
-    trace = solve(scene, springs(scene, said=0.1), start=np.full(scene.n_free, 1e-3))
-    documented(trace, scene)
+    trace = solve(scene, springs(scene, tangent_factor=0.1), start=np.full(scene.n_free, 1e-3))
+    check_trace(trace, scene)
     assert trace.end is End.DIVERGED
     assert trace.residuals[-1] > 1e8 * trace.residuals[0] > 1e8 * trace.residuals[-2] / trace.residuals[-1]
     assert np.isfinite(trace.q).all()
@@ -199,12 +202,12 @@ def test_iterates_that_leave() -> None:
 
 def test_out_of_iterations() -> None:
     scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
-    trace = solved("vts-ppt-basic", scene, iterations=3)
-    documented(trace, scene)
+    trace = solve_named("vts-ppt-basic", scene, iterations=3)
+    check_trace(trace, scene)
     assert trace.end is End.EXHAUSTED
     assert trace.n_iterations == 3
     assert len(trace.q) == 4
-    whole = solved("vts-ppt-basic", scene)
+    whole = solve_named("vts-ppt-basic", scene)
     assert np.array_equal(whole.q[:4], trace.q)
     assert whole.end is End.CONVERGED
 
@@ -214,18 +217,18 @@ def test_stagnated_just_above_roundoff() -> None:
     quiet = solve(scene, springs(scene))
     assert quiet.end is End.CONVERGED
     trace = solve(scene, springs(scene, noise=1e3 * UNIT_ROUNDOFF))
-    documented(trace, scene)
+    check_trace(trace, scene)
     assert trace.end is End.STAGNATED
     assert 1 < min(trace.roundings) <= 1e3
 
 
 def test_a_wrong_tangent_is_no_error() -> None:
-    """Where it says that nothing pushes though something does, what pushes is no roundoff."""
+    """The tangent says that nothing pushes though something does; what pushes is no roundoff."""
     scene = replace(
         catalogue.make_scene("c"), bodies=tuple(replace(b, load=0 * b.load) for b in catalogue.make_scene("c").bodies)
     )
-    trace = solve(scene, springs(scene, said=0.0, noise=1e-3), start=np.zeros(scene.n_free), iterations=5)
-    documented(trace, scene)
+    trace = solve(scene, springs(scene, tangent_factor=0.0, noise=1e-3), start=np.zeros(scene.n_free), iterations=5)
+    check_trace(trace, scene)
     assert trace.roundings[0] > 1e12
     assert trace.end is not End.CONVERGED
 
@@ -235,21 +238,21 @@ def test_a_wrong_tangent_is_no_error() -> None:
 @pytest.mark.parametrize("penalty", [1e2, 1e5, 1e9])
 def test_non_convergence_never_raises(name: str, scene: str, penalty: float) -> None:
     for lowered in (-1e-3, 0.0, 1.0, 3.0):
-        made = catalogue.make_scene(scene, penalty=penalty, lowered=lowered, sides="free", degrees=10.0)
-        documented(solved(name, made, iterations=12), made)
+        low_scene = catalogue.make_scene(scene, penalty=penalty, lowered=lowered, sides="free", degrees=10.0)
+        check_trace(solve_named(name, low_scene, iterations=12), low_scene)
 
 
 def test_bad_options_of_a_solution() -> None:
     scene = catalogue.make_scene("a1")
     formulation = on("vts-ppt", scene)
-    for how, message in (
+    for options, message in (
         ({"load_steps": 0}, "load_steps: found 0; needed at least 1"),
         ({"iterations": 0}, "iterations: found 0; needed at least 1"),
         ({"start": np.zeros(3)}, f"start: found shape (3,); needed shape ({scene.n_free},)"),
         ({"start": np.full(scene.n_free, np.nan)}, "start: found NaN or infinity; needed finite numbers"),
     ):
         with pytest.raises(MisuseError) as error:
-            solve(scene, formulation, **how)  # type: ignore[arg-type]
+            solve(scene, formulation, **options)  # type: ignore[arg-type]
         assert str(error.value) == message
 
 
@@ -284,8 +287,8 @@ def test_residuals_energies_and_changes_are_what_they_say() -> None:
 
 def test_load_steps_end_at_the_same_solution() -> None:
     scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5)
-    once, four = solved("vts-ppt", scene), solved("vts-ppt", scene, load_steps=4)
-    documented(four, scene)
+    once, four = solve_named("vts-ppt", scene), solve_named("vts-ppt", scene, load_steps=4)
+    check_trace(four, scene)
     assert four.end is once.end is End.CONVERGED
     matrix, floor = System(scene, on("vts-ppt", scene)).matrix(
         once.solution, on("vts-ppt", scene).pair(scene.interface, once.z)
@@ -307,17 +310,17 @@ def test_load_steps_end_at_the_same_solution() -> None:
 
 def test_load_steps_of_an_imposed_displacement() -> None:
     scene = two_blocks(Rectangle([0, 1, 3], [0, 1]), Rectangle([0, 2, 3], [-1, 0]), penalty=10, approach=0.1)
-    trace = solved("vts-ppt", scene, load_steps=2)
+    trace = solve_named("vts-ppt", scene, load_steps=2)
     half = [-stresses[..., 1] for stresses in scene.stresses(trace.q[np.flatnonzero(trace.factors == 0.5)[-1]], 0.5)]
     exact = 0.1 / (1 + 1 + 0.1)
-    bound = 64 * UNIT_ROUNDOFF  # of displacements up to 0.1 over cells of 1 on coordinates up to 3
+    bound = 64 * UNIT_ROUNDOFF  # Displacements are up to 0.1, cells 1, and coordinates up to 3.
     assert max(np.abs(values - exact / 2).max() for values in half) <= bound
     assert abs(mean_pressure(scene, trace.solution)[0] - exact) <= bound
 
 
 def test_a_load_step_that_fails_is_the_last() -> None:
     scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
-    trace = solved("vts-ppt-basic", scene, load_steps=3, iterations=2)
+    trace = solve_named("vts-ppt-basic", scene, load_steps=3, iterations=2)
     assert trace.end is End.EXHAUSTED
     assert trace.factors.tolist() == [1 / 3] * 3
     assert np.array_equal(trace.z, scene.positions(trace.solution, 1 / 3))
@@ -332,7 +335,7 @@ class Wrapped:
             setattr(self, name, parts.get(name, getattr(inner, name)))
 
 
-def wrapped(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
+def wrap_formulation(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
     inner = subject(name)
     return Subject(name, lambda *, penalty: Wrapped(inner._make(penalty=penalty), **parts)).for_case(scene.case())
 
@@ -340,20 +343,22 @@ def wrapped(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> Chec
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-basic", "nts-ar"])
 def test_a_formulation_without_tangent_is_differentiated(name: str) -> None:
     scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5)
-    formulation = wrapped(name, scene, tangent=None)
+    formulation = wrap_formulation(name, scene, tangent=None)
     assert "tangent" not in formulation.provides
-    trace, own = solve(scene, formulation), solved(name, scene)
-    documented(trace, scene)
-    assert trace.end is own.end is End.CONVERGED
-    asked_not_to = solved(name, scene, use_tangent=False)
-    assert np.array_equal(asked_not_to.q, trace.q)
-    pairing = formulation.pair(scene.interface, own.z)
-    matrix, floor = System(scene, formulation).matrix(own.solution, pairing)
+    trace, reference = solve(scene, formulation), solve_named(name, scene)
+    check_trace(trace, scene)
+    assert trace.end is reference.end is End.CONVERGED
+    differentiated = solve_named(name, scene, use_tangent=False)
+    assert np.array_equal(differentiated.q, trace.q)
+    pairing = formulation.pair(scene.interface, reference.z)
+    matrix, floor = System(scene, formulation).matrix(reference.solution, pairing)
     bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * max(floor.max(), trace.floors[-1])
-    assert np.abs(trace.solution - own.solution).max() <= bound
-    exact, _ = System(scene, on("vts-ppt" if name == "vts-ppt-basic" else name, scene)).matrix(own.solution, pairing)
+    assert np.abs(trace.solution - reference.solution).max() <= bound
+    exact, _ = System(scene, on("vts-ppt" if name == "vts-ppt-basic" else name, scene)).matrix(
+        reference.solution, pairing
+    )
     # central differences: a third power of (u X / shortest) twice over
-    h = (UNIT_ROUNDOFF * np.abs(own.z).max() / 2) ** (1 / 3)
+    h = (UNIT_ROUNDOFF * np.abs(reference.z).max() / 2) ** (1 / 3)
     assert np.abs(matrix - exact).max() <= h**2 * np.abs(exact).max()
 
 
@@ -371,17 +376,17 @@ def test_a_formulation_without_pairing() -> None:
 
 @pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced", "nts-ar"])
 def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: Callable[[], Scene] = lambda: catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
-    scene = made()
-    dense = solved(name, scene)
+    build_scene: Callable[[], Scene] = lambda: catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
+    scene = build_scene()
+    dense = solve_named(name, scene)
     matrix, floor = System(scene, on(name, scene)).matrix(
         dense.solution, on(name, scene).pair(scene.interface, dense.z)
     )
     monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     monkeypatch.setattr(bulk, "DENSE_LIMIT", 0)
-    large = made()
-    trace = solved(name, large)
-    documented(trace, large)
+    large = build_scene()
+    trace = solve_named(name, large)
+    check_trace(trace, large)
     assert sparse.issparse(large.stiffness)
     assert trace.end is dense.end is End.CONVERGED
     bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * floor.max()
@@ -402,7 +407,7 @@ def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
         return inner(*arguments)
 
     with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$"):
-        solve(scene, wrapped("vts-ppt-basic", scene, **{verb: third_time}))
+        solve(scene, wrap_formulation("vts-ppt-basic", scene, **{verb: third_time}))
     assert calls == 3
 
 
@@ -430,8 +435,8 @@ def test_unsymmetric_matrices_are_solved_right(dense: bool, monkeypatch: pytest.
 
 
 def at_the_solution(scene: Scene) -> tuple[Trace, FloatArray, FloatArray]:
-    """The consistent solution, and there the consistent matrix and that of the basic version."""
-    trace = solved("vts-ppt", scene)
+    """Return the consistent solution, and there the consistent matrix and that of the basic version."""
+    trace = solve_named("vts-ppt", scene)
     assert trace.end is End.CONVERGED
     matrices = []
     for name in ("vts-ppt", "vts-ppt-basic"):
@@ -441,12 +446,12 @@ def at_the_solution(scene: Scene) -> tuple[Trace, FloatArray, FloatArray]:
 
 
 def spectral_radius(consistent: FloatArray, basic: FloatArray) -> float:
-    """Of I − K_basic⁻¹ K_consistent."""
+    """Return the spectral radius of I − K_basic⁻¹ K_consistent."""
     return float(np.abs(np.linalg.eigvals(np.eye(len(basic)) - np.linalg.solve(basic, consistent))).max())
 
 
 def iterations_for(decades: int, name: str, scene: Scene) -> int:
-    """Newton steps until the residual is down by so many decades, whatever the solver would stop at."""
+    """Count Newton steps until the residual is down by so many decades, whatever the solver would stop at."""
     system, q = System(scene, on(name, scene)), scene.start
     first = None
     for iteration in range(40):
@@ -474,7 +479,7 @@ def test_iterations_of_figure_30(ratio: float, basic: tuple[int, ...], consisten
 
 def test_iterations_down_to_roundoff() -> None:
     scene = catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, lowered=0.0)
-    consistent, basic = solved("vts-ppt", scene), solved("vts-ppt-basic", scene)
+    consistent, basic = solve_named("vts-ppt", scene), solve_named("vts-ppt-basic", scene)
     assert consistent.end is basic.end is End.CONVERGED
     assert consistent.n_iterations == 4
     assert basic.n_iterations in (15, 16)
@@ -486,7 +491,7 @@ def test_the_basic_version_converges_at_the_rate_of_its_spectral_radius(sides: A
     exact, consistent, basic = at_the_solution(scene)
     rate = spectral_radius(consistent, basic)
     assert 0.12 <= round(rate, 2) <= 0.14
-    errors = np.abs(solved("vts-ppt-basic", scene).q - exact.solution).max(axis=1)
+    errors = np.abs(solve_named("vts-ppt-basic", scene).q - exact.solution).max(axis=1)
     # the tail: linear terms alone are left, and roundoff is not yet seen
     tail = errors[(errors < 1e-4 * errors[0]) & (errors > 1e-10 * errors[0])]
     assert len(tail) >= 4

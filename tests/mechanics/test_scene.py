@@ -35,7 +35,7 @@ ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 
 
-def pressed(**more: Any) -> Scene:
+def press_blocks(**more: Any) -> Scene:
     """Two blocks whose meshes do not match, pressed together; leaning, off the origin."""
     slave = Rectangle([0, 1, 2.5, 4], [0, 1, 2, 3.5], young=1.0, poisson=0.3)
     master = Rectangle([0, 2, 3, 4], [-3, -1, 0], young=3.0, poisson=0.2)
@@ -48,7 +48,7 @@ def in_triangles(body: Body) -> Body:
 
 
 def three_bodies() -> Scene:
-    """A quadrilateral and a triangular slave on one master, of different heights."""
+    """Return a scene of a quadrilateral and a triangular slave on one master, of different heights."""
     master = block(Rectangle(np.linspace(0, 8, 6), [-2, -1, 0], young=5.0), contact="top", approach=0.0, name="base")
     left = block(
         Rectangle([0.5, 1, 3], [0, 1, 2], poisson=0.25), contact="bottom", approach=0.125, tilt=0.01, lowered=0.125
@@ -60,12 +60,12 @@ def three_bodies() -> Scene:
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
-    "quadrilaterals": pressed,
-    "triangles": lambda: replace(pressed(), bodies=tuple(map(in_triangles, pressed().bodies))),
+    "quadrilaterals": press_blocks,
+    "triangles": lambda: replace(press_blocks(), bodies=tuple(map(in_triangles, press_blocks().bodies))),
     "triangles on quadrilaterals": lambda: replace(
-        pressed(), bodies=(in_triangles(pressed().bodies[0]), pressed().bodies[1])
+        press_blocks(), bodies=(in_triangles(press_blocks().bodies[0]), press_blocks().bodies[1])
     ),
-    "rigid floor": lambda: pressed(rigid_master=True),
+    "rigid floor": lambda: press_blocks(rigid_master=True),
     "rigid both": lambda: Scene(
         (rigid_surface([[0, 0], [1, 0], [3, 0]], displacement=(0, -0.5)), rigid_surface([[4, 0], [-1, 0]])),
         penalty=1 / 3,
@@ -77,19 +77,19 @@ every_scene = pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 
 
 def bits(arrays: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
-    """Arrays as what can be compared bit by bit."""
-    found = {}
+    """Return arrays in a form that can be compared bit by bit."""
+    comparable = {}
     for name, values in arrays.items():
         array = np.asarray(values)
-        found[name] = (array.dtype, array.shape, array.tobytes())
-    return found
+        comparable[name] = (array.dtype, array.shape, array.tobytes())
+    return comparable
 
 
 ATTRIBUTES = ("nodes", "cells", "contact", "young", "poisson", "fixed", "imposed", "load", "axis", "start")
 
 
-def same_body(one: Body, other: Body) -> bool:
-    return bits({name: getattr(one, name) for name in ATTRIBUTES}) == bits(
+def same_body(body: Body, other: Body) -> bool:
+    return bits({name: getattr(body, name) for name in ATTRIBUTES}) == bits(
         {name: getattr(other, name) for name in ATTRIBUTES}
     )
 
@@ -115,7 +115,7 @@ def test_the_bodies_of_a_case_are_called_by_their_roles() -> None:
 
 
 def test_one_scene_is_made_of_one_case() -> None:
-    case = pressed().case()
+    case = press_blocks().case()
     assert scene_of(case) is scene_of(case)
 
 
@@ -176,7 +176,7 @@ def test_spread_is_the_derivative_of_positions(make: Callable[[], Scene]) -> Non
 
 
 def test_the_first_guess() -> None:
-    scene = pressed(lowered=0.25)
+    scene = press_blocks(lowered=0.25)
     moved = scene.positions(scene.start).reshape(-1, 2) - scene.interface.nodes
     down = 0.25 * 2 * np.array([LEANING[1], -LEANING[0]])  # the scene is scaled by 2
     bound = 4 * UNIT_ROUNDOFF * np.abs(scene.interface.nodes).max()
@@ -186,7 +186,7 @@ def test_the_first_guess() -> None:
 
 
 def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) -> None:
-    dense = pressed()
+    dense = press_blocks()
     q = at_random(dense)
     positions, forces = dense.positions(q), dense.bulk_forces(q)
     monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
@@ -205,7 +205,12 @@ def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     "scene",
-    [pressed(), pressed(rigid_master=True), pressed(placing=Placing()), *map(catalogue.make_scene, catalogue.BLOCKS)],
+    [
+        press_blocks(),
+        press_blocks(rigid_master=True),
+        press_blocks(placing=Placing()),
+        *map(catalogue.make_scene, catalogue.BLOCKS),
+    ],
     ids=lambda scene: scene.name or "pressed",
 )
 @pytest.mark.parametrize("factor", [1.0, 0.5])
@@ -219,20 +224,20 @@ def test_bulk_forces_of_the_exact_solution_are_the_consistent_ones(scene: Scene,
     expected = (
         factor * p * weights[:, None] * np.where(np.arange(len(weights)) < n_slave, 1.0, -1.0)[:, None] * (frame[:, 1])
     )
-    held = np.zeros(len(weights), bool)
+    supported = np.zeros(len(weights), bool)
     if scene.bodies[1].rigid:
-        held[n_slave:] = True  # supports take it
-    found = scene.nodal_forces(q, factor)
-    assert not found[held].any()
+        supported[n_slave:] = True  # supports take it
+    forces = scene.nodal_forces(q, factor)
+    assert not forces[supported].any()
     terms = np.abs(scene.stiffness) @ np.abs(q) + factor * np.abs(scene.load)
-    assert np.abs(found - expected)[~held].max() <= 2 * scene.n_free * UNIT_ROUNDOFF * terms.max()
+    assert np.abs(forces - expected)[~supported].max() <= 2 * scene.n_free * UNIT_ROUNDOFF * terms.max()
 
 
 def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
     far = block(Rectangle([100, 101, 103], [0, 1, 2], young=2.0, poisson=0.25), contact="bottom", approach=0.25)
     free = block(Rectangle([200, 201], [0, 3]), contact="top", pressure=0.5, free_sides=True)
     free = replace(free, fixed=free.fixed | (free.nodes[:, 1:] == 3) & [False, True])  # hangs on its contact side
-    scene = replace(pressed(), bodies=(*pressed().bodies, far, free), slave=(0, 2), master=(1, 3))
+    scene = replace(press_blocks(), bodies=(*press_blocks().bodies, far, free), slave=(0, 2), master=(1, 3))
     assert scene.bodies_in_reach == (0, 1)
     displaced = scene.displacements(scene.start)
     assert np.abs(displaced[2] - [0, -0.25]).max() <= 64 * UNIT_ROUNDOFF  # pushed from above and nothing below
@@ -245,10 +250,10 @@ def test_a_body_out_of_reach_is_solved_on_its_own() -> None:
 
 # --- what a scene cannot be -------------------------------------------------------------------------------------
 
-SLAVE, MASTER = pressed(placing=Placing()).bodies
+SLAVE, MASTER = press_blocks(placing=Placing()).bodies
 LOOSE = replace(SLAVE, fixed=np.zeros_like(SLAVE.fixed))
 ROLES = "bodies: found slave {} and master {} of {} bodies; needed each body either slave or master, and at least one"
-HELD = "; needed fixed components that prevent it (contact without friction does not)"
+PREVENTION = "; needed fixed components that prevent it (contact without friction does not)"
 
 
 @pytest.mark.parametrize(
@@ -261,18 +266,23 @@ HELD = "; needed fixed components that prevent it (contact without friction does
         ((SLAVE, MASTER), (0, 1), (), "bodies: found no master; needed at least one of both"),
         ((SLAVE, MASTER), (), (0, 1), "bodies: found no slave; needed at least one of both"),
         ((), (), (), "bodies: found no slave; needed at least one of both"),
-        ((LOOSE, MASTER), (0,), (1,), f"supports of slave: found no supports: it can move along its first axis{HELD}"),
+        (
+            (LOOSE, MASTER),
+            (0,),
+            (1,),
+            f"supports of slave: found no supports: it can move along its first axis{PREVENTION}",
+        ),
         (
             (replace(LOOSE, name="punch", fixed=np.arange(32).reshape(-1, 2) == 31), MASTER),
             (0,),
             (1,),
-            f"supports of punch: found supports: it can move along its first axis{HELD}",
+            f"supports of punch: found supports: it can move along its first axis{PREVENTION}",
         ),
         (
             (SLAVE, replace(MASTER, fixed=MASTER.fixed & [False, True])),
             (0,),
             (1,),
-            f"supports of master: found supports: it can move along its first axis{HELD}",
+            f"supports of master: found supports: it can move along its first axis{PREVENTION}",
         ),
     ],
 )
@@ -285,11 +295,17 @@ def test_wrong_scenes(bodies: tuple[Body, ...], slave: Any, master: Any, message
 
 def test_supports_are_asked_of_a_body_from_a_mesh() -> None:
     mesh = skfem.MeshQuad.init_tensor(np.arange(5.0), np.arange(3.0)).with_defaults()
-    for supports, said in (({}, "no supports"), ({"top": "across"}, "supports"), ({"left": "across"}, "supports")):
+    for supports, description in (
+        ({}, "no supports"),
+        ({"top": "across"}, "supports"),
+        ({"left": "across"}, "supports"),
+    ):
         loose = body_from_mesh(mesh, contact="bottom", supports=supports, name="punch")
         with pytest.raises(MisuseError) as error:
             Scene((loose, MASTER))
-        assert str(error.value) == f"supports of punch: found {said}: it can move along its first axis{HELD}"
+        assert (
+            str(error.value) == f"supports of punch: found {description}: it can move along its first axis{PREVENTION}"
+        )
     for supports in ({"left": "along"}, {"top": "along"}, {"top": "both"}):
         Scene((body_from_mesh(mesh, contact="bottom", supports=supports), MASTER))  # contact holds the rest
 
@@ -317,33 +333,33 @@ def test_a_body_out_of_reach_that_nothing_holds() -> None:
 
 
 class Counting:
-    """A formulation that notes what it is asked, and how large the pairings are."""
+    """A formulation that notes its calls, and how large the pairings are."""
 
-    def __init__(self, inner: Any, seen: list[tuple[Any, ...]]) -> None:
-        self.inner, self.seen = inner, seen
+    def __init__(self, inner: Any, calls: list[tuple[Any, ...]]) -> None:
+        self.inner, self.calls = inner, calls
         self.traits = inner.traits
 
     def pair(self, interface: Interface, z: Any) -> Pairing:
         pairing: Pairing = self.inner.pair(interface, z)
         sizes = [(name, values.size) for name, values in sorted(pairing.items())]
-        self.seen.append(("pair", len(interface.slave), len(interface.master), z.size, *sizes))
+        self.calls.append(("pair", len(interface.slave), len(interface.master), z.size, *sizes))
         return pairing
 
     def residual(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
-        self.seen.append(("residual", z.shape))
+        self.calls.append(("residual", z.shape))
         return self.inner.residual(interface, pairing, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
         tangent = self.inner.tangent(interface, pairing, z)
-        self.seen.append(("tangent", tangent.shape, tangent.nnz))
+        self.calls.append(("tangent", tangent.shape, tangent.nnz))
         return tangent
 
 
-def counted(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
-    seen: list[tuple[Any, ...]] = []
+def count_calls(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
+    calls: list[tuple[Any, ...]] = []
     inner = load_formulation(name)
     assert isinstance(inner, Subject)
-    return Subject(name, lambda *, penalty: Counting(inner._make(penalty=penalty), seen)), seen
+    return Subject(name, lambda *, penalty: Counting(inner._make(penalty=penalty), calls)), calls
 
 
 def with_a_far_body(scene: Scene, role: str) -> Scene:
@@ -360,7 +376,7 @@ def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
     assert len(beside.bodies) == 3
     answers, counts = [], []
     for scene in (alone, beside):
-        subject, seen = counted(name)
+        subject, calls = count_calls(name)
         case = scene.case()
         formulation = subject.for_case(case)
         pairing = formulation.pair(case.interface, case.z)
@@ -381,10 +397,10 @@ def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
             )
         )
         trace = newton.solve(scene, formulation, iterations=8)
-        said = ("q", "factors", "residuals", "energies", "floors", "changes", "conditions")
-        answers[-1] |= bits({key: getattr(trace, key) for key in said})
+        fields = ("q", "factors", "residuals", "energies", "floors", "changes", "conditions")
+        answers[-1] |= bits({key: getattr(trace, key) for key in fields})
         answers[-1]["end"] = (trace.end,)
-        counts.append(seen)
+        counts.append(calls)
     assert answers[0] == answers[1]
     assert counts[0] == counts[1]
     assert {entry[0] for entry in counts[0]} == {"pair", "residual", "tangent"}
@@ -397,8 +413,8 @@ def test_a_near_body_does_change_it() -> None:
     assert len(beside.interface.slave) == len(alone.interface.slave) + 1
 
 
-def bent(seed: int, n_master: int) -> tuple[Interface, FloatArray]:
-    """A wavy slave pressed into a wavy master, with some overhang."""
+def wavy_interface(seed: int, n_master: int) -> tuple[Interface, FloatArray]:
+    """Return a wavy slave pressed into a wavy master, with some overhang."""
     random = np.random.default_rng(seed)
     upper, lower = np.linspace(0, 10, 9), np.linspace(-0.4, 10.3, n_master + 1)
     upper[1:-1] += random.uniform(-0.3, 0.3, 7)
@@ -409,7 +425,7 @@ def bent(seed: int, n_master: int) -> tuple[Interface, FloatArray]:
 
 
 def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
-    """The same, and a chain of the master that is far away."""
+    """Add a chain of the master that is far away."""
     far = np.column_stack([1e4 + np.arange(n_far + 1.0), np.full(n_far + 1, -3.0)])[::-1]
     numbers = interface.n_nodes + np.arange(n_far + 1)
     return Interface(
@@ -421,23 +437,23 @@ def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_far_chain_of_the_master_changes_no_bit(name: str) -> None:
-    """Stronger than a far body: here the formulation itself is given the far segments."""
+    """Stronger than a far body: here the formulation itself gets the far segments."""
     subject = load_formulation(name)
     assert isinstance(subject, Subject)
     touching = 0
     for seed in range(24):
-        interface, z = bent(seed, n_master=4 + seed % 9)
+        interface, z = wavy_interface(seed, n_master=4 + seed % 9)
         case = Case(interface, z, penalty=10.0)
         formulation = subject.for_case(case)
         more = with_a_far_chain(interface, n_far=1 + seed % 7)
         pairs, forces, tangents = [], [], []
         for each in (interface, more):
-            own = each.nodes.reshape(-1)
-            pairing = formulation.pair(each, own)
+            positions = each.nodes.reshape(-1)
+            pairing = formulation.pair(each, positions)
             assert pairing is not None
             pairs.append(bits(pairing))
-            forces.append(formulation.residual(each, pairing, own))
-            tangents.append(formulation.tangent(each, pairing, own).toarray())
+            forces.append(formulation.residual(each, pairing, positions))
+            tangents.append(formulation.tangent(each, pairing, positions).toarray())
         assert pairs[0] == pairs[1]
         assert forces[1][: z.size].tobytes() == forces[0].tobytes()
         assert not forces[1][z.size :].any()
@@ -453,7 +469,7 @@ Counts = tuple[int, int]
 
 @pytest.fixture
 def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
-    """How many distances from a point to a segment one `pair` evaluates, and how many of them to far segments.
+    """Count the distances from a point to a segment that one `pair` evaluates, and those to far segments.
 
     Counted inside the search itself: its own Python functions run, not compiled, with a counter for a distance.
     """
@@ -496,7 +512,7 @@ def test_a_far_body_costs_no_evaluation(name: str, distances: Callable[[str, Cas
 def test_no_distance_to_far_segments_of_an_interface_is_evaluated(
     name: str, n_master: int, n_far: int, distances: Callable[[str, Case], Counts]
 ) -> None:
-    interface, z = bent(3, n_master)
+    interface, z = wavy_interface(3, n_master)
     more = with_a_far_chain(interface, n_far)
     expected = distances(name, Case(interface, z))
     assert expected[0] > 0

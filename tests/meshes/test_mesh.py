@@ -24,7 +24,7 @@ NAMES = {"punch": np.array([1, 1]), "base": np.array([2, 1]), "bodies": np.array
 def blocks(
     *, points: object = POINTS, upper: object = UPPER, lower: object = LOWER, cells: object = (), line: str = "line"
 ) -> meshio.Mesh:
-    """The two blocks in memory, their groups as physical groups; without cells unless they are given."""
+    """Return the two blocks in memory, their groups as physical groups; without cells unless they are given."""
     parts = [(line, np.array(upper)), (line, np.array(lower))] + ([("quad", np.array(cells))] if len(cells) else [])
     tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
     points = np.column_stack([points, np.zeros(len(points))]) if np.shape(points)[1] == 2 else np.array(points)
@@ -35,7 +35,7 @@ def blocks(
 
 @pytest.fixture
 def read(tmp_path: Path) -> Callable[..., Interface]:
-    """Writes a mesh as .msh 2.2 and reads its interface; the punch is the slave."""
+    """Return a function that writes a mesh as .msh 2.2 and reads its interface; the punch is the slave."""
 
     def written_and_read(mesh: meshio.Mesh, *, slave: str = "punch", master: str = "base", **more: bool) -> Interface:
         meshio.write(tmp_path / "mesh.msh", mesh, file_format="gmsh22", binary=False)
@@ -45,7 +45,7 @@ def read(tmp_path: Path) -> Callable[..., Interface]:
 
 
 def points_of(interface: Interface) -> tuple[list[list[float]], list[list[float]]]:
-    """The points of one open chain a side, in walking order."""
+    """Return the points of one open chain a side, in walking order."""
     sides = []
     for surface in (interface.slave, interface.master):
         segments = surface.segments[surface.chain_order]
@@ -116,8 +116,8 @@ def test_flip_exchanges_the_orientation(read: Callable[..., Interface]) -> None:
     with pytest.raises(MisuseError, match="--flip where only one surface has cells"):
         read(rigid_base)
     assert points_of(read(rigid_base, flip=True)) == RIGHT
-    told = read_interface(PUNCH, slave="punch", master="base", flip=True)
-    assert points_of(told)[0][0] == [7, 4]
+    flipped_interface = read_interface(PUNCH, slave="punch", master="base", flip=True)
+    assert points_of(flipped_interface)[0][0] == [7, 4]
 
 
 def test_gmsh_turns_the_lines_of_a_negative_curve(tmp_path: Path) -> None:

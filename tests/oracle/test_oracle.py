@@ -30,7 +30,7 @@ CHECKED = settings(max_examples=100, derandomize=True, database=None, deadline=N
 
 
 def chains(slave: list[tuple[float, float]], master: list[tuple[float, float]]) -> tuple[Interface, FloatArray]:
-    """An interface whose state is its reference."""
+    """Return an interface whose state is its reference, and that state."""
     interface = Interface.from_chains(slave, master)
     return interface, interface.nodes.reshape(-1)
 
@@ -127,8 +127,8 @@ VALLEY = [(4.0, 2.0), (0.0, 0.0), (-4.0, 2.0)]
 @pytest.mark.parametrize(("line", "height"), [(ROOF, 1.0), (ROOF, -1.0), (VALLEY, 1.0), (VALLEY, -1.0)])
 def test_a_point_on_the_bisector_is_a_tie(line: list[tuple[float, float]], height: float) -> None:
     interface, z = chains([(-1, height), (1, height)], line)
-    found = project_point(interface, z, 0, 0.0)
-    assert (found.segment, found.tied, found.undecided) == (0, (0, 1), (0, 1))
+    projection = project_point(interface, z, 0, 0.0)
+    assert (projection.segment, projection.tied, projection.undecided) == (0, (0, 1), (0, 1))
     assert kink_margin(interface, z, [0], [0.0]) == 0
     assert project_point(interface, z, 0, 2.0**-40).undecided == (0,)
     assert project_point(interface, z, 0, -(2.0**-40)).undecided == (1,)
@@ -136,19 +136,19 @@ def test_a_point_on_the_bisector_is_a_tie(line: list[tuple[float, float]], heigh
 
 def test_in_the_cone_of_a_re_entrant_vertex_the_overshoot_decides() -> None:
     interface, z = chains([(-1, -1), (1, -1)], VALLEY)
-    found = project_point(interface, z, 0, 0.25)
-    assert found.tied == (0, 1)
-    assert (found.segment, found.undecided) == (0, (0,))
-    assert found.gap_sign == -1
-    assert found.squared_distance == Fraction(17, 16)
+    projection = project_point(interface, z, 0, 0.25)
+    assert projection.tied == (0, 1)
+    assert (projection.segment, projection.undecided) == (0, (0,))
+    assert projection.gap_sign == -1
+    assert projection.squared_distance == Fraction(17, 16)
 
 
 def test_a_foot_is_not_clipped_and_a_gap_is_exact() -> None:
     interface, z = chains([(5, 0.125), (6, 0.125)], [(4, 0), (0, 0)])
-    found = project_point(interface, z, 0, -1)
-    assert found.xi == Fraction(-1, 4)
-    assert (found.gap_sign, found.signed_squared_gap) == (1, Fraction(1, 64))
-    assert found.squared_distance == 1 + Fraction(1, 64)
+    projection = project_point(interface, z, 0, -1)
+    assert projection.xi == Fraction(-1, 4)
+    assert (projection.gap_sign, projection.signed_squared_gap) == (1, Fraction(1, 64))
+    assert projection.squared_distance == 1 + Fraction(1, 64)
 
 
 def test_the_tilted_case_covers_two_segments_twice() -> None:
@@ -160,20 +160,20 @@ def test_projection_cases_by_hand() -> None:
     interface, z = chains([(-1, -0.125), (3, -0.125)], [(2, 0), (2, 1), (1, 0), (0, 0)])
     # The quarter point at x = 0 hits a node, its area ends past the free end and at the node x = 1; the one at x = 2
     # has the wall's foot.
-    found = projection_cases(interface, z)
-    assert found["node exactly hit"] >= 2
-    assert found["beyond an end"] >= 1
+    occurrences = projection_cases(interface, z)
+    assert occurrences["node exactly hit"] >= 2
+    assert occurrences["beyond an end"] >= 1
 
 
 def decisions(case: Case, z: FloatArray) -> list[object]:
-    """Exactly: nearest segments, signs of gaps, roles of the covered segments."""
+    """Return exact decisions: nearest segments, signs of gaps, roles of the covered segments."""
     segments, places, _, _ = default_points(case.interface)
-    found: list[object] = []
+    choices: list[object] = []
     for segment, c in zip(segments.tolist(), places.tolist(), strict=True):
         answer = project_point(case.interface, z, segment, c)
-        found.append((answer.segment, answer.gap_sign))
+        choices.append((answer.segment, answer.gap_sign))
     roles = projection_cases(case.interface, z)
-    return [*found, *(roles[role] for role in ("one segment", "first", "intermediate", "edge-on", "beyond an end"))]
+    return [*choices, *(roles[role] for role in ("one segment", "first", "intermediate", "edge-on", "beyond an end"))]
 
 
 @CHECKED

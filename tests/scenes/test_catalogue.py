@@ -33,8 +33,8 @@ def coordinates(scene: Scene) -> tuple[list[float], list[float]]:
     return sorted(along[:n].tolist()), sorted(along[n:].tolist())
 
 
-def printed(name: str) -> tuple[list[float], list[float]]:
-    """The nodes as the drawing has them."""
+def printed_nodes(name: str) -> tuple[list[float], list[float]]:
+    """Return the nodes as the drawing has them."""
     drawing = BLOCKS[name]
     sides = ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
     return tuple(
@@ -60,7 +60,7 @@ def test_every_scene_solves(name: str, text: str) -> None:
     matrix, floor = system.matrix(trace.solution, system.pair(trace.solution))
     off = (
         np.abs(np.linalg.inv(matrix)).sum(axis=1).max() * floor.max()
-    )  # of displacements, where the residual is roundoff
+    )  # The error of displacements, if the residual is roundoff.
     shortest = min(
         body.nodes[body.cells][:, [0, 1, 2]].std(axis=1).max(axis=1).min() for body in scene.bodies if not body.rigid
     )
@@ -78,7 +78,7 @@ def test_what_is_known_of_a_scene(name: str) -> None:
     assert drawing.summary
     assert drawing.source
     assert drawing.assumptions
-    assert coordinates(scene) == printed(name)
+    assert coordinates(scene) == printed_nodes(name)
     slave, master = coordinates(scene)
     assert master[0] <= slave[0]
     assert slave[-1] <= master[-1]
@@ -107,13 +107,13 @@ def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
 
 def under(name: str, points: FloatArray) -> set[float]:
     """Points that lie exactly on a master node."""
-    return set(points.tolist()) & set(printed(name)[1])
+    return set(points.tolist()) & set(printed_nodes(name)[1])
 
 
 @every_name_of_the_paper
 def test_where_areas_of_competence_lie(name: str) -> None:
-    """What the summaries say: over one master segment or across a master node, on a node or not."""
-    slave, master = map(np.array, printed(name))
+    """Check what the summaries say: over one master segment or across a master node, on a node or not."""
+    slave, master = map(np.array, printed_nodes(name))
     halves = np.sort(np.concatenate([slave, (slave[1:] + slave[:-1]) / 2]))  # ends of areas of two virtual slave nodes
     quarters = (halves[1:] + halves[:-1]) / 2
     crossing = any(low < node < high for low, high in itertools.pairwise(halves) for node in master.tolist())
@@ -123,7 +123,7 @@ def test_where_areas_of_competence_lie(name: str) -> None:
 
 def test_the_punch_is_symmetrical() -> None:
     for name in ("example-1", "example-1bis"):
-        for side in printed(name):
+        for side in printed_nodes(name):
             assert side == [-x for x in reversed(side)]
 
 
@@ -131,7 +131,7 @@ def test_the_punch_is_symmetrical() -> None:
 @pytest.mark.parametrize("refine", [2, 3, 7])
 def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> None:
     fine = make_scene(name, refine=refine)
-    for here, there in zip(coordinates(fine), printed(name), strict=True):
+    for here, there in zip(coordinates(fine), printed_nodes(name), strict=True):
         assert here[::refine] == there
         assert len(here) == refine * (len(there) - 1) + 1
         gaps = np.diff(here).reshape(-1, refine)
@@ -147,10 +147,10 @@ def test_quarter_turns_are_exact(degrees: int, turn: list[list[int]]) -> None:
     upright = make_scene("c-prime")
     for angle in (degrees, float(degrees), degrees - 360, degrees + 720):
         turned = make_scene("c-prime", degrees=angle)
-        for one, other in zip(turned.bodies, upright.bodies, strict=True):
-            assert np.array_equal(one.nodes, other.nodes @ np.transpose(turn))
-            assert np.array_equal(one.frame, turn)
-            assert np.array_equal(one.load, other.load)
+        for body, other in zip(turned.bodies, upright.bodies, strict=True):
+            assert np.array_equal(body.nodes, other.nodes @ np.transpose(turn))
+            assert np.array_equal(body.frame, turn)
+            assert np.array_equal(body.load, other.load)
     assert np.array_equal(make_scene("c-prime", degrees=360).bodies[0].nodes, upright.bodies[0].nodes)
 
 
@@ -158,21 +158,21 @@ def test_any_other_turn() -> None:
     angle = np.radians(17.3)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     upright, turned = make_scene("b"), make_scene("b", degrees=17.3)
-    for one, other in zip(turned.bodies, upright.bodies, strict=True):
-        assert np.abs(one.nodes - other.nodes @ turn.T).max() <= 4 * UNIT_ROUNDOFF * 12 * np.sqrt(2)
-        assert np.abs(one.frame - turn).max() <= UNIT_ROUNDOFF
+    for body, other in zip(turned.bodies, upright.bodies, strict=True):
+        assert np.abs(body.nodes - other.nodes @ turn.T).max() <= 4 * UNIT_ROUNDOFF * 12 * np.sqrt(2)
+        assert np.abs(body.frame - turn).max() <= UNIT_ROUNDOFF
 
 
 def test_the_disk() -> None:
     """By name it is what `disk` makes, with the paper's numbers; no pressure is known of it."""
     assert SCENES["example-2"].source
-    one, other = make_scene("example-2"), disk_on_foundation()
-    for body, same in zip(one.bodies, other.bodies, strict=True):
+    scene, other = make_scene("example-2"), disk_on_foundation()
+    for body, same in zip(scene.bodies, other.bodies, strict=True):
         assert np.array_equal(body.nodes, same.nodes)
         assert (body.young, body.poisson) == (same.young, same.poisson)
-    assert one.penalty == other.penalty
-    assert one.name == "example-2"
-    assert not is_uniform(one.case())
+    assert scene.penalty == other.penalty
+    assert scene.name == "example-2"
+    assert not is_uniform(scene.case())
     stiffer = make_scene(
         "example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2
     )
@@ -205,11 +205,11 @@ def test_options_from_text_are_those_of_python() -> None:
     }
     assert {option for options in texts.values() for option in options} == set(OPTIONS)
     for text, options in texts.items():
-        one, other = (
+        arrays, other = (
             load_scene(text).case().to_arrays(),
             make_scene(text.partition(":")[0], **options).case().to_arrays(),
         )
-        assert all(np.array_equal(one[key], other[key]) for key in one), text
+        assert all(np.array_equal(arrays[key], other[key]) for key in arrays), text
 
 
 def test_what_options_do() -> None:
@@ -247,18 +247,18 @@ WRONG = {
     "c:name=b": "--scene: option of 'c:name=b': found 'name'; needed one of degrees, lowered, penalty, poisson, "
     f"pressure, ratio, refine, sides, young; {ALL_OPTIONS}",
     **{
-        f"c:refine={value}": f"--scene: refine of 'c:refine={value}': found {said}; needed a whole number from 1 to 64"
-        for value, said in (("0", "0"), ("-1", "-1"), ("65", "65"), ("1.5", "1.5"), ("true", "True"), ("x", "'x'"))
+        f"c:refine={value}": f"--scene: refine of 'c:refine={value}': found {word}; needed a whole number from 1 to 64"
+        for value, word in (("0", "0"), ("-1", "-1"), ("65", "65"), ("1.5", "1.5"), ("true", "True"), ("x", "'x'"))
     },
     **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {said}; needed a number > 0"
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {word}; needed a number > 0"
         for option in ("penalty", "young", "ratio", "pressure")
-        for value, said in (("0", "0"), ("-1", "-1"), ("nan", "nan"), ("inf", "inf"))
+        for value, word in (("0", "0"), ("-1", "-1"), ("nan", "nan"), ("inf", "inf"))
     },
     **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {said}; needed a number"
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {word}; needed a number"
         for option in ("penalty", "young", "ratio", "pressure", "poisson", "degrees", "lowered")
-        for value, said in (("soft", "'soft'"), ("true", "True"))
+        for value, word in (("soft", "'soft'"), ("true", "True"))
     },
     **{
         f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {value}; needed a finite number"
@@ -330,9 +330,9 @@ def test_numbers_of_numpy_are_numbers() -> None:
     ],
 )
 def test_names_with_options(text: str, name: str, options: dict[str, Any]) -> None:
-    found = parse_name("formulation", text)
-    assert found == (name, options)
-    assert [type(value) for value in found[1].values()] == [type(value) for value in options.values()]
+    result = parse_name("formulation", text)
+    assert result == (name, options)
+    assert [type(value) for value in result[1].values()] == [type(value) for value in options.values()]
 
 
 def test_an_unknown_name_suggests_the_nearest_or_lists_all() -> None:

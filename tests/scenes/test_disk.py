@@ -27,12 +27,12 @@ PENALTY_METHODS = ("nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced")
 
 
 @pytest.fixture(scope="module")
-def solved() -> dict[str, DiskSolution]:
+def solutions() -> dict[str, DiskSolution]:
     return {name: solve_disk(PaperFormulation(name, name)) for name in PENALTY_METHODS}
 
 
 def corner_angles(body: Body) -> FloatArray:
-    """(n_cells, 4) in degrees."""
+    """Return the angles (n_cells, 4) in degrees."""
     corners = body.nodes[body.cells]
     to_next = np.roll(corners, -1, axis=1) - corners
     back = -np.roll(to_next, 1, axis=1)
@@ -130,13 +130,13 @@ def test_graded_grids() -> None:
 
 
 def test_a_contact_that_the_meshes_are_not_made_for() -> None:
-    for problem, said in (
+    for problem, message in (
         (replace(PAPER, penalty=1e6), "penalty: found 1e[+]06, with which the contact is 4.9.* wide; needed a stiffer"),
         (replace(PAPER, penalty=1e7), "penalty: .* needed a stiffer one: the meshes are made for at most 1.35"),
         (replace(PAPER, force=1e9), "force: found 1e[+]09, with which Hertz' contact is 23.7 wide; needed a contact"),
         (replace(PAPER, force=1e-9), "force: found 1e-09, .*"),
     ):
-        with pytest.raises(MisuseError, match=said):
+        with pytest.raises(MisuseError, match=message):
             disk_on_foundation(problem)
 
 
@@ -144,28 +144,28 @@ def test_a_contact_that_the_meshes_are_not_made_for() -> None:
 
 
 @pytest.mark.parametrize("name", PENALTY_METHODS)
-def test_the_papers_numbers(name: str, solved: dict[str, DiskSolution]) -> None:
+def test_the_papers_numbers(name: str, solutions: dict[str, DiskSolution]) -> None:
     """Fig. 38 ends at 1.61e6; the half-width is that on the layer, less the 1.6 % by which p/E compresses it."""
-    found = solved[name]
-    assert found.converged
-    assert found.iterations == 4
-    assert found.peak == pytest.approx(1.61e6, rel=0.03)
-    assert found.half_width == pytest.approx(PAPER.winkler_contact().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
+    solution = solutions[name]
+    assert solution.converged
+    assert solution.iterations == 4
+    assert solution.peak == pytest.approx(1.61e6, rel=0.03)
+    assert solution.half_width == pytest.approx(PAPER.winkler_contact().half_width * (1 - 1.6e6 / 1e8), rel=5e-3)
 
 
-def test_what_transfer_to_the_master_changes(solved: dict[str, DiskSolution]) -> None:
+def test_what_transfer_to_the_master_changes(solutions: dict[str, DiskSolution]) -> None:
     """Fig. 39."""
-    x, differences = difference(solved["vts-ppt"], solved["vts-me"])
+    x, differences = difference(solutions["vts-ppt"], solutions["vts-me"])
     assert len(x) == 68
     assert 0 < np.abs(differences).max() <= 2.5e3
     assert differences.min() < 0 < differences.max()
 
 
 @pytest.mark.parametrize("name", PENALTY_METHODS)
-def test_the_other_half_is_symmetrical(name: str, solved: dict[str, DiskSolution]) -> None:
-    """But for the one element that is on one side alone, far away."""
-    found = solved[name]
-    assert np.abs(found.pressure - found.pressure[::-1]).max() <= 1e-5 * found.peak
+def test_the_other_half_is_symmetrical(name: str, solutions: dict[str, DiskSolution]) -> None:
+    """One element alone, far away, is on one side only."""
+    solution = solutions[name]
+    assert np.abs(solution.pressure - solution.pressure[::-1]).max() <= 1e-5 * solution.peak
 
 
 def test_nodal_forces_carry_the_load() -> None:
@@ -185,7 +185,7 @@ def test_what_is_left_of_the_difference_falls_with_the_mesh_and_is_the_current_l
     assert 0 < fine < coarse / 2
     assert coarse <= 1e-3
     steep, flat = (solve_disk(VTS_ME, flatter(slope)) for slope in (1.0, 0.5))
-    left = [one.excess - coarse for one in (steep, flat)]
+    left = [solution.excess - coarse for solution in (steep, flat)]
     assert left[0] / left[1] == pytest.approx(2, rel=0.05)
     assert left[0] == pytest.approx(
         PAPER.winkler_contact().peak / PAPER.young[0], rel=0.15
@@ -197,11 +197,11 @@ def test_how_it_begins() -> None:
     subject = load_formulation("vts-me")
     assert isinstance(subject, Subject)
 
-    def ended(scene: Scene) -> End:
+    def find_end(scene: Scene) -> End:
         return newton.solve(scene, subject.for_case(scene.case())).end
 
-    assert ended(replace_start(BASE, -1e-3)) is End.SINGULAR
-    assert ended(BASE) is End.CONVERGED
+    assert find_end(replace_start(BASE, -1e-3)) is End.SINGULAR
+    assert find_end(BASE) is End.CONVERGED
     assert BASE.bodies[0].start.tolist() == [0, -(PAPER.winkler_contact().half_width ** 2) / 20]
 
 

@@ -14,7 +14,8 @@ from contactverif.scenes.hertz import solve_winkler_contact
 
 FORCE, RADIUS, PENALTY = 1e6, 10.0, 1e9
 STIFFNESS = 1 / (1 / 1e8 + 1 / 1e9)
-SHORTFALLS = {0.01: 0.317, 0.03: 0.313, 0.1: 0.301}  # of the peak, over E*/(ε̂ a): computed apart from this code
+# Relative shortfalls of the peak over E*/(ε̂ a), for values of E*/(ε̂ a); computed apart from this code.
+SHORTFALLS = {0.01: 0.317, 0.03: 0.313, 0.1: 0.301}
 
 
 def test_hertz_of_example_2() -> None:
@@ -32,16 +33,16 @@ def test_the_pressure_of_hertz_carries_the_force() -> None:
 
 
 def test_the_layer_of_example_2() -> None:
-    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY)
-    assert found.peak == pytest.approx(1.586e6, abs=500)
-    assert found.half_width == pytest.approx(0.4291, abs=5e-5)
-    assert found.force == pytest.approx(FORCE, rel=1e-13)
+    contact = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY)
+    assert contact.peak == pytest.approx(1.586e6, abs=500)
+    assert contact.half_width == pytest.approx(0.4291, abs=5e-5)
+    assert contact.force == pytest.approx(FORCE, rel=1e-13)
 
 
 def test_the_layer_converges() -> None:
     """Each half as many terms more: the peak settles like a high power, the half-width like a lower one."""
-    found = [solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, terms) for terms in (12, 24, 48, 96)]
-    peaks, widths = (np.array([getattr(one, word) for one in found]) for word in ("peak", "half_width"))
+    contacts = [solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, terms) for terms in (12, 24, 48, 96)]
+    peaks, widths = (np.array([getattr(contact, word) for contact in contacts]) for word in ("peak", "half_width"))
     assert (np.abs(np.diff(peaks))[1:] <= np.abs(np.diff(peaks))[:-1] / 20).all()
     assert (np.abs(np.diff(widths))[1:] <= np.abs(np.diff(widths))[:-1] / 8).all()
     assert abs(peaks[1] / peaks[-1] - 1) <= 1e-7  # what TERMS says
@@ -49,27 +50,27 @@ def test_the_layer_converges() -> None:
 
 
 def test_the_equation_holds_between_the_collocation_points() -> None:
-    """p/ε̂ − (2/πE*) ∫ p ln|x − s| ds + x²/2R is the same at all x, by another quadrature."""
-    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, 48)
-    a = found.half_width
+    """The sum p/ε̂ − (2/πE*) ∫ p ln|x − s| ds + x²/2R is the same at all x, by another quadrature."""
+    contact = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, PENALTY, 48)
+    a = contact.half_width
 
-    def left(x: float) -> float:
+    def left_side(x: float) -> float:
         def term(s: float) -> float:
-            return float(found.pressure(np.array(s))) * log(abs(x - s))
+            return float(contact.pressure(np.array(s))) * log(abs(x - s))
 
         integral = float(quad(term, -a, x, epsrel=1e-11, limit=200)[0] + quad(term, x, a, epsrel=1e-11, limit=200)[0])
-        return float(found.pressure(np.array(x))) / PENALTY - 2 / (np.pi * STIFFNESS) * integral + x**2 / (2 * RADIUS)
+        return float(contact.pressure(np.array(x))) / PENALTY - 2 / (np.pi * STIFFNESS) * integral + x**2 / (2 * RADIUS)
 
-    values = np.array([left(x) for x in a * np.array([0.0, 0.21, 0.4, 0.77, 0.95])])
+    values = np.array([left_side(x) for x in a * np.array([0.0, 0.21, 0.4, 0.77, 0.95])])
     assert np.ptp(values) <= 1e-7 * a**2 / (2 * RADIUS)
 
 
 @pytest.mark.parametrize(("ratio", "shortfall"), SHORTFALLS.items())
 def test_a_stiff_layer_lowers_the_peak(ratio: float, shortfall: float) -> None:
     a, p = hertz.half_width(FORCE, RADIUS, STIFFNESS), hertz.peak(FORCE, RADIUS, STIFFNESS)
-    found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, STIFFNESS / (ratio * a), 48)
-    assert (1 - found.peak / p) / ratio == pytest.approx(shortfall, abs=1e-3)
-    assert found.half_width > a
+    contact = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, STIFFNESS / (ratio * a), 48)
+    assert (1 - contact.peak / p) / ratio == pytest.approx(shortfall, abs=1e-3)
+    assert contact.half_width > a
 
 
 def test_a_soft_layer_is_alone() -> None:
@@ -77,9 +78,9 @@ def test_a_soft_layer_is_alone() -> None:
     for over in (1e2, 1e4):
         penalty = STIFFNESS / (over * hertz.half_width(FORCE, RADIUS, STIFFNESS))
         a = hertz.layer_half_width(FORCE, RADIUS, penalty)
-        found = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, penalty)
-        assert abs(found.half_width / a - 1) <= over ** (-2 / 3)
-        assert abs(found.peak / (penalty * a**2 / (2 * RADIUS)) - 1) <= over ** (-2 / 3)
+        contact = solve_winkler_contact(FORCE, RADIUS, STIFFNESS, penalty)
+        assert abs(contact.half_width / a - 1) <= over ** (-2 / 3)
+        assert abs(contact.peak / (penalty * a**2 / (2 * RADIUS)) - 1) <= over ** (-2 / 3)
 
 
 @pytest.mark.parametrize(("length", "force"), [(2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**60)])

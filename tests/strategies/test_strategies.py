@@ -1,4 +1,4 @@
-"""What is drawn is valid, simple when shrunk, exact on its lattice, and reaches every case of projection."""
+"""Random cases are valid, simple when shrunk, exact on their lattice, and reach every case of projection."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from contactverif.strategies.solids import block_cases, dead_zone_cases, variant
 FIXED = settings(derandomize=True, database=None, deadline=None)
 
 
-def drawn(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
-    """Many cases, always the same."""
+def collect_cases(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
+    """Return many cases, always the same."""
     assert strategy is not None
     cases: list[Case] = []
 
@@ -44,7 +44,7 @@ def drawn(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
 
 @pytest.fixture(scope="module")
 def flat() -> list[Case]:
-    return drawn(flat_cases(), 400)
+    return collect_cases(flat_cases(), 400)
 
 
 @pytest.mark.parametrize("strategy", [flat_cases, general_cases, smooth_cases, tie_cases])
@@ -118,13 +118,13 @@ def test_ratios_of_neighbours_reach_2_to_the_20(flat: list[Case]) -> None:
 
 
 def test_typical_meshes_are_small(flat: list[Case]) -> None:
-    cases = flat + drawn(general_cases(), 200)
+    cases = flat + collect_cases(general_cases(), 200)
     assert np.median([case.n_segments for case in cases]) <= 12
 
 
 def test_every_case_of_projection_is_reached() -> None:
     total: Counter[str] = Counter()
-    for case in drawn(general_cases(), 300) + drawn(tie_cases(), 150):
+    for case in collect_cases(general_cases(), 300) + collect_cases(tie_cases(), 150):
         total.update(projection_cases(case.interface, case.z))
     print("\n" + "\n".join(f"{count:6} {name}" for name, count in total.most_common()))
     wanted = "one segment,first,intermediate,last,node exactly hit,beyond an end,convex vertex,concave vertex,edge-on"
@@ -132,7 +132,7 @@ def test_every_case_of_projection_is_reached() -> None:
 
 
 def test_smooth_cases_are_away_from_kinks() -> None:
-    margins = np.array([_relative_margin(case) for case in drawn(smooth_cases(), 2000)])
+    margins = np.array([_relative_margin(case) for case in collect_cases(smooth_cases(), 2000)])
     share, wide = (margins > 1e-7).mean(), (margins > 1e-5).mean()
     print(f"\nfurther from a kink than 1e-7 ℓ: {share:.2%}, than 1e-5 ℓ: {wide:.2%}")
     assert share >= 0.98
@@ -144,21 +144,21 @@ def _relative_margin(case: Case) -> float:
 
 
 def test_ties_are_at_kinks() -> None:
-    margins = np.array([_relative_margin(case) for case in drawn(tie_cases(), 300)])
+    margins = np.array([_relative_margin(case) for case in collect_cases(tie_cases(), 300)])
     assert (margins < 1e-12).mean() >= 0.9
 
 
 def test_shapes_and_states_of_all_kinds_occur() -> None:
-    seen: Counter[str] = Counter()
-    for case in drawn(general_cases(), 400):
+    counts: Counter[str] = Counter()
+    for case in collect_cases(general_cases(), 400):
         master, slave = case.interface.master, case.interface.slave
-        seen["closed chain"] += bool((master.neighbours >= 0).all())
-        seen["several chains"] += int((slave.neighbours[:, 0] < 0).sum()) > 1
-        seen["moved"] += bool(np.abs(case.positions - case.interface.nodes).max() > 2 * case.shortest_segment)
+        counts["closed chain"] += bool((master.neighbours >= 0).all())
+        counts["several chains"] += int((slave.neighbours[:, 0] < 0).sum()) > 1
+        counts["moved"] += bool(np.abs(case.positions - case.interface.nodes).max() > 2 * case.shortest_segment)
         normals = np.diff(case.positions[master.segments], axis=1)[:, 0]
-        seen["bent"] += bool(np.linalg.matrix_rank(normals, rtol=1e-6) > 1)
-    print("\n", seen)
-    assert all(seen[kind] >= 10 for kind in ("closed chain", "several chains", "moved", "bent"))
+        counts["bent"] += bool(np.linalg.matrix_rank(normals, rtol=1e-6) > 1)
+    print("\n", counts)
+    assert all(counts[kind] >= 10 for kind in ("closed chain", "several chains", "moved", "bent"))
 
 
 def test_impossible_arguments_are_refused() -> None:
@@ -168,7 +168,7 @@ def test_impossible_arguments_are_refused() -> None:
 
 @pytest.fixture(scope="module")
 def dead_zones() -> list[Case]:
-    return drawn(dead_zone_cases(), 300)
+    return collect_cases(dead_zone_cases(), 300)
 
 
 def test_the_simplest_dead_zone_is_one_segment_a_side() -> None:
@@ -182,7 +182,7 @@ def test_the_simplest_dead_zone_is_one_segment_a_side() -> None:
 
 
 def test_in_a_dead_zone_the_master_ends_inside_a_slave_segment(dead_zones: list[Case]) -> None:
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for case in dead_zones:
         slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
         ends = {"left": master.min(), "right": master.max()}
@@ -194,14 +194,16 @@ def test_in_a_dead_zone_the_master_ends_inside_a_slave_segment(dead_zones: list[
         for side, over in overhang.items():
             assert not over or ends[side] not in slave
         both = all(overhang.values())
-        seen["both"] += both
-        seen["in one segment"] += both and not ((slave > ends["left"]) & (slave < ends["right"])).any()
-        seen["the master overhangs on the other side"] += bool(master.min() < slave.min() or slave.max() < master.max())
-        seen["a whole slave segment touches nothing"] += bool((np.sort(slave)[1:-1] < ends["left"]).any())
-        seen["turned"] += scene_of(case).bodies[0].axis.tolist() != [1, 0]
-    print("\n", seen)
-    assert len(seen) == 5
-    assert min(seen.values()) >= 20
+        counts["both"] += both
+        counts["in one segment"] += both and not ((slave > ends["left"]) & (slave < ends["right"])).any()
+        counts["the master overhangs on the other side"] += bool(
+            master.min() < slave.min() or slave.max() < master.max()
+        )
+        counts["a whole slave segment touches nothing"] += bool((np.sort(slave)[1:-1] < ends["left"]).any())
+        counts["turned"] += scene_of(case).bodies[0].axis.tolist() != [1, 0]
+    print("\n", counts)
+    assert len(counts) == 5
+    assert min(counts.values()) >= 20
 
 
 def test_a_scene_is_asked_where_its_overhang_belongs() -> None:
@@ -209,11 +211,11 @@ def test_a_scene_is_asked_where_its_overhang_belongs() -> None:
     covered, overhanging, bent = map(load_scene_case, ("c", "dead-zone", "dead-zone:sides=free"))
     for strategy in (block_cases, variant_cases):
         assert strategy(overhanging) is None
-        assert drawn(strategy(covered), 2)[0] is covered
+        assert collect_cases(strategy(covered), 2)[0] is covered
     assert dead_zone_cases(covered) is None
     assert dead_zone_cases(bent) is None
     assert dead_zone_cases(named_case("c")) is None
-    assert drawn(dead_zone_cases(overhanging), 2)[0] is overhanging
+    assert collect_cases(dead_zone_cases(overhanging), 2)[0] is overhanging
 
 
 # Interfaces that somebody gives
@@ -224,7 +226,7 @@ def test_flat_cases_of_a_given_interface_have_the_penetration_they_say() -> None
     interface = named_case("c").interface.at(named_case("c").interface.nodes @ turn + [3.0, -7.0])
     strategy = flat_cases(interface)
     assert strategy is not None
-    for case in drawn(strategy, 30):
+    for case in collect_cases(strategy, 30):
         assert case.interface is interface
         normal = np.array([-case.parameters["direction"][1], case.parameters["direction"][0]])
         heights = case.positions @ normal
@@ -251,9 +253,11 @@ def test_what_is_not_flat_has_no_flat_cases(interface: Interface) -> None:
 
 @pytest.mark.parametrize("strategy", [general_cases, smooth_cases])
 def test_states_of_a_given_interface_touch(strategy: Callable[[Interface], SearchStrategy[Case]]) -> None:
-    ring = next(case.interface for case in drawn(general_cases(), 200) if (case.interface.master.neighbours >= 0).all())
+    ring = next(
+        case.interface for case in collect_cases(general_cases(), 200) if (case.interface.master.neighbours >= 0).all()
+    )
     for interface in (named_case("c").interface, named_case("tilted").interface, ring):
-        cases = drawn(strategy(interface), 30)
+        cases = collect_cases(strategy(interface), 30)
         assert all(case.interface is interface for case in cases)
         assert len({case.z.tobytes() for case in cases}) > 10
         least = min(np.abs(case.positions - interface.nodes).max() for case in cases)
@@ -288,7 +292,7 @@ def test_an_unknown_name_gets_near_ones() -> None:
 
 @pytest.mark.parametrize("strategy", [flat_cases, general_cases, smooth_cases, tie_cases])
 def test_no_segment_has_shrunk_to_a_point(strategy: Callable[[], SearchStrategy[Case]]) -> None:
-    for case in drawn(strategy(), 1000):
+    for case in collect_cases(strategy(), 1000):
         assert case.shortest_segment > 0
 
 

@@ -65,7 +65,7 @@ class SegmentToSegment:
 
 
 class Exact(SegmentToSegment):
-    """The same residual, with promises and an exact tangent."""
+    """The segment-to-segment residual, with promises and an exact tangent."""
 
     traits = Traits(
         passes_flat_patch=True,
