@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from plain_skfem import TwoBlocks, exact_pressure
 from plain_skfem import solve as plain
-from test_speed import interleaved
+from test_speed import time_in_turns
 
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.bulk import condense
@@ -81,7 +81,7 @@ def test_beside_the_plain_script(benchmark: Any, capsys: pytest.CaptureFixture[s
         plain,
     ):
         assert max(way(blocks) for blocks in every) < 1e-11
-    mine, whole, theirs = interleaved(
+    mine, whole, theirs = time_in_turns(
         lambda: [solve_as_scene(blocks, subject) for blocks in every],
         lambda: [judge_as_property(blocks, subject) for blocks in every],
         lambda: [plain(blocks) for blocks in every],
@@ -121,11 +121,11 @@ def test_one_random_patch_test(benchmark: Any, capsys: pytest.CaptureFixture[str
         for case in cases:
             solve(scene_of(case), subject.for_case(case))
 
-    drawing, whole, bodies, newton = interleaved(
+    drawing, whole, bodies, newton = time_in_turns(
         lambda: draw_cases(block_cases(), seed="0", examples=N_MESHES), judge_all, condense_all, solve_all, repeats=1
     )
     judge_all()
-    again = interleaved(lambda: [judge_case(FLAT_SOLVE, case, subject) for case in cases], repeats=1)[0]
+    again = time_in_turns(lambda: [judge_case(FLAT_SOLVE, case, subject) for case in cases], repeats=1)[0]
     benchmark(judge_all)
     drawing, whole, bodies, newton, again = (1e3 * time / N_MESHES for time in (drawing, whole, bodies, newton, again))
     benchmark.extra_info |= {"drawing, ms": drawing, "judging, ms": whole}
