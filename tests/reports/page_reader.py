@@ -1,4 +1,4 @@
-"""Reads an HTML page as strictly as the standard library lets one: what is nested, named, referred to, said."""
+"""Read an HTML page as strictly as the standard library allows: its nesting, ids, links and texts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ VOID = {"meta", "link", "img", "br", "hr", "input", "col"}
 
 @dataclass
 class Table:
-    """Texts of the cells; `headers` of the column headers with a scope."""
+    """A table of a page: the texts of its cells; `headers` are those of the column headers with a scope."""
 
     caption: str = ""
     headers: list[str] = field(default_factory=list)
@@ -18,18 +18,18 @@ class Table:
 
 
 class Page(HTMLParser):
-    """All that a test asks about a page.
+    """The contents of a page, as tests check them.
 
     Attributes
     ----------
-    errors
-        What is not nested as it was opened.
-    ids
-        In their order, twice if they are there twice.
-    links
-        Targets of every `href`, `src` and `url(…)`.
-    text
-        Of the page, style sheets left out, spaces made one.
+    errors : list[str]
+        The elements that are closed in the wrong order or not at all.
+    ids : list[str]
+        All ids in their order; a repeated id is repeated here.
+    links : list[str]
+        The targets of every `href`, `src` and `url(…)`.
+    text : str
+        The text of the page without style sheets; all white space is one blank.
     """
 
     def __init__(self, html: str) -> None:
@@ -82,37 +82,41 @@ class Page(HTMLParser):
             self._cell.append(data)
 
     def _take(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        found = {name: value or "" for name, value in attrs}
-        self.tags.append((tag, found))
-        if "id" in found:
-            self.ids.append(found["id"])
-        self.links += [found[name] for name in ("href", "src", "srcset", "data", "poster") if name in found]
-        self.links += [part.partition(")")[0] for value in found.values() for part in value.split("url(")[1:] if part]
+        attributes = {name: value or "" for name, value in attrs}
+        self.tags.append((tag, attributes))
+        if "id" in attributes:
+            self.ids.append(attributes["id"])
+        self.links += [attributes[name] for name in ("href", "src", "srcset", "data", "poster") if name in attributes]
+        self.links += [
+            part.partition(")")[0] for value in attributes.values() for part in value.split("url(")[1:] if part
+        ]
 
     def _attribute_of_last(self, tag: str, name: str) -> str:
-        return next((attrs.get(name, "") for found, attrs in reversed(self.tags) if found == tag), "")
+        return next((attrs.get(name, "") for other, attrs in reversed(self.tags) if other == tag), "")
 
 
 def complaints(html: str) -> list[str]:
-    """What is wrong with a page of ours, a line each."""
+    """Return the mistakes in a page of ours, a line each."""
     page = Page(html)
-    found = list(page.errors)
-    found += [f"id {name!r} twice" for name in sorted({name for name in page.ids if page.ids.count(name) > 1})]
-    found += [f"outside: {link}" for link in page.links if not link.startswith("#")]
-    found += [f"leads nowhere: {link}" for link in page.links if link[:1] == "#" and link[1:] not in page.ids]
-    found += [f"script: {attrs}" for tag, attrs in page.tags if tag in ("script", "link", "iframe", "object")]
-    found += [f"@import in {tag}" for tag in ("style",) if "@import" in html]
+    mistakes = list(page.errors)
+    mistakes += [f"id {name!r} twice" for name in sorted({name for name in page.ids if page.ids.count(name) > 1})]
+    mistakes += [f"outside: {link}" for link in page.links if not link.startswith("#")]
+    mistakes += [f"leads nowhere: {link}" for link in page.links if link[:1] == "#" and link[1:] not in page.ids]
+    mistakes += [f"script: {attrs}" for tag, attrs in page.tags if tag in ("script", "link", "iframe", "object")]
+    mistakes += [f"@import in {tag}" for tag in ("style",) if "@import" in html]
     tags = [tag for tag, _ in page.tags]
-    found += [f"{tags.count(tag)} × {tag}" for tag in ("html", "title", "h1", "main", "header") if tags.count(tag) != 1]
-    found += [] if any(tag == "html" and attrs.get("lang") for tag, attrs in page.tags) else ["no language"]
+    mistakes += [
+        f"{tags.count(tag)} × {tag}" for tag in ("html", "title", "h1", "main", "header") if tags.count(tag) != 1
+    ]
+    mistakes += [] if any(tag == "html" and attrs.get("lang") for tag, attrs in page.tags) else ["no language"]
     for number, table in enumerate(page.tables):
         if not table.headers:
-            found.append(f"table {number} ({table.caption}) has no column headers with a scope")
+            mistakes.append(f"table {number} ({table.caption}) has no column headers with a scope")
         if not table.caption:
-            found.append(f"table {number} has no caption")
+            mistakes.append(f"table {number} has no caption")
         if len({len(row) for row in table.rows}) != 1:
-            found.append(f"table {number} ({table.caption}) is ragged")
+            mistakes.append(f"table {number} ({table.caption}) is ragged")
     for tag, attrs in page.tags:
         if tag == "svg" and not (attrs.get("aria-label") or attrs.get("aria-hidden")):
-            found.append("an svg says nothing")
-    return found
+            mistakes.append("an svg says nothing")
+    return mistakes

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made import awkward, flat
+from handmade_report import awkward, flat
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import jinja2
 import numpy as np
 import pytest
-from made import flat, small_run
+from handmade_report import flat, small_run
 from markupsafe import Markup
 from matplotlib.figure import Figure
 from page_reader import Page, complaints
@@ -30,13 +30,13 @@ EVIL = "<script>alert(1)</script> & \"'"
 
 
 def figure(title: str = "a title") -> Figure:
-    """One of everything that an SVG refers to by an id: a clip path, a marker, a hatch."""
-    made = Figure(figsize=(3.0, 2.0))
-    axes = made.add_subplot()
+    """Return a figure with all that an SVG refers to by an id: a clip path, a marker, a hatch."""
+    drawing = Figure(figsize=(3.0, 2.0))
+    axes = drawing.add_subplot()
     axes.plot([0, 1, 2], [1, 3, 2], "o-")
     axes.fill_between([0, 1], [1, 1], [2, 2], hatch="//")
     axes.set_title(title)
-    return made
+    return drawing
 
 
 def page(tmp_path: Path, run: object, name: str = "report.nc") -> str:
@@ -47,7 +47,7 @@ def page(tmp_path: Path, run: object, name: str = "report.nc") -> str:
 
 @pytest.fixture
 def child(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A template that extends the base, beside the real ones."""
+    """Add a template that extends the base to the real ones."""
     blocks = "{% block title %}{{ name }}{% endblock %}{% block content %}{{ svgs }}{% endblock %}"
     text = '{% extends "base.html.j2" %}' + blocks
     environment = pages._environment().overlay()
@@ -206,12 +206,12 @@ def test_many_formulations_are_folded_and_few_counterexamples_drawn(
     row = next(row for row in small_run().rows if row.shrunk is not None)
     rows = tuple(replace(row, formulation=f"mine:n={n}") for n in range(9))
     html = page(tmp_path, replace(small_run(), rows=rows, provided={}, not_loaded=()))
-    found = Page(html)
+    contents = Page(html)
     assert not complaints(html)
-    assert "2 of 9 counterexamples are drawn as figures" in found.text
+    assert "2 of 9 counterexamples are drawn as figures" in contents.text
     assert html.count("data-figure=") == 2
     assert html.count("<pre>") == 7, "the others are drawn in text"
-    assert not any(tag == "details" and "open" in attrs for tag, attrs in found.tags), "nothing of it was unexpected"
+    assert not any(tag == "details" and "open" in attrs for tag, attrs in contents.tags), "nothing of it was unexpected"
 
 
 def test_a_strip_tells_how_many_keep_the_tolerance() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from made import ERROR, awkward, small_run
+from handmade_report import ERROR, awkward, small_run
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -115,7 +115,7 @@ def test_a_damaged_case_is_said_to_be_one(report: Path) -> None:
     "error", [RuntimeError("NetCDF: HDF error"), KeyError("gone"), ValueError("99"), OSError(5, "Input/output error")]
 )
 def test_what_is_damaged_in_a_report_is_one_line(report: Path, error: Exception) -> None:
-    said = r"report.nc, which cannot be read \(.*\); needed an undamaged report"
-    with pytest.raises(MisuseError, match=said) as caught, open_report(report):
+    message = r"report.nc, which cannot be read \(.*\); needed an undamaged report"
+    with pytest.raises(MisuseError, match=message) as caught, open_report(report):
         raise error
     assert "\n" not in str(caught.value)

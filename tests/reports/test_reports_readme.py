@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from made import small_run
+from handmade_report import small_run
 
 from contactverif_reports.netcdf.write import write
 

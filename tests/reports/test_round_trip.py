@@ -13,7 +13,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from made import ERROR, SLOPE, awkward, flat, outcome, question, small_run
+from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, small_run
 from rich.console import Console, RenderableType
 
 from contactverif.cli.changes_tables import ChangesTable, regressions_text
@@ -93,7 +93,7 @@ def live(request: pytest.FixtureRequest) -> Run:
 
 
 @pytest.fixture
-def stored(live: Run, tmp_path: Path) -> Run:
+def reread(live: Run, tmp_path: Path) -> Run:
     write(live, tmp_path / "report.nc")
     return read_run(tmp_path / "report.nc")
 
@@ -105,41 +105,41 @@ def text_of(content: RenderableType, width: int = 100) -> str:
 
 
 def everything_shown(run: Run) -> dict[str, str]:
-    """All that somebody is shown of a run, by name."""
-    shown = {"page": report_page(run, "report.nc"), "last line": text_of(summary(run))}
-    shown |= {f"table, {width} columns": text_of(RunTable(run), width) for width in (80, 140)}
-    shown |= {example.id: text_of(counterexample_text(example, Path("r.nc"))) for example in failing_examples(run)}
-    shown["advice"] = str(how_to_keep(run))
+    """Return everything that a reader is shown of a run, by name."""
+    texts = {"page": report_page(run, "report.nc"), "last line": text_of(summary(run))}
+    texts |= {f"table, {width} columns": text_of(RunTable(run), width) for width in (80, 140)}
+    texts |= {example.id: text_of(counterexample_text(example, Path("r.nc"))) for example in failing_examples(run)}
+    texts["advice"] = str(how_to_keep(run))
     for reference in run.formulations[:1] if run.rows else ():
         comparison = Comparison.from_run(run, reference)
         tables = (results_table, errors_table, iterations_table, last_line)
-        shown |= {table.__name__: text_of(table(comparison)) for table in tables}
-        shown["comparison"] = comparison_page(comparison, (), (), ())
+        texts |= {table.__name__: text_of(table(comparison)) for table in tables}
+        texts["comparison"] = comparison_page(comparison, (), (), ())
     named = NamedRun.from_run("r.nc", run)
     changes = Changes.between(named, named)
-    shown |= {"changes": text_of(ChangesTable(changes)), "regressions": text_of(regressions_text(changes))}
-    return shown | {"page of changes": changes_page(changes, counterexamples(run))}
+    texts |= {"changes": text_of(ChangesTable(changes)), "regressions": text_of(regressions_text(changes))}
+    return texts | {"page of changes": changes_page(changes, counterexamples(run))}
 
 
-def test_a_report_that_is_read_and_written_again_is_the_same(stored: Run, tmp_path: Path) -> None:
-    write(stored, tmp_path / "again.nc")
+def test_a_report_that_is_read_and_written_again_is_the_same(reread: Run, tmp_path: Path) -> None:
+    write(reread, tmp_path / "again.nc")
     assert same_data(tmp_path / "report.nc", tmp_path / "again.nc") == []
 
 
-def test_all_that_is_shown_is_the_same_from_memory_and_from_a_file(live: Run, stored: Run) -> None:
-    ours, theirs = everything_shown(live), everything_shown(stored)
+def test_all_that_is_shown_is_the_same_from_memory_and_from_a_file(live: Run, reread: Run) -> None:
+    ours, theirs = everything_shown(live), everything_shown(reread)
     assert list(ours) == list(theirs)
     for name, text in ours.items():
         assert text == theirs[name], name
 
 
-def test_what_is_counted_is_the_same(live: Run, stored: Run) -> None:
-    assert stored.promises_kept is live.promises_kept
-    assert [stored.count(result) for result in Result] == [live.count(result) for result in Result]
-    assert (stored.formulations, list(stored.properties)) == (live.formulations, list(live.properties))
-    assert stored.provided == live.provided
-    assert stored.provenance == live.provenance
-    for ours, theirs in zip(live.rows, stored.rows, strict=True):
+def test_what_is_counted_is_the_same(live: Run, reread: Run) -> None:
+    assert reread.promises_kept is live.promises_kept
+    assert [reread.count(result) for result in Result] == [live.count(result) for result in Result]
+    assert (reread.formulations, list(reread.properties)) == (live.formulations, list(live.properties))
+    assert reread.provided == live.provided
+    assert reread.provenance == live.provenance
+    for ours, theirs in zip(live.rows, reread.rows, strict=True):
         assert (ours.verdict, ours.promise, ours.known, ours.reason) == (
             theirs.verdict, theirs.promise, theirs.known, theirs.reason,
         )  # fmt: skip
@@ -152,8 +152,8 @@ def test_what_is_counted_is_the_same(live: Run, stored: Run) -> None:
         )  # fmt: skip
 
 
-def test_every_outcome_comes_back(live: Run, stored: Run) -> None:
-    for ours, theirs in zip(live.rows, stored.rows, strict=True):
+def test_every_outcome_comes_back(live: Run, reread: Run) -> None:
+    for ours, theirs in zip(live.rows, reread.rows, strict=True):
         for our, their in zip(ours.outcomes, theirs.outcomes, strict=True):
             assert same_outcome(our, their), (ours.property_id, our, their)
         assert (ours.witness is None) is (theirs.witness is None)
@@ -162,7 +162,7 @@ def test_every_outcome_comes_back(live: Run, stored: Run) -> None:
 
 
 def same_outcome(a: Outcome, b: Outcome) -> bool:
-    """Whether all but the time is the same; NaN is NaN, and a mapping has no order."""
+    """Return whether all but the time is the same; NaN equals NaN, and a mapping has no order."""
     return (a.verdict, a.reason, a.breach, repr(a.summary)) == (b.verdict, b.reason, b.breach, repr(b.summary)) and (
         facts(a.measurement) == facts(b.measurement)
     )
@@ -181,7 +181,7 @@ def test_the_cases_of_a_row_are_a_sequence(tmp_path: Path) -> None:
     outcomes = read_run(tmp_path / "report.nc").rows[0].outcomes
     assert len(outcomes) == 9
     assert outcomes[-1].verdict is Verdict.PASS
-    assert [one.verdict for one in outcomes[5:7]] == [Verdict.FAIL, Verdict.FAIL]
+    assert [outcome.verdict for outcome in outcomes[5:7]] == [Verdict.FAIL, Verdict.FAIL]
     with pytest.raises(IndexError):
         outcomes[9]
     with pytest.raises(MisuseError, match="case: found the summary of a case; needed a counterexample"):

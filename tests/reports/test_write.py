@@ -14,7 +14,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from made import ERROR, flat, outcome, question, small_run
+from handmade_report import ERROR, flat, outcome, question, small_run
 
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -115,7 +115,7 @@ def test_same_run_same_data(tmp_path: Path) -> None:
     run = small_run()
     slower = [
         dataclasses.replace(
-            row, seconds=9.0, outcomes=tuple(dataclasses.replace(one, seconds=3.0) for one in row.outcomes)
+            row, seconds=9.0, outcomes=tuple(dataclasses.replace(case, seconds=3.0) for case in row.outcomes)
         )
         for row in run.rows
     ]
@@ -192,11 +192,11 @@ def test_the_closest_number_is_that_of_a_decided_case_or_of_the_witness() -> Non
 def test_an_exception_leaves_what_was_there(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = report.read_bytes()
 
-    def broken(self: xr.DataTree, path: Path, **options: object) -> None:
+    def break_off(self: xr.DataTree, path: Path, **options: object) -> None:
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(xr.DataTree, "to_netcdf", broken)
+    monkeypatch.setattr(xr.DataTree, "to_netcdf", break_off)
     with pytest.raises(KeyboardInterrupt):
         write(small_run(passing=True), report)
     assert report.read_bytes() == before
@@ -212,7 +212,7 @@ def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None
     script = textwrap.dedent("""
         import sys, time
         import xarray as xr
-        from made import small_run
+        from handmade_report import small_run
         from contactverif_reports.netcdf import write as writing
         whole = xr.DataTree.to_netcdf
         def slow(self, path, **options):
@@ -236,7 +236,7 @@ def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None
     assert sorted(os.listdir(tmp_path)) == [left, "report.nc"] if there else [left]
     if there:
         assert report.read_bytes() == before
-    mine = tmp_path / f".report.nc.{os.getppid()}.part"  # of a process that is alive
+    mine = tmp_path / f".report.nc.{os.getppid()}.part"  # The process is alive.
     other = tmp_path / f".other.nc.{process.pid}.part"
     mine.touch()
     other.touch()
@@ -259,10 +259,10 @@ def test_replaces_the_file_behind_a_link(tmp_path: Path, report: Path) -> None:
     link.symlink_to(report)
     write(small_run(passing=True), link)
     assert link.is_symlink()
-    assert any("promises_kept" in line for line in same_data(report, _written(tmp_path / "c.nc", small_run())))
+    assert any("promises_kept" in line for line in same_data(report, write_to(tmp_path / "c.nc", small_run())))
 
 
-def _written(path: Path, run: Run) -> Path:
+def write_to(path: Path, run: Run) -> Path:
     write(run, path)
     return path
 

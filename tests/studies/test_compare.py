@@ -33,7 +33,7 @@ from contactverif_reports.netcdf.write import write
 
 ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding")
 SLOPE = Quantity("order of one Newton step", "1", "1.9", "second order", "at least")
-TOLERANCE = 2.0**-40  # a power of two, so that margins are exact
+TOLERANCE = 2.0**-40  # A power of two, so that margins are exact.
 
 
 def question(id_: str = "patch.flat.transmission", *quantities: Quantity) -> Property:
@@ -55,11 +55,11 @@ def a_case(size: int) -> Case:
 
 
 def outcome(margin: float | Verdict, size: int = 1, **details: float) -> Outcome:
-    """Of a case of that many segments: a number so many tolerances large, or a verdict without one."""
+    """Return the outcome of a case of `size` segments: a number of `margin` tolerances, or a verdict without one."""
     if isinstance(margin, Verdict):
         return Outcome(a_case(size), margin, "" if margin is Verdict.PASS else "made by hand", seconds=0.25)
-    found = Measurement({ERROR.name: margin * TOLERANCE}, {ERROR.name: TOLERANCE}, details=details)
-    return Outcome(a_case(size), *judge(question(), found), found, seconds=0.25)
+    measurement = Measurement({ERROR.name: margin * TOLERANCE}, {ERROR.name: TOLERANCE}, details=details)
+    return Outcome(a_case(size), *judge(question(), measurement), measurement, seconds=0.25)
 
 
 def row(
@@ -67,20 +67,20 @@ def row(
 ) -> Row:
     sizes = sizes or [1] * len(margins)
     outcomes = tuple(outcome(margin, size) for margin, size in zip(margins, sizes, strict=True))
-    verdicts = [one.verdict for one in outcomes]
+    verdicts = [item.verdict for item in outcomes]
     worst = next((bad for bad in (Verdict.CRASHED, Verdict.FAIL) if bad in verdicts), Verdict.PASS)
     return Row(formulation, question(), worst, promise, planned=len(outcomes), outcomes=outcomes, seconds=1.0)
 
 
-OF_ROWS = {"formulation", "info", "verdict", "promise", "reason"}  # What a cell takes from its row.
+OF_ROWS = {"formulation", "info", "verdict", "promise", "reason"}  # Attributes that a cell takes from its row.
 
 
 def cell(*margins: float | Verdict, **changes: Any) -> Cell:
-    return changed(Cell.from_row(row("vts-me", *margins)), **changes)
+    return with_changes(Cell.from_row(row("vts-me", *margins)), **changes)
 
 
-def changed(old: Cell, **changes: Any) -> Cell:
-    """The cell with other attributes, of its own or of its row."""
+def with_changes(old: Cell, **changes: Any) -> Cell:
+    """Replace attributes of the cell or of its row."""
     row_changes = {name: value for name, value in changes.items() if name in OF_ROWS}
     others = {name: value for name, value in changes.items() if name not in OF_ROWS}
     return replace(old, row=replace(old.row, **row_changes), **others)
@@ -91,36 +91,36 @@ def changed(old: Cell, **changes: Any) -> Cell:
 
 
 def test_a_margin_is_the_quantity_that_went_furthest() -> None:
-    one = question("newton.order", ERROR, SLOPE)
-    found = Measurement({ERROR.name: 0.5, SLOPE.name: 0.95}, {ERROR.name: 1.0, SLOPE.name: 1.9})
-    outcomes = (Outcome(a_case(1), Verdict.FAIL, "slope", found),)
-    made = Cell.from_row(Row("nts", one, Verdict.FAIL, None, planned=1, outcomes=outcomes))
-    assert made.margins.tolist() == [2.0]  # 1.9 / 0.95, the quantity that must be at least its tolerance
-    assert made.orders.tolist() == [0.95]
+    order = question("newton.order", ERROR, SLOPE)
+    measurement = Measurement({ERROR.name: 0.5, SLOPE.name: 0.95}, {ERROR.name: 1.0, SLOPE.name: 1.9})
+    outcomes = (Outcome(a_case(1), Verdict.FAIL, "slope", measurement),)
+    result = Cell.from_row(Row("nts", order, Verdict.FAIL, None, planned=1, outcomes=outcomes))
+    assert result.margins.tolist() == [2.0]  # 1.9 / 0.95, the quantity that must be at least its tolerance
+    assert result.orders.tolist() == [0.95]
 
 
 def test_medians_and_worst_are_over_what_was_decided() -> None:
-    made = cell(0.5, 0.25, 8.0, 4.0, 0.125, Verdict.UNDECIDED, Verdict.PASS)
-    assert (made.median, made.worst, made.row.judged) == (0.5, 8.0, 6)
-    assert np.isnan(made.margins[[5, 6]]).all()
-    assert made.standing[6] == 0.0  # it passes, without a number
-    assert isnan(made.standing[5])
+    result = cell(0.5, 0.25, 8.0, 4.0, 0.125, Verdict.UNDECIDED, Verdict.PASS)
+    assert (result.median, result.worst, result.row.judged) == (0.5, 8.0, 6)
+    assert np.isnan(result.margins[[5, 6]]).all()
+    assert result.standing[6] == 0.0  # it passes, without a number
+    assert isnan(result.standing[5])
 
 
 def test_a_failure_without_a_number_is_infinitely_far() -> None:
     assert cell(Verdict.CRASHED, Verdict.FAIL).margins.tolist() == [inf, inf]
     broken = Measurement({ERROR.name: 0.0}, {ERROR.name: TOLERANCE}, broken="changes its input")
     outcomes = (Outcome(a_case(1), Verdict.FAIL, "changes its input", broken),)
-    made = Cell.from_row(Row("nts", question(), Verdict.FAIL, None, planned=1, outcomes=outcomes))
-    assert made.margins.tolist() == [inf]
+    result = Cell.from_row(Row("nts", question(), Verdict.FAIL, None, planned=1, outcomes=outcomes))
+    assert result.margins.tolist() == [inf]
 
 
 def test_a_row_that_was_not_asked_is_an_empty_cell() -> None:
-    made = Cell.from_row(Row("nts", question(), Verdict.NOT_APPLICABLE, None, reason="no springs"))
-    assert isnan(made.median)
-    assert isnan(made.worst)
-    assert isnan(made.seconds)
-    assert Paired.from_cells(made, made).n == 0
+    result = Cell.from_row(Row("nts", question(), Verdict.NOT_APPLICABLE, None, reason="no springs"))
+    assert isnan(result.median)
+    assert isnan(result.worst)
+    assert isnan(result.seconds)
+    assert Paired.from_cells(result, result).n == 0
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -129,15 +129,15 @@ def test_a_row_that_was_not_asked_is_an_empty_cell() -> None:
 
 def test_pairs_are_counted_case_by_case() -> None:
     #                within  worse  better  both fail: near  worse  better  undecided        crash
-    one = cell(0.25, 2.0, 0.5, 100.0, 100.0, 8.0, Verdict.UNDECIDED, Verdict.CRASHED)
+    first = cell(0.25, 2.0, 0.5, 100.0, 100.0, 8.0, Verdict.UNDECIDED, Verdict.CRASHED)
     other = cell(0.75, 1.0, 2.0, 100.5, 10.0, 80.0, 4.0, Verdict.CRASHED)
-    found = Paired.from_cells(one, other)
-    assert (found.n, found.better, found.equal, found.worse) == (7, 2, 3, 2)
-    assert found.apart.tolist() == [False, True, True, False, False, False, False, False]
-    assert found.decades[[0, 3, 7]] == pytest.approx([0.0, np.log10(100 / 100.5), 0.0])
-    assert found.decades[4] == pytest.approx(1.0)
-    assert found.decades[5] == pytest.approx(-1.0)
-    assert isnan(found.decades[6])
+    pairs = Paired.from_cells(first, other)
+    assert (pairs.n, pairs.better, pairs.equal, pairs.worse) == (7, 2, 3, 2)
+    assert pairs.apart.tolist() == [False, True, True, False, False, False, False, False]
+    assert pairs.decades[[0, 3, 7]] == pytest.approx([0.0, np.log10(100 / 100.5), 0.0])
+    assert pairs.decades[4] == pytest.approx(1.0)
+    assert pairs.decades[5] == pytest.approx(-1.0)
+    assert isnan(pairs.decades[6])
 
 
 def test_the_ratio_is_the_median_of_ratios_on_the_same_cases() -> None:
@@ -151,16 +151,17 @@ def test_the_ratio_is_the_median_of_ratios_on_the_same_cases() -> None:
 
 @pytest.mark.parametrize(("other", "counts"), [(100.0, (0, 1, 0)), (101.0, (0, 1, 0)), (101.5, (1, 0, 0))])
 def test_beyond_the_tolerance_one_tolerance_is_roundoff(other: float, counts: tuple[int, int, int]) -> None:
-    found = Paired.from_cells(cell(100.0), cell(other))
-    assert (found.better, found.equal, found.worse) == counts
+    pairs = Paired.from_cells(cell(100.0), cell(other))
+    assert (pairs.better, pairs.equal, pairs.worse) == counts
 
 
 def test_the_mesh_to_draw_is_a_small_one_that_differs_much() -> None:
     sizes = np.array([40.0, 4.0, 2.0, 9.0])
-    one = cell(1e12, 1e8, 10.0, 0.5)
-    assert Paired.from_cells(one, cell(0.5, 0.5, 0.5, 0.5)).furthest(sizes) == 1  # 8 decades of 12; 1 decade is too few
+    reference = cell(1e12, 1e8, 10.0, 0.5)
+    # Case 1 shows 8 of the 12 decades of case 0; the 1 decade of case 2 is too little.
+    assert Paired.from_cells(reference, cell(0.5, 0.5, 0.5, 0.5)).furthest(sizes) == 1
     # one passes and the other does not: before those where both fail, however far
-    assert Paired.from_cells(one, cell(2.0, 2.0, 0.5, 0.5)).furthest(sizes) == 2
+    assert Paired.from_cells(reference, cell(2.0, 2.0, 0.5, 0.5)).furthest(sizes) == 2
     # Within the tolerance nothing differs.
     assert Paired.from_cells(cell(0.1, 0.9), cell(0.9, 0.1)).furthest(sizes[:2]) is None
 
@@ -180,24 +181,24 @@ def small_run() -> Run:
 
 def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     run = small_run()
-    found = Comparison.from_run(run, "vts-me")
-    assert found.formulations == ("vts-me", "vts-ppt", "nts")
-    assert found.unexpected == ()  # vts-me promised to pass, but it is the reference
-    assert not found.promises_kept  # `mine` did not load
-    found = Comparison.from_run(run, "vts-ppt")
-    assert [one.formulation for one in found.unexpected] == ["vts-me"]
-    assert found.not_loaded == {"mine": "no module"}
-    paired = found.paired["vts-me", "patch.flat.transmission"]
+    comparison = Comparison.from_run(run, "vts-me")
+    assert comparison.formulations == ("vts-me", "vts-ppt", "nts")
+    assert comparison.unexpected == ()  # vts-me promised to pass, but it is the reference
+    assert not comparison.promises_kept  # `mine` did not load
+    comparison = Comparison.from_run(run, "vts-ppt")
+    assert [item.formulation for item in comparison.unexpected] == ["vts-me"]
+    assert comparison.not_loaded == {"mine": "no module"}
+    paired = comparison.paired["vts-me", "patch.flat.transmission"]
     assert (paired.better, paired.equal, paired.worse) == (0, 1, 2)
     assert paired.ratio == pytest.approx(32.0)  # the median of 64, 1 (both within) and 32
 
 
 def test_the_mesh_that_is_drawn_is_the_small_one() -> None:
     run = small_run()
-    (one,) = find_differing(run, Comparison.from_run(run, "vts-ppt"))
-    assert (one.formulation, one.number, one.apart) == ("vts-me", 2, True)
-    assert len(one.case.interface.slave) == 1
-    assert (one.margin, one.reference_margin) == (32.0, 0.125)
+    (differing,) = find_differing(run, Comparison.from_run(run, "vts-ppt"))
+    assert (differing.formulation, differing.number, differing.apart) == ("vts-me", 2, True)
+    assert len(differing.case.interface.slave) == 1
+    assert (differing.margin, differing.reference_margin) == (32.0, 0.125)
 
 
 def test_iterations_are_counted_where_both_converged() -> None:
@@ -212,12 +213,12 @@ def test_iterations_are_counted_where_both_converged() -> None:
             Verdict.PASS,
             None,
             planned=4,
-            outcomes=tuple(outcome(0.5, iterations=float(n), end=float(end)) for n, end in taken),
+            outcomes=tuple(outcome(0.5, iterations=float(n), end=float(end)) for n, end in pairs),
         )
-        for name, taken in solves.items()
+        for name, pairs in solves.items()
     )
-    one, other = Comparison.from_run(Run(rows), "vts-ppt").iterations
-    assert (one.formulation, one.converged, one.solved, one.median, one.most) == ("vts-ppt", 3, 4, 3.0, 4.0)
+    first, other = Comparison.from_run(Run(rows), "vts-ppt").iterations
+    assert (first.formulation, first.converged, first.solved, first.median, first.most) == ("vts-ppt", 3, 4, 3.0, 4.0)
     assert (other.converged, other.median, other.most) == (3, 4.0, 5.0)
     assert (other.fewer, other.same, other.more) == (0, 1, 1)
 
@@ -235,8 +236,8 @@ def test_all_are_asked_the_same_cases() -> None:
     subjects = [load_formulation(name) for name in ("vts-ppt", "vts-me")]
     assert isinstance(subjects[0], Subject)
     study = run_comparison(subjects[0], subjects[1:], load_properties(["patch.flat.transmission"]), examples=12, seed=1)
-    ours, theirs = (found.outcomes for found in study.run.rows)
-    assert [one.case for one in ours] == [other.case for other in theirs]
+    ours, theirs = (result.outcomes for result in study.run.rows)
+    assert [our.case for our in ours] == [their.case for their in theirs]
     assert study.differing[0].formulation == "vts-me"
     assert study.differing[0].reference_outcome.verdict is Verdict.PASS
     assert {cost.formulation for cost in study.costs} == {"vts-ppt", "vts-me"}
@@ -248,12 +249,12 @@ def test_all_are_asked_the_same_cases() -> None:
 
 
 class Counting:
-    """A plugin without pairing or tangent that counts how often it was asked."""
+    """A plugin without pairing or tangent that counts how often it is called."""
 
-    asked = 0
+    n_calls = 0
 
     def residual(self, interface: Interface, pairing: None, z: Any) -> Any:
-        type(self).asked += 1
+        type(self).n_calls += 1
         return 0 * z
 
 
@@ -265,7 +266,7 @@ class Raising:
 def test_cost_is_of_what_is_provided_and_a_failure_has_none() -> None:
     subjects = [Subject("counting", lambda penalty: Counting()), Subject("raising", lambda penalty: Raising())]
     good, bad = measure_costs(subjects, [make_state(4)], turns=3)
-    assert Counting.asked >= 4  # once to warm up
+    assert Counting.n_calls >= 4  # once to warm up
     assert good.n_segments == 4
     assert good.total == good.seconds["residual"] > 0
     assert isnan(good.seconds["pair"])
@@ -290,14 +291,14 @@ def test_the_shared_state_is_in_contact_everywhere() -> None:
 
 
 def test_the_same_again_is_no_regression() -> None:
-    one = cell(0.5, 1e12, Verdict.CRASHED, Verdict.UNDECIDED)
-    found = compare_rows(one, one, same_seed=True)
-    assert found.paired is not None
-    assert found.regressions == ()
+    same = cell(0.5, 1e12, Verdict.CRASHED, Verdict.UNDECIDED)
+    change = compare_rows(same, same, same_seed=True)
+    assert change.paired is not None
+    assert change.regressions == ()
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "regressions"),
     [
         (Verdict.PASS, Verdict.FAIL, ["pass → fail"]),
         (Verdict.PASS, Verdict.CRASHED, ["pass → crashed"]),
@@ -311,10 +312,10 @@ def test_the_same_again_is_no_regression() -> None:
         (Verdict.NOT_APPLICABLE, Verdict.FAIL, []),  # it was not asked before
     ],
 )
-def test_a_verdict_that_got_worse(old: Verdict, new: Verdict, said: list[str]) -> None:
-    found = compare_rows(cell(verdict=old), cell(verdict=new), same_seed=True)
-    assert list(found.regressions) == said
-    assert found.better is (new is Verdict.PASS)
+def test_a_verdict_that_got_worse(old: Verdict, new: Verdict, regressions: list[str]) -> None:
+    change = compare_rows(cell(verdict=old), cell(verdict=new), same_seed=True)
+    assert list(change.regressions) == regressions
+    assert change.better is (new is Verdict.PASS)
 
 
 def test_a_promise_that_is_not_kept_any_more() -> None:
@@ -340,39 +341,39 @@ def test_a_promise_that_is_not_kept_any_more() -> None:
 )
 def test_an_error_more_than_doubles_and_two_tolerances(old: tuple[Any, ...], new: tuple[Any, ...], grew: bool) -> None:
     before, after = (cell(*margins, verdict=Verdict.FAIL) for margins in (old, new))
-    found = compare_rows(before, after, same_seed=True).regressions
-    said = [words for words in found if "passed and fail now" not in words]
-    assert bool(said) is grew
-    assert all(words.startswith("error grew, in tolerances, on the same") for words in said)
+    regressions = compare_rows(before, after, same_seed=True).regressions
+    growth = [words for words in regressions if "passed and fail now" not in words]
+    assert bool(growth) is grew
+    assert all(words.startswith("error grew, in tolerances, on the same") for words in growth)
 
 
 def test_a_case_that_passed_and_fails_is_named_in_a_row_that_failed_already() -> None:
-    found = compare_rows(cell(0.5, 0.5, 64.0), cell(0.5, 2.0, 64.0), same_seed=True)
-    assert found.regressions == ("1 of 3 cases passed and fail now, the first is case 1",)
+    change = compare_rows(cell(0.5, 0.5, 64.0), cell(0.5, 2.0, 64.0), same_seed=True)
+    assert change.regressions == ("1 of 3 cases passed and fail now, the first is case 1",)
 
 
 @pytest.mark.parametrize("n", [60, 500])
 def test_cases_that_were_judged_and_are_undecided_now(n: int) -> None:
     old, some = cell(*[0.5] * n), int(few(n))
     assert some == {60: 1, 500: 5}[n]
-    for lost, regressed in ((some, False), (some + 1, True)):
-        new = cell(*[Verdict.UNDECIDED] * lost, *[0.5] * (n - lost))
-        said = (f"{lost} of the same {n} cases were judged and are undecided now",) * regressed
-        assert compare_rows(old, new, same_seed=True).regressions == said
+    for n_undecided, regressed in ((some, False), (some + 1, True)):
+        new = cell(*[Verdict.UNDECIDED] * n_undecided, *[0.5] * (n - n_undecided))
+        lines = (f"{n_undecided} of the same {n} cases were judged and are undecided now",) * regressed
+        assert compare_rows(old, new, same_seed=True).regressions == lines
         assert compare_rows(new, old, same_seed=True).regressions == ()
     back = cell(*[Verdict.UNDECIDED] * 2, *[0.5] * (n - 2))
-    gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 2), *[0.5] * (n - some - 4))
-    assert compare_rows(back, gone, same_seed=True).regressions == ()  # noise goes both ways
-    gone = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 3), *[0.5] * (n - some - 5))
-    (said_so,) = compare_rows(back, gone, same_seed=True).regressions
-    assert said_so.endswith("undecided now, 2 the other way round")
+    other = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 2), *[0.5] * (n - some - 4))
+    assert compare_rows(back, other, same_seed=True).regressions == ()  # noise goes both ways
+    other = cell(0.5, 0.5, *[Verdict.UNDECIDED] * (some + 3), *[0.5] * (n - some - 5))
+    (line,) = compare_rows(back, other, same_seed=True).regressions
+    assert line.endswith("undecided now, 2 the other way round")
 
 
 @pytest.mark.parametrize(("left", "regressed"), [(60, False), (59, False), (58, True), (3, True), (0, True)])
 def test_fewer_cases_at_the_same_seed_and_number_of_examples(left: int, regressed: bool) -> None:
     old, new = cell(*[0.5] * 60), cell(*[0.5] * left)
-    said = (f"{left} cases, 60 before, at the same seed and number of examples",) * regressed
-    assert compare_rows(old, new, same_seed=True).regressions == said
+    lines = (f"{left} cases, 60 before, at the same seed and number of examples",) * regressed
+    assert compare_rows(old, new, same_seed=True).regressions == lines
     assert compare_rows(new, old, same_seed=True).regressions == ()
     assert compare_rows(old, new, same_seed=True, same_examples=False).regressions == ()
     assert compare_rows(old, new, same_seed=False).regressions == ()
@@ -380,47 +381,47 @@ def test_fewer_cases_at_the_same_seed_and_number_of_examples(left: int, regresse
 
 def test_fewer_examples_are_no_fewer_cases() -> None:
     key = ("vts-me", "patch.flat.transmission")
-    old, new = stored({key: cell(*[0.5] * 60)}), stored({key: cell(0.5, 0.5, 0.5)})
+    old, new = named_run({key: cell(*[0.5] * 60)}), named_run({key: cell(0.5, 0.5, 0.5)})
     assert len(Changes.between(old, new).regressions) == 1  # neither says how many were asked
-    asked = [
-        replace(one, run=replace(one.run, provenance={"seed": "1", "examples": n}))
-        for one, n in ((old, "60"), (new, "3"))
+    reports = [
+        replace(report, run=replace(report.run, provenance={"seed": "1", "examples": n}))
+        for report, n in ((old, "60"), (new, "3"))
     ]
-    assert Changes.between(*asked).regressions == ()
+    assert Changes.between(*reports).regressions == ()
 
 
-def solved(ends: list[End], taken: float = 3.0, what: str = "") -> Cell:
-    numbers = {"end": np.array([float(end) for end in ends]), "iterations": np.full(len(ends), taken)}
-    return cell(*[0.5] * len(ends), details={f"{name}{what}": values for name, values in numbers.items()})
+def solved_cell(ends: list[End], iterations: float = 3.0, suffix: str = "") -> Cell:
+    numbers = {"end": np.array([float(end) for end in ends]), "iterations": np.full(len(ends), iterations)}
+    return cell(*[0.5] * len(ends), details={f"{name}{suffix}": values for name, values in numbers.items()})
 
 
 @pytest.mark.parametrize("end", [end for end in End if end is not End.CONVERGED])
-@pytest.mark.parametrize("what", ["", ", high penalty"])
-def test_solutions_that_converged_and_do_not_any_more(end: End, what: str) -> None:
+@pytest.mark.parametrize("suffix", ["", ", high penalty"])
+def test_solutions_that_converged_and_do_not_any_more(end: End, suffix: str) -> None:
     n, some = 60, int(wandering(60))
     assert some == 5
-    old = solved([End.CONVERGED] * n, what=what)
-    for lost, regressed in ((some, False), (some + 1, True)):
-        new = solved([end] * lost + [End.CONVERGED] * (n - lost), what=what)
-        kind = f"{n} solutions{' (high penalty)' if what else ''}"
-        said = (f"{lost} of the same {kind} converged and do not any more",) * regressed
-        assert compare_rows(old, new, same_seed=True).regressions == said
+    old = solved_cell([End.CONVERGED] * n, suffix=suffix)
+    for n_other, regressed in ((some, False), (some + 1, True)):
+        new = solved_cell([end] * n_other + [End.CONVERGED] * (n - n_other), suffix=suffix)
+        kind = f"{n} solutions{' (high penalty)' if suffix else ''}"
+        lines = (f"{n_other} of the same {kind} converged and do not any more",) * regressed
+        assert compare_rows(old, new, same_seed=True).regressions == lines
         assert compare_rows(new, old, same_seed=True).regressions == ()
 
 
 def test_roundoff_takes_solutions_both_ways_and_one_that_was_not_kept_says_nothing() -> None:
     good, bad = End.CONVERGED, End.CYCLE
-    old = solved([bad] * 20 + [good] * 40)
-    assert compare_rows(old, solved([good] * 20 + [bad] * 25 + [good] * 15), same_seed=True).regressions == ()
-    (said,) = compare_rows(old, solved([good] * 20 + [bad] * 26 + [good] * 14), same_seed=True).regressions
-    assert said == "26 of the same 60 solutions converged and do not any more, 20 the other way round"
-    untold = replace(old, details={"end": np.full(60, np.nan)})
-    assert compare_rows(old, untold, same_seed=True).regressions == ()
+    old = solved_cell([bad] * 20 + [good] * 40)
+    assert compare_rows(old, solved_cell([good] * 20 + [bad] * 25 + [good] * 15), same_seed=True).regressions == ()
+    (line,) = compare_rows(old, solved_cell([good] * 20 + [bad] * 26 + [good] * 14), same_seed=True).regressions
+    assert line == "26 of the same 60 solutions converged and do not any more, 20 the other way round"
+    unknown = replace(old, details={"end": np.full(60, np.nan)})
+    assert compare_rows(old, unknown, same_seed=True).regressions == ()
     assert compare_rows(old, replace(old, details={}), same_seed=True).regressions == ()
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "statistics"),
     [
         ((1e-6,), (0.5,), ["median", "worst"]),
         ((0.5, 1e-4, 1e-4), (0.5, 0.2, 0.2), ["median"]),
@@ -433,26 +434,26 @@ def test_roundoff_takes_solutions_both_ways_and_one_that_was_not_kept_says_nothi
     ],
 )
 def test_an_error_that_leaps_within_its_tolerance_is_worth_a_look(
-    old: tuple[float, ...], new: tuple[float, ...], said: list[str]
+    old: tuple[float, ...], new: tuple[float, ...], statistics: list[str]
 ) -> None:
-    found = compare_rows(cell(*old), cell(*new), same_seed=True)
-    assert [words.partition(" ")[0] for words in found.noteworthy] == said
-    assert bool(found.regressions) is (new == (64.0,))
+    change = compare_rows(cell(*old), cell(*new), same_seed=True)
+    assert [words.partition(" ")[0] for words in change.noteworthy] == statistics
+    assert bool(change.regressions) is (new == (64.0,))
 
 
-@pytest.mark.parametrize(("taken", "said"), [(8.0, False), (8.5, True), (15.0, True)])
-def test_iterations_that_more_than_double_are_worth_a_look(taken: float, said: bool) -> None:
+@pytest.mark.parametrize(("iterations", "noteworthy"), [(8.0, False), (8.5, True), (15.0, True)])
+def test_iterations_that_more_than_double_are_worth_a_look(iterations: float, noteworthy: bool) -> None:
     ends = [End.CONVERGED] * 4
-    for what in ("", ", high penalty"):
-        found = compare_rows(solved(ends, what=what), solved(ends, taken, what), same_seed=True)
-        words = f"Newton iterations{' (high penalty)' if what else ''}, median 3 → {taken:g}"
-        assert (found.regressions, found.noteworthy) == ((), (words,) * said)
+    for suffix in ("", ", high penalty"):
+        change = compare_rows(solved_cell(ends, suffix=suffix), solved_cell(ends, iterations, suffix), same_seed=True)
+        words = f"Newton iterations{' (high penalty)' if suffix else ''}, median 3 → {iterations:g}"
+        assert (change.regressions, change.noteworthy) == ((), (words,) * noteworthy)
 
 
 def test_a_row_is_one_regression_however_much_of_it_got_worse() -> None:
     key = ("vts-me", "patch.flat.transmission")
     old, new = cell(0.5, 0.5), cell(64.0, 64.0, details={"x": np.zeros(2)})
-    bad = Changes.between(stored({key: old}), stored({key: changed(new, verdict=Verdict.FAIL)}))
+    bad = Changes.between(named_run({key: old}), named_run({key: with_changes(new, verdict=Verdict.FAIL)}))
     assert len(bad.changes[0].regressions) == 2
     (line,) = bad.regressions
     assert line == f"vts-me, patch.flat.transmission: {'; '.join(bad.changes[0].regressions)}"
@@ -462,36 +463,36 @@ def test_a_row_is_one_regression_however_much_of_it_got_worse() -> None:
 
 def test_what_is_worth_a_look_is_told_and_no_regression() -> None:
     key = ("vts-me", "patch.flat.transmission")
-    one = Changes.between(stored({key: cell(1e-6)}), stored({key: cell(0.5)}))
+    changes = Changes.between(named_run({key: cell(1e-6)}), named_run({key: cell(0.5)}))
     line = "vts-me, patch.flat.transmission: median error grew within its tolerance, 1e-06 → 0.5 of it; worst"
-    assert one.regressions == ()
-    told, last = regressions_text(one).plain.splitlines()
-    assert told.startswith(f"worth a look: {line}")
+    assert changes.regressions == ()
+    first, last = regressions_text(changes).plain.splitlines()
+    assert first.startswith(f"worth a look: {line}")
     assert last == "Nothing got worse."
-    page = changes_page(one, {})
+    page = changes_page(changes, {})
     assert "<h2>Worth a look</h2>" in page
     assert f"<li>{line}" in page
     assert "What got worse" not in page
-    same = Changes.between(stored({key: cell(0.5)}), stored({key: cell(0.5)}))
+    same = Changes.between(named_run({key: cell(0.5)}), named_run({key: cell(0.5)}))
     assert regressions_text(same).plain == "Nothing got worse."
     assert "Worth a look" not in changes_page(same, {})
 
 
 def test_speed_is_told_and_never_a_regression() -> None:
-    found = compare_rows(cell(0.5), cell(0.5, seconds=25.0), same_seed=True)
-    assert (found.slower, found.regressions) == (100.0, ())
+    change = compare_rows(cell(0.5), cell(0.5, seconds=25.0), same_seed=True)
+    assert (change.slower, change.regressions) == (100.0, ())
 
 
 def test_other_cases_are_compared_as_distributions() -> None:
     n = 40
-    allowed = sqrt(log(1 / ALPHA) * (1 / n + 1 / n))  # of half as many independent cases
+    allowed = sqrt(log(1 / ALPHA) * (1 / n + 1 / n))  # The distance that chance allows half as many independent cases.
     just, beyond = int(allowed * n), int(allowed * n) + 1  # cases that may be worse, and one more
     old = cell(*[10.0] * n)
     for worse, regressed in ((just, False), (beyond, True)):
         new = cell(*[10.0] * (n - worse), *[1000.0] * worse)
-        found = compare_rows(old, new, same_seed=False)
-        assert found.paired is None
-        assert bool(found.regressions) is regressed
+        change = compare_rows(old, new, same_seed=False)
+        assert change.paired is None
+        assert bool(change.regressions) is regressed
         assert compare_rows(new, old, same_seed=False).regressions == ()  # it got better
     within = compare_rows(cell(*[0.01] * n), cell(*[0.99] * n), same_seed=False)
     assert within.regressions == ()
@@ -516,9 +517,9 @@ def test_cases_are_the_same_only_if_the_meshes_are() -> None:
     old, new = row("vts-me", 0.5, 2.0, sizes=[1, 2]), row("vts-me", 0.5, 9.0, sizes=[1, 3])
     assert compare_rows(Cell.from_row(old), Cell.from_row(new), same_seed=True).paired is None
     longer = Cell.from_row(row("vts-me", 0.5, 9.0, 64.0, sizes=[1, 2, 7]))
-    found = compare_rows(Cell.from_row(old), longer, same_seed=True).paired
-    assert found is not None
-    assert found.n == 2  # the first ones
+    pairs = compare_rows(Cell.from_row(old), longer, same_seed=True).paired
+    assert pairs is not None
+    assert pairs.n == 2  # the first ones
 
 
 def test_the_distance_of_two_samples() -> None:
@@ -528,23 +529,27 @@ def test_the_distance_of_two_samples() -> None:
     assert shift(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 2.0, 5.0, 6.0])) == 0.5
 
 
-def stored(cells: dict[tuple[str, str], Cell], lost: dict[str, str] | None = None) -> NamedRun:
-    """A report with these rows, {(formulation, property): cell}."""
-    renamed = {(name, id_): changed(one, formulation=name, info=question(id_)) for (name, id_), one in cells.items()}
-    not_loaded = tuple(NotLoaded(*item) for item in (lost or {}).items())
-    run = Run(tuple(one.row for one in renamed.values()), not_loaded, {}, {"seed": "1"})
+def named_run(cells: dict[tuple[str, str], Cell], failures: dict[str, str] | None = None) -> NamedRun:
+    """Return a report with these rows, {(formulation, property): cell}."""
+    renamed = {
+        (name, id_): with_changes(item, formulation=name, info=question(id_)) for (name, id_), item in cells.items()
+    }
+    not_loaded = tuple(NotLoaded(*item) for item in (failures or {}).items())
+    run = Run(tuple(item.row for item in renamed.values()), not_loaded, {}, {"seed": "1"})
     return NamedRun("r.nc", run, renamed)
 
 
 def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> None:
-    one = cell(0.5)
-    old = stored({("nts", "purity"): one, ("vts-me", "purity"): one, ("nts", "scaling"): one})
-    new = stored({("nts", "purity"): one, ("nts", "newton.order"): one}, {"vts-me": "no module", "other": "no module"})
-    found = Changes.between(old, new)
-    assert found.removed == ("vts-me", "scaling")
-    assert found.added == ("newton.order",)
-    assert found.no_longer_loaded == {"vts-me": "no module"}
-    assert found.regressions == ("vts-me: not loaded any more: no module",)
+    same = cell(0.5)
+    old = named_run({("nts", "purity"): same, ("vts-me", "purity"): same, ("nts", "scaling"): same})
+    new = named_run(
+        {("nts", "purity"): same, ("nts", "newton.order"): same}, {"vts-me": "no module", "other": "no module"}
+    )
+    changes = Changes.between(old, new)
+    assert changes.removed == ("vts-me", "scaling")
+    assert changes.added == ("newton.order",)
+    assert changes.no_longer_loaded == {"vts-me": "no module"}
+    assert changes.regressions == ("vts-me: not loaded any more: no module",)
 
 
 def test_a_stored_report_gives_the_cells_of_its_run(tmp_path: Path) -> None:
@@ -557,18 +562,18 @@ def test_a_stored_report_gives_the_cells_of_its_run(tmp_path: Path) -> None:
     rows += (Row("nts", question(), Verdict.NOT_PROVIDED, None, reason="pair: not provided"),)
     run = Run(rows, (NotLoaded("mine", "no module"),), {}, {"seed": "1", "command": "", "platform": "", "created": ""})
     write(run, tmp_path / "r.nc")
-    found = read_run(tmp_path / "r.nc")
-    assert found.formulations == ("vts-ppt", "vts-me:n=4", "nts")
-    assert list(found.properties) == ["patch.flat.transmission", "newton.order"]
-    assert len(found.rows) == len(rows)
-    for ours, theirs in zip(map(Cell.from_row, rows), map(Cell.from_row, found.rows), strict=True):
+    result = read_run(tmp_path / "r.nc")
+    assert result.formulations == ("vts-ppt", "vts-me:n=4", "nts")
+    assert list(result.properties) == ["patch.flat.transmission", "newton.order"]
+    assert len(result.rows) == len(rows)
+    for ours, theirs in zip(map(Cell.from_row, rows), map(Cell.from_row, result.rows), strict=True):
         assert ours.details.keys() == theirs.details.keys()
         assert all(np.array_equal(ours.details[name], theirs.details[name], equal_nan=True) for name in ours.details)
         for name in ("verdicts", "margins", "orders", "kinds"):
             assert np.array_equal(getattr(ours, name), getattr(theirs, name), equal_nan=True), name
         assert ours.closest == theirs.closest
         assert ours.seconds == theirs.seconds or (isnan(ours.seconds) and isnan(theirs.seconds))
-    again = NamedRun.from_run("r.nc", found)
+    again = NamedRun.from_run("r.nc", result)
     assert Changes.between(again, again).regressions == ()
 
 
@@ -576,7 +581,7 @@ def test_a_page_escapes_what_a_plugin_calls_itself() -> None:
     evil = "<script>alert(1)</script>"
     bad = cell(64.0, reason=evil)
     key = (evil, "patch.flat.transmission")
-    old, new = stored({key: changed(bad, verdict=Verdict.PASS)}), stored({key: bad}, {"nts": evil})
+    old, new = named_run({key: with_changes(bad, verdict=Verdict.PASS)}), named_run({key: bad}, {"nts": evil})
     page = changes_page(Changes.between(old, new), {})
     assert "<script" not in page
     assert "&lt;script&gt;" in page
@@ -593,6 +598,6 @@ def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -
     scene = load_scene("c")
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)
-    told = solution_details(solve(scene, subject.for_case(scene.case())))
-    assert {ITERATIONS, END} <= set(told)
-    assert told[END] == CONVERGED == End.CONVERGED
+    details = solution_details(solve(scene, subject.for_case(scene.case())))
+    assert {ITERATIONS, END} <= set(details)
+    assert details[END] == CONVERGED == End.CONVERGED

@@ -28,7 +28,7 @@ def question(id_: str = "patch.flat.transmission", family: str = "patch", *quant
 def flat(
     slave: list[float], master: list[float], penetration: float = 0.125, scale: float = 1.0, angle: float = 0.0
 ) -> Case:
-    """A flat interface with these lengths; the slave runs to the right above the master."""
+    """Return a flat interface with these lengths; the slave runs to the right above the master."""
     s, m = (np.concatenate([[0.0], np.cumsum(lengths)]) for lengths in (slave, master[::-1]))
     upper = np.column_stack([s, np.zeros_like(s)])
     lower = np.column_stack([m[::-1], np.zeros_like(m)])
