@@ -65,7 +65,7 @@ def tree(paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> xr.DataTree:
 
 @pytest.fixture(scope="module")
 def stored_tree() -> xr.DataTree:
-    """The numbers that are kept, without the slow items, which are not computed again, and without measured times."""
+    """Return the stored numbers, without measured times and the slow items, which are not computed again."""
     tree = xr.open_datatree(STORED / "paper.nc").load()
     groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree if node.path.split("/")[1] not in SLOW}
     statements = groups["/statements"]
