@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, find, given, settings
+from hypothesis import find, settings
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
@@ -17,6 +17,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import default_points, kink_margin, projection_cases
+from contactverif.run.driver import draw_cases
 from contactverif.scenes.blocks import is_uniform, overhangs
 from contactverif.scenes.catalogue import load_scene_case
 from contactverif.scenes.named_states import NAMED, named_case
@@ -29,17 +30,9 @@ FIXED = settings(derandomize=True, database=None, deadline=None)
 
 
 def collect_cases(strategy: SearchStrategy[Case] | None, count: int) -> list[Case]:
-    """Return many cases, always the same."""
+    """Return many cases, always the same, whatever modules are loaded: drawn as a run draws them."""
     assert strategy is not None
-    cases: list[Case] = []
-
-    @settings(FIXED, max_examples=count, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
-    @given(strategy)
-    def collect(case: Case) -> None:
-        cases.append(case)
-
-    collect()
-    return cases
+    return list(draw_cases(strategy, seed="strategies", examples=count).cases)
 
 
 @pytest.fixture(scope="module")
