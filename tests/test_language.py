@@ -80,9 +80,6 @@ FILES: dict[str, list[Path]] = {}
 for source in sources():
     FILES.setdefault(folder_of(source), []).append(source)
 
-# Folders whose owners are still at work; the test fails when the list names one that passes. It must end empty.
-UNFINISHED: dict[str, set[str]] = {"names": set(), "docstrings": set(), "comments": set()}
-
 
 # --------------------------------------------------------------------------------------------------------------
 # Names
@@ -284,14 +281,12 @@ RULES: dict[str, Callable[[str, str], list[Finding]]] = {
 
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("folder", FILES)
-def test_a_folder_reads_as_plain_english(folder: str, rule: str, request: pytest.FixtureRequest) -> None:
+def test_a_folder_reads_as_plain_english(folder: str, rule: str) -> None:
     wrong = [
         f"{path.relative_to(ROOT)}:{finding.line}: {finding.message}"
         for path in FILES[folder]
         for finding in RULES[rule](path.read_text(encoding="utf-8"), path.stem)
     ]
-    if folder in UNFINISHED[rule]:
-        request.applymarker(pytest.mark.xfail(reason="the folder's owner is still at work", strict=False))
     assert not wrong, "\n" + "\n".join(wrong)
 
 

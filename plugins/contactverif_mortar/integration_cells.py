@@ -186,13 +186,17 @@ class Quadrature:
 
         Parameters
         ----------
+        interface : Interface
+            The meshes.
+        cells : Cells
+            The cells that the pairing holds.
         x : Array, shape (n_states, n_nodes, 2)
             Positions, real or complex.
 
         Returns
         -------
         Array, shape (n_states, n_cells × n_q, 6)
-            c, ξ, gap (negative in penetration), weight (a length) and the normal out of the slave.
+            Six numbers a point: c, ξ, gap (negative in penetration), weight (a length), normal out of the slave.
         """
         return _points(x, *self._arguments(interface, cells))
 
@@ -201,6 +205,10 @@ class Quadrature:
 
         Parameters
         ----------
+        interface : Interface
+            The meshes.
+        cells : Cells
+            The cells that the pairing holds.
         x : FloatArray, shape (n_nodes, 2)
             Positions.
 

@@ -80,10 +80,12 @@ def vts_ppt_lm(
     ----------
     penalty : float
         Scale c > 0 of the decision λ − c g ≥ 0, force per length per length. No solution depends on it.
+    n : int
+        As for `vts_ppt` or `vts_ppt_balanced`.
     transmission : str
         "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
-    n, free_end, tau : int or str or float
-        As for `vts_ppt` or `vts_ppt_balanced`; an empty `free_end` is the default of the one chosen.
+    free_end, tau : str or float
+        As for `vts_ppt` or `vts_ppt_balanced`; an empty `free_end` is the default of the chosen transmission.
 
     References
     ----------

@@ -227,9 +227,11 @@ def vts_ppt_balanced(
 
     Parameters
     ----------
+    penalty, n : float or int
+        As for `vts_ppt`.
     area : str
         "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    penalty, n, free_end, tau : float or int or str
+    free_end, tau : str or float
         As for `vts_ppt`; `free_end` is "cover" by default.
 
     References

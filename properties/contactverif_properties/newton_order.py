@@ -183,7 +183,7 @@ def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[floa
         The slope. Infinite where even the longest distance ends at the floor: one step is exact. NaN where there are
         too few distances, or where the slope is below 2 and still rises towards it as the distances fall.
     rate : float
-        after/before at the nearest distance.
+        The ratio after/before at the nearest distance.
     """
     if not len(before):
         return np.nan, np.nan

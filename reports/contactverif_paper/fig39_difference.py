@@ -44,7 +44,7 @@ class Difference:
 
     @property
     def words(self) -> str:
-        """Its range."""
+        """The range of the differences, in words."""
         return f"{number(float(self.values.min()), 2)} to {number(float(self.values.max()), 2)}"
 
 

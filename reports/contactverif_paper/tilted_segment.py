@@ -26,7 +26,7 @@ def tilted_pair(theta: float, master: Sequence[float]) -> tuple[Interface, Float
     theta : float
         The tilt, rad.
     master : Sequence[float]
-        x of the master's nodes, ascending. The slave has unit length and begins at x = 0.
+        The x of the master's nodes, ascending. The slave has unit length and begins at x = 0.
     """
     chain = np.column_stack([master[::-1], np.zeros(len(master))])
     reference = np.array([[0.0, 0.0], [1.0, 0.0]])

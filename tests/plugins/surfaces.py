@@ -14,7 +14,7 @@ DEPTH = 1 / 8
 
 
 def make_bent(seed: int) -> tuple[Interface, Any]:
-    """A bent, tilted slave pressed into a bent master, with overhang on either side: the interface and z."""
+    """Return a bent, tilted slave pressed into a bent master, with overhang on either side: the interface and z."""
     random = np.random.default_rng(seed)
     chains = []
     for _ in range(2):
@@ -42,6 +42,6 @@ def make_flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.
 
 
 def contact_forces(formulation: Any, interface: Interface, z: Any) -> Any:
-    """Forces (n_nodes, 2) by which contact pushes the nodes."""
+    """Return the forces (n_nodes, 2) by which contact pushes the nodes."""
     residual = formulation.residual(interface, formulation.pair(interface, z), z)
     return -residual[: interface.n_unknowns].reshape(-1, 2)

@@ -21,14 +21,14 @@ MIDPOINT = Quadrature.gauss(1, current=True)
 
 
 def cells_at(interface: Interface, z: Any, averaged: bool = False) -> tuple[Cells, Any]:
-    """The cells, and the point in the middle of each, (n_cells, 6)."""
+    """Return the cells, and the point in the middle of each, (n_cells, 6)."""
     x = np.array(z).reshape(-1, 2)
     cells = Cells.find(interface, x, averaged)
     return cells, MIDPOINT.points(interface, cells, x[None])[0]
 
 
 def in_two_chains(slave: Any, *masters: Any) -> Interface:
-    """A slave chain over several master chains, all open."""
+    """Return a slave chain over several master chains, all open."""
     sizes = [len(chain) for chain in (slave, *masters)]
     firsts = np.cumsum([0, *sizes])
     segments = [

@@ -46,7 +46,7 @@ def make(name: str, **options: Any) -> Any:
 
 
 def with_random_multipliers(formulation: Any, seed: int) -> tuple[Interface, Any]:
-    """A bent scene, half of its multipliers negative, so that some points let go."""
+    """Return a bent scene, half of its multipliers negative, so that some points let go."""
     interface, z = make_bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)

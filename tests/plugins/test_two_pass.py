@@ -34,7 +34,7 @@ def make_two_pass(name: str, **options: Any) -> Any:
 
 
 def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
-    """A bent scene, with random multipliers where there are any."""
+    """Return a bent scene, with random multipliers where there are any."""
     interface, z = make_bent(seed)
     multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
     return interface, np.append(z, multipliers)

@@ -70,7 +70,7 @@ class Springs(Handmade):
 
 
 def subject(plugin: Callable[..., Any], **options: Any) -> Subject:
-    """A formulation on trial: `plugin(**options)` with the penalty as an attribute."""
+    """Return a formulation on trial: `plugin(**options)` with the penalty as an attribute."""
 
     def make(*, penalty: float) -> Any:
         formulation = plugin(**options)
