@@ -39,6 +39,9 @@ class Case:
         The seed of everything random that the property does with the case, such as directions of a derivative.
     name : str
         The name of the case, if it has one (``"c"``, ``"c-prime"``); else empty.
+    kind : str
+        The kind of situation that the strategy made, in words (``"convex vertex"``), so that a run can count how many
+        cases of each kind it judged; empty where a strategy makes no kinds.
     n_multipliers : int
         The number of multipliers in z. A case from a strategy or a report has none; the harness puts those of a
         formulation behind the positions.
@@ -68,6 +71,7 @@ class Case:
     seed: int = 0
     name: str = ""
     n_multipliers: int = 0
+    kind: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "z", self._check_state())
@@ -149,6 +153,7 @@ class Case:
             "penalty": self.penalty,
             "seed": self.seed,
             "name": self.name,
+            "kind": self.kind,
         }
         arrays |= {_PREFIX + name: values for name, values in self.parameters.items()}
         return {name: np.asarray(values) for name, values in arrays.items()}
@@ -181,6 +186,7 @@ class Case:
             parameters,
             int(np.asarray(arrays["seed"])),
             str(np.asarray(arrays["name"])),
+            kind=str(np.asarray(arrays.get("kind", ""))),
         )
 
 

@@ -154,11 +154,14 @@ _VALUES_OF_TRAITS: dict[str, tuple[object, ...]] = {
     "conserves_moment": (True, False, None),
     "continuity": ("C0", "C1", None),
     "area": ("reference", "current", None),
+    "gap": ("closest point", "slave normal", "cells", None),
+    "translation_stable": (True, False, None),
     "penalty": ("nodal", "distributed", None),
     "enforcement": ("penalty", "multiplier", "barrier"),
     "independent_multipliers": (True, False, None),
     "batched": (True, False),
     "takes_complex": (True, False),
+    "takes_longdouble": (True, False),
 }
 
 
@@ -189,6 +192,15 @@ class Traits:
     area : Literal['reference', 'current'] | None
         The configuration in which areas of competence are measured. They add up to the slave's length there, so that a
         uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass).
+    gap : Literal['closest point', 'slave normal', 'cells'] | None
+        The rule by which a contact point finds its master segment and measures its gap. ``"closest point"``: the
+        nearest closed segment, along that segment's normal. ``"slave normal"``: the segment that the line through the
+        point along the normal of its slave segment meets, along that line. ``"cells"``: as ``"slave normal"``, at points
+        of the cells between slave nodes and projected master nodes.
+    translation_stable : bool | None
+        An exact translation of the whole state, however far, changes forces and tangent by no more than rounding the
+        positions relative to one another would. Kernels that take differences of nodes first are; kernels that round a
+        point at its distance from the origin are not. ``None`` promises nothing: such kernels are common and not wrong.
     penalty : Literal['nodal', 'distributed'] | None
         The unit of the penalty: ``"nodal"`` is force per length, ``"distributed"`` is force per length per length of
         penetration. For multipliers it says what a multiplier is: a nodal force, or a pressure.
@@ -202,6 +214,8 @@ class Traits:
         ``residual`` takes a batch of states, z (..., n_unknowns), in one call. Otherwise the harness loops.
     takes_complex : bool
         ``residual`` takes complex positions, so that the harness may use a complex step.
+    takes_longdouble : bool
+        ``residual`` takes positions in ``numpy.longdouble`` and computes in that precision.
     witnesses : Mapping[str, str]
         ``{property id: name of a case}`` for each promise "does not". The case always runs. The beginning of an id
         stands for all ids below it: ``"patch"`` is the witness of ``"patch.flat.solve"`` too. A property that solves
@@ -234,12 +248,15 @@ class Traits:
     conserves_moment: bool | None = None
     continuity: Literal["C0", "C1"] | None = None
     area: Literal["reference", "current"] | None = None
+    gap: Literal["closest point", "slave normal", "cells"] | None = None
+    translation_stable: bool | None = None
     penalty: Literal["nodal", "distributed"] | None = None
     enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
     independent_multipliers: bool | None = None
     dimensions: tuple[int, ...] = (2,)
     batched: bool = False
     takes_complex: bool = False
+    takes_longdouble: bool = False
     witnesses: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
 
