@@ -154,7 +154,7 @@ _VALUES_OF_TRAITS: dict[str, tuple[object, ...]] = {
     "conserves_moment": (True, False, None),
     "continuity": ("C0", "C1", None),
     "area": ("reference", "current", None),
-    "gap": ("closest point", "slave normal", "cells", None),
+    "gap": ("closest point", "slave normal", "cells", "cells and nodes", None),
     "translation_stable": (True, False, None),
     "penalty": ("nodal", "distributed", None),
     "enforcement": ("penalty", "multiplier", "barrier"),
@@ -192,11 +192,15 @@ class Traits:
     area : Literal['reference', 'current'] | None
         The configuration in which areas of competence are measured. They add up to the slave's length there, so that a
         uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass).
-    gap : Literal['closest point', 'slave normal', 'cells'] | None
-        The rule by which a contact point finds its master segment and measures its gap. ``"closest point"``: the
-        nearest closed segment, along that segment's normal. ``"slave normal"``: the segment that the line through the
-        point along the normal of its slave segment meets, along that line. ``"cells"``: as ``"slave normal"``, at points
-        of the cells between slave nodes and projected master nodes.
+    gap : Literal['closest point', 'slave normal', 'cells', 'cells and nodes'] | None
+        The rule by which a contact point gets its master segment, ξ, normal and gap. ``"closest point"``: the nearest
+        closed master segment, ξ and gap along that segment's normal. ``"slave normal"``: the line through the point
+        along the normal of its slave segment; of the master segments that face the slave (their tangents run against
+        each other) and that this line meets, the nearest; the gap along the line, and the normal out of the master is
+        the slave segment's, reversed. ``"cells"``: the same, but the segment is chosen once for each cell, the overlap
+        of a slave with a master segment seen along the slave's normal; the nearest in the middle of its overlap. A
+        weighted node has its own normal and segment by this rule, but the mean gap of its cells. ``"cells and nodes"``:
+        as ``"cells"``, but pressures and contact follow from gaps of the slave nodes by ``"closest point"``.
     translation_stable : bool | None
         An exact translation of the whole state, however far, changes forces and tangent by no more than rounding the
         positions relative to one another would. Kernels that take differences of nodes first are; kernels that round a
@@ -248,7 +252,7 @@ class Traits:
     conserves_moment: bool | None = None
     continuity: Literal["C0", "C1"] | None = None
     area: Literal["reference", "current"] | None = None
-    gap: Literal["closest point", "slave normal", "cells"] | None = None
+    gap: Literal["closest point", "slave normal", "cells", "cells and nodes"] | None = None
     translation_stable: bool | None = None
     penalty: Literal["nodal", "distributed"] | None = None
     enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
@@ -290,12 +294,16 @@ class Traits:
             )
 
 
+def _false() -> BoolArray:
+    return np.zeros((), dtype=np.bool_)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPoints:
     """The points at which a formulation looks for contact, and what it finds there.
 
     `Formulation.contact_points` returns them, for pictures and for properties that judge gaps and pressures. A number
-    that means nothing for a formulation is NaN; an integer is −1.
+    that means nothing for a formulation is NaN; an integer is −1. A point with a pressure has a normal.
 
     Attributes
     ----------
@@ -321,6 +329,15 @@ class ContactPoints:
         True where the point is in contact.
     area_from, area_to : FloatArray, shape (n_points,)
         The two ends of the area of competence on the slave segment, measured as `c`.
+    weighted : BoolArray, shape (n_points,), optional
+        False for a point: its gap is measured where it is, and its pressure acts there. True for a weighted node, as a
+        mortar method has them: gap and pressure are means over the shape of the node, and `weight` is ∫ of the shape.
+        One value stands for all points; False by default.
+    on_master : BoolArray, shape (n_points,), optional
+        True for a point of a second pass, which lies on the master and looks for the slave. All other fields of such a
+        point have the roles exchanged: `slave_segment` is the number of the master segment that carries it,
+        `master_segment` that of the slave segment opposite, and the normal points out of the slave body. One value
+        stands for all points; False by default.
 
     Raises
     ------
@@ -340,14 +357,19 @@ class ContactPoints:
     active: BoolArray
     area_from: FloatArray
     area_to: FloatArray
+    weighted: BoolArray = field(default_factory=_false)
+    on_master: BoolArray = field(default_factory=_false)
 
     def __post_init__(self) -> None:
-        dtypes = {"slave_segment": np.int64, "master_segment": np.int64, "active": np.bool_}
+        dtypes: dict[str, type[np.generic]] = dict.fromkeys(("slave_segment", "master_segment"), np.int64)
+        dtypes |= dict.fromkeys(("active", "weighted", "on_master"), np.bool_)
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
         for entry in fields(self):
             raw, dtype = np.asarray(getattr(self, entry.name)), dtypes.get(entry.name, np.float64)
             if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # Otherwise 0.7 would become segment 0.
                 raise MisuseError(f"ContactPoints.{entry.name}", f"dtype {raw.dtype}", np.dtype(dtype).name)
+            if raw.ndim == 0 and entry.name in ("weighted", "on_master"):
+                raw = np.full(n_points, raw)
             values: NDArray[Any] = freeze(raw, dtype)
             n_axes = 2 if entry.name in ("position", "normal") else 1
             if values.ndim != n_axes or len(values) != n_points:
@@ -357,6 +379,10 @@ class ContactPoints:
                     f"({n_points}, dim)" if n_axes == 2 else f"({n_points},)",
                 )
             object.__setattr__(self, entry.name, values)
+
+    def select(self, selection: BoolArray | IntArray) -> ContactPoints:
+        """Return some of the points, selected by mask (n_points,) or by number."""
+        return ContactPoints(**{entry.name: getattr(self, entry.name)[selection] for entry in fields(self)})
 
 
 class ResidualOnly(Protocol):

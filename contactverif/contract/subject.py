@@ -215,11 +215,16 @@ class CheckedFormulation:
         points = _call_plugin("contact_points", self.plugin.contact_points, interface, pairing, freeze(z, np.float64))
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
-        for name, surface in (("slave_segment", interface.slave), ("master_segment", interface.master)):
-            numbers = getattr(points, name)
-            if numbers.size and not -1 <= numbers.min() <= numbers.max() < len(surface):
-                outlier = numbers.min() if numbers.min() < -1 else numbers.max()
-                raise ContractError(f"contact_points: {name} {outlier}; needed −1 to {len(surface) - 1}")
+        counts = np.array([len(interface.slave), len(interface.master)])
+        for name, role in (("slave_segment", 0), ("master_segment", 1)):
+            numbers, limits = (
+                getattr(points, name),
+                counts[role ^ points.on_master],
+            )  # A second pass exchanges the roles.
+            outliers = np.flatnonzero((numbers < -1) | (numbers >= limits))
+            if len(outliers):
+                first = outliers[0]
+                raise ContractError(f"contact_points: {name} {numbers[first]}; needed −1 to {limits[first] - 1}")
         return points
 
     def _check_size(self, interface: Interface, z: Array) -> None:

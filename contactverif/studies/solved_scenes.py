@@ -127,7 +127,7 @@ def _contact(
         points = formulation.contact_points(interface, pairing, z)
     except ContractError as error:
         return forces, None, str(error)
-    is_point = points.slave_segment >= 0
+    is_point = (points.slave_segment >= 0) & ~points.on_master
     area = np.column_stack([points.area_from, points.area_to])
     pressures = PointPressures(
         points.slave_segment[is_point], points.c[is_point], area[is_point], points.pressure[is_point]

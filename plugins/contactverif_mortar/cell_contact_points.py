@@ -63,8 +63,9 @@ def at_nodes(
 ) -> ContactPoints:
     """Return the slave nodes as contact points, with ∫N_j, weighted gap and nodal pressure.
 
-    A node is measured against the master segment that it sees itself. Where two cells meet there, that is the one
-    behind it along the slave. A node that overhangs is measured against none (−1).
+    A node has the master segment that it sees itself. Where two cells meet there, that is the one behind it along the
+    slave. A node that overhangs sees none (−1): it has the normal at the near end of the cell that begins beside it,
+    and a node without such a cell has NaN.
 
     Parameters
     ----------
@@ -85,13 +86,19 @@ def at_nodes(
         numbers = interface.slave.segments[:, end]
         carrier[numbers], place[numbers] = np.arange(len(numbers)), 2.0 * end - 1
     master, xi, normal = np.full(n_nodes, -1), np.full(n_nodes, np.nan), np.full((n_nodes, 2), np.nan)
-    for end, c in ((1, 1.0), (0, -1.0)):
-        at_end = Quadrature(np.array([c]), np.ones(1), current=True)
-        here = np.flatnonzero(~(cells.cut_high if end else cells.cut_low))  # cells that end at the node
-        number = interface.slave.segments[cells.slave[here], end]
-        carrier[number], place[number] = cells.slave[here], c
-        ends = at_end.points(interface, cells.select(here), x[None])[0]
-        master[number], xi[number], normal[number] = cells.master[here], ends[:, XI], -ends[:, NORMAL_X:]
+    for facing in (False, True):
+        for end, c in ((1, 1.0), (0, -1.0)):
+            at_end = Quadrature(np.array([c]), np.ones(1), current=True)
+            first = np.diff(cells.slave, prepend=-1) != 0  # Cells are in the order in which one meets them.
+            outermost = np.append(first[1:], True)[: len(first)] if end else first
+            cut = cells.cut_high if end else cells.cut_low
+            here = np.flatnonzero(~cut if facing else outermost)
+            number = interface.slave.segments[cells.slave[here], end]
+            carrier[number], place[number] = cells.slave[here], c
+            ends = at_end.points(interface, cells.select(here), x[None])[0]
+            normal[number] = -ends[:, NORMAL_X:]
+            if facing:
+                master[number], xi[number] = cells.master[here], ends[:, XI]
     undefined = np.full(n_nodes, np.nan)
     return ContactPoints(
         slave_segment=carrier,
@@ -106,4 +113,5 @@ def at_nodes(
         active=active,
         area_from=undefined,
         area_to=undefined,
+        weighted=np.ones(n_nodes, dtype=np.bool_),
     )

@@ -201,6 +201,7 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
             conserves_force=True,
             conserves_moment=True,
             area="current" if current else "reference",
+            gap="cells and nodes",
             penalty="distributed",
             batched=True,
             takes_complex=True,

@@ -244,6 +244,7 @@ def _traits(area: str, normals: str, dual: bool) -> Traits:
         # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
         continuity=None if choose("normals", normals, NORMALS) else "C0",
         area="current" if choose("area", area, AREAS) else "reference",
+        gap=None if choose("normals", normals, NORMALS) else "cells",
         penalty="distributed",
         batched=True,
         takes_complex=True,

@@ -111,6 +111,7 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
             conserves_moment=True,
             continuity="C0",
             area="current" if choose("area", area, AREAS) else "reference",
+            gap="cells",
             penalty="distributed",
             batched=True,
             takes_complex=True,

@@ -43,6 +43,7 @@ _PRINTED = Traits(
     conserves_force=False,
     conserves_moment=False,
     area="current",
+    gap="closest point",
     penalty="distributed",
     batched=True,
     takes_complex=True,

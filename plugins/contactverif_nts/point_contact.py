@@ -259,6 +259,7 @@ def _traits(patch_witness: str, penalty: str, area_from: int | None, symmetric: 
         conserves_force=True,
         conserves_moment=True,
         area=areas[area_from],  # type: ignore[arg-type]
+        gap="closest point",
         penalty=penalty,  # type: ignore[arg-type]
         batched=True,
         takes_complex=True,

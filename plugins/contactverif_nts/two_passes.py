@@ -95,29 +95,16 @@ class TwoPass:
     def _contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> ContactPoints:
         """Return the points of both passes, each with the gap, area and pressure of its own pass.
 
-        The points of the second pass lie on the master: `slave_segment` is −1, `c` and the ends of areas are NaN, and
-        `master_segment`, `xi` and `position` say where a point is. Their normal is the one out of the slave, reversed.
-        The forces pressure × weight of both passes add up.
+        The points of the second pass lie on the master, and their roles are exchanged (`on_master`). The forces
+        pressure × weight of both passes add up.
         """
         first, second = (
             self._inner.contact_points(each.interface, each.part(pairing), z[each.places])
             for each in self._passes(interface)
         )
-        meaningless = np.full_like(second.c, np.nan)
-        on_master = replace(
-            second,
-            slave_segment=np.full_like(second.slave_segment, -1),
-            master_segment=second.slave_segment,
-            xi=(1 + second.c) / 2,
-            normal=-second.normal,
-            c=meaningless,
-            area_from=meaningless,
-            area_to=meaningless,
-        )
+        second = replace(second, on_master=~second.on_master)
         names = [entry.name for entry in fields(ContactPoints)]
-        return ContactPoints(
-            **{name: np.concatenate([getattr(first, name), getattr(on_master, name)]) for name in names}
-        )
+        return ContactPoints(**{name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names})
 
     def _passes(self, interface: Interface) -> tuple[Pass, Pass]:
         """Return both passes. The last ones are kept, because exchanging the roles costs far more than a residual."""

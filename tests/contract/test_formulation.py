@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import MISSING, FrozenInstanceError, fields
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,8 @@ def test_no_traits_promise_nothing() -> None:
 
 def points(**changed: Any) -> ContactPoints:
     """Two points of contact, with what is changed."""
-    whole: dict[str, Any] = {entry.name: np.array([0.5, np.nan]) for entry in fields(ContactPoints)}
+    required = [entry.name for entry in fields(ContactPoints) if entry.default_factory is MISSING]
+    whole: dict[str, Any] = {name: np.array([0.5, np.nan]) for name in required}
     whole |= {"slave_segment": np.array([0, 0]), "master_segment": np.array([1, -1]), "active": np.array([True, False])}
     whole |= {"position": np.zeros((2, 2)), "normal": np.ones((2, 2))}
     return ContactPoints(**(whole | changed))
@@ -111,6 +112,14 @@ def test_contact_points_are_read_only_and_may_be_meaningless() -> None:
     assert whole.active.dtype == np.bool_
     with pytest.raises(ValueError, match="read-only"):
         whole.gap[0] = 1
+
+
+def test_points_lie_on_the_slave_and_are_no_means_unless_they_say_so() -> None:
+    assert not points().weighted.any()
+    assert not points().on_master.any()
+    assert points(weighted=True, on_master=True).weighted.tolist() == [True, True]
+    second = points(weighted=np.array([False, True]), on_master=np.array([False, True])).select(np.array([1]))
+    assert (second.weighted.tolist(), second.on_master.tolist(), second.c.shape) == ([True], [True], (1,))
 
 
 def test_no_contact_points() -> None:
@@ -131,6 +140,8 @@ def test_no_contact_points() -> None:
         ({"master_segment": np.array([0.7, 1.0])}, "ContactPoints.master_segment: found dtype float64; needed int64"),
         ({"active": np.array([0.3, 1.0])}, "ContactPoints.active: found dtype float64; needed bool"),
         ({"gap": np.array([1j, 0])}, "ContactPoints.gap: found dtype complex128; needed float64"),
+        ({"weighted": np.array([True])}, r"ContactPoints.weighted: found shape \(1,\); needed \(2,\)"),
+        ({"on_master": 0.0}, "ContactPoints.on_master: found dtype float64; needed bool"),
     ],
 )
 def test_broken_contact_points(changed: dict[str, Any], message: str) -> None:

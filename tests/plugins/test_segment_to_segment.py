@@ -232,7 +232,10 @@ def test_contact_points_add_up_to_the_forces(name: str, options: dict[str, str])
         assert np.all(points.pressure[~points.active] == 0)
         if "mortar" in name:
             assert len(points.gap) == interface.n_slave_nodes
+            assert points.weighted.all()
+            assert np.isfinite(points.normal[points.pressure > 0]).all()  # A node that overhangs has one too.
             continue
+        assert not points.weighted.any()
         pushes = (points.pressure * points.weight)[:, None] * points.normal
         slave = contact_forces(formulation, interface, z)[: interface.n_slave_nodes].sum(axis=0)
         assert pushes.sum(axis=0) == pytest.approx(slave, abs=1e-14)

@@ -17,6 +17,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
 from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.passes import split_passes
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
 
@@ -117,7 +118,17 @@ def find_kink(
     """
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, pairing, case.z)
-        margin = kink_margin(case.interface, case.z, points.slave_segment, points.c, points.area_from, points.area_to)
+        margin = min(
+            kink_margin(
+                each.interface,
+                each.z,
+                each.points.slave_segment,
+                each.points.c,
+                each.points.area_from,
+                each.points.area_to,
+            )
+            for each in split_passes(case, points)
+        )
         if margin <= np.sqrt(2) * reach:  # The reach is of a coordinate, the margin of a node.
             return f"a kink: a decision hangs on {margin:.2g}, no more than nodes may move"
         return ""

@@ -117,17 +117,20 @@ def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: fl
 
 
 def beside_master(case: Case, points: ContactPoints) -> BoolArray:
-    """Return which points (n_points,) of an overhanging slave lie beside the master, or within roundoff of its end.
+    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end.
 
-    A point that names no place on the slave does not lie beside the master.
+    A point that names no place on its surface does not lie beside the other. A point of a second pass lies on the
+    master, and the other surface is the slave.
     """
+    beside = np.zeros(len(points.c), bool)
     if not overhangs(case):
-        return np.zeros(len(points.c), bool)
-    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
-    ends = slave[
-        case.interface.slave.segments[points.slave_segment]
-    ]  # Segment −1 gives nonsense, which the last line drops.
-    place = (1 - points.c) / 2 * ends[:, 0] + (1 + points.c) / 2 * ends[:, 1]
+        return beside
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
-    beside: BoolArray = (place < master.min() + rounding) | (place > master.max() - rounding)
-    return beside & (points.slave_segment >= 0)
+    interface, along = case.interface, case.parameters["along"]
+    slave, master = np.split(along, [interface.n_slave_nodes])
+    for surface, other, second in ((interface.slave, master, False), (interface.master, slave, True)):
+        here = (points.on_master == second) & (points.slave_segment >= 0)
+        ends, c = along[surface.segments[points.slave_segment[here]]], points.c[here]
+        place = (1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1]
+        beside[here] = (place < other.min() + rounding) | (place > other.max() - rounding)
+    return beside
