@@ -24,7 +24,7 @@ def failing_examples(run: Run) -> list[Counterexample]:
 def counterexample_text(example: Counterexample, report: Path | None) -> Text:
     """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
     row, outcome = example.row, example.outcome
-    description = f"the case {outcome.case.name}" if example.is_witness else "the smallest case found"
+    description = f"the case {outcome.case.name}" if outcome.case.name else "the smallest case found"
     lines = [
         f"{row.formulation}, {row.property_id}: {row.result}, {description}",
         *(f"    {line}" for line in _numbers(row.info, outcome)),

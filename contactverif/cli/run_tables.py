@@ -22,7 +22,7 @@ _COLUMNS = ("property", "promise", "result", "judged", "closest", "tolerance")
 _RIGHT_ALIGNED = _COLUMNS[3:]
 _LEGEND = {
     "promise": "what the formulation states about itself: it passes, it fails, or – nothing",
-    "judged": "random cases that could be decided, of those planned",
+    "judged": "cases that could be decided, of those planned",
     "closest": "of all measured numbers the one nearest to its tolerance, or furthest beyond it",
 }
 _MEANINGS = {  # The results that are explained below the table where they occur in it.
@@ -35,6 +35,7 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
     Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
 }
+_MOST_NAMES = 6  # Named cases that a remark lists.
 _COUNTED = {  # {result: (words for one, words for several)} in the last line
     Result.BROKEN_PROMISE: ("broken promise", "broken promises"),
     Result.CRASHED: ("crash", "crashes"),
@@ -134,8 +135,11 @@ def _entries(row: Row) -> tuple[str, ...]:
 
 
 def _quantity(row: Row) -> str:
-    """Return the name of the closest number, where a property measures several."""
-    return row.closest.number.quantity.name if row.closest is not None and len(row.info.quantities) > 1 else ""
+    """Return the name of the closest number, where a property measures several, and of its case, if that has one."""
+    if row.closest is None:
+        return ""
+    quantity = row.closest.number.quantity.name if len(row.info.quantities) > 1 else ""
+    return " in ".join(text for text in (quantity, row.closest_name) if text)
 
 
 def _remark(row: Row) -> str:
@@ -144,9 +148,17 @@ def _remark(row: Row) -> str:
         row.unexpected if row.result is Result.BROKEN_PROMISE else "",
         f"known: {row.known}" if row.known else "",
         row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
+        f"fails in {_list(row.failing_names)}" if row.failing_names else "",
         f"{row.undecided} undecided" if row.undecided else "",
+        f"undecided in {_list(row.undecided_names)}" if row.undecided_names else "",
     ]
     return "; ".join(part for part in parts if part)
+
+
+def _list(names: Sequence[str]) -> str:
+    """Return the first names of a finite list of cases, and how many more there are."""
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
 
 
 def _align(cells: Sequence[str], widths: Sequence[int]) -> str:

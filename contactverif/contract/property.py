@@ -155,7 +155,9 @@ class Property(PropertyInfo):
     ----------
     cases : Callable[[Any], Any]
         Makes a hypothesis strategy of `Case`. Given an interface, it makes random states on that one, or returns
-        None if the property cannot be checked there. A property of bodies is given the case of a scene instead.
+        None if the property cannot be checked there. A property of bodies is given the case of a scene instead. It may
+        return a tuple of cases instead, each with a name of its own: a finite list. All of them run, whatever the
+        number of examples, and tables and reports call each by its name.
     measure : Callable[[Case, Subject], Measurement]
         Measures one case; it raises what the plugin raises.
     promise : Callable[[Traits], bool | None]

@@ -121,13 +121,13 @@ class Row:
     reason : str
         The reason why the verdict is no pass, from the worst case.
     planned : int
-        The number of random cases that were planned.
+        The number of cases that were planned: random ones, or those of a finite list.
     outcomes : Sequence[Outcome]
-        The outcomes of the random cases, in order.
+        The outcomes of the planned cases, in order.
     witness : Outcome | None
         The outcome of the named case with which a formulation proves that it fails.
     shrunk : Outcome | None
-        The worst case after shrinking; None if no random case failed.
+        The worst case after shrinking, or the first bad one of a finite list; None if no planned case failed.
     seconds : float
         Time spent judging, shrinking excluded.
     """
@@ -169,6 +169,23 @@ class Row:
         """The number of random cases that were measured, but left open whether they pass."""
         return self.tally.verdicts.get(Verdict.UNDECIDED, 0)
 
+    def names_of(self, *verdicts: Verdict) -> tuple[str, ...]:
+        """Return the names of the cases with one of these verdicts, where cases have names, in their order."""
+        if not any(self.tally.verdicts.get(verdict, 0) for verdict in verdicts):
+            return ()
+        cases = (outcome.case_or_summary for outcome in self.outcomes if outcome.verdict in verdicts)
+        return tuple(case.name for case in cases if case.name)
+
+    @property
+    def failing_names(self) -> tuple[str, ...]:
+        """The names of the cases that fail or crash, where cases have names."""
+        return self.names_of(Verdict.FAIL, Verdict.CRASHED)
+
+    @property
+    def undecided_names(self) -> tuple[str, ...]:
+        """The names of the cases that are undecided, where cases have names."""
+        return self.names_of(Verdict.UNDECIDED)
+
     @property
     def breach(self) -> bool:
         """Return whether the plugin broke the contract somewhere, which fails a run whatever the formulation states."""
@@ -178,6 +195,13 @@ class Row:
     def closest(self) -> ClosestNumber | None:
         """The number that came closest to its tolerance, or went furthest beyond it, the witness included."""
         return self.tally.closest
+
+    @property
+    def closest_name(self) -> str:
+        """The name of the planned case with the closest number; empty if the case has none, or is the witness."""
+        if self.closest is None or self.closest.case is None:
+            return ""
+        return self.outcomes[self.closest.case].case_or_summary.name
 
     @property
     def unexpected(self) -> str:

@@ -3,6 +3,9 @@
 The planned cases are drawn first, all of them, by a function that never fails. So every formulation of a run is judged
 on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
 
+A property may have a finite list of named cases instead of a strategy. Then all of them are planned, whatever the
+number of examples, and none is shrunk: its name says what it is.
+
 Rule: the same seed gives the same cases, in pytest and on the command line, from any folder and with any other modules
 imported. Therefore every setting is spelled out here (or the settings of a user's own tests would leak in), nothing is
 stored, and `_reproducible` takes away what depends on the imported modules.
@@ -10,6 +13,7 @@ stored, and `_reproducible` takes away what depends on the imported modules.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,6 +28,9 @@ from hypothesis.statistics import collector
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+
+CaseSource = SearchStrategy[Case] | tuple[Case, ...]  # A strategy, or a finite list of named cases.
 
 # The largest number of judgements for one counterexample. Hypothesis itself stops after 500 shrinks or 300 s.
 SHRINK_CALLS = 2000
@@ -38,7 +45,7 @@ class PlannedCases:
     cases : tuple[Case, ...]
         The cases in the order in which they were drawn.
     exhausted : bool
-        Whether the strategy has no other cases, so that there may be fewer than planned.
+        Whether there are no other cases, so that there may be fewer or more than were asked for.
     """
 
     cases: tuple[Case, ...]
@@ -46,14 +53,14 @@ class PlannedCases:
 
 
 def draw_cases(
-    strategy: SearchStrategy[Case], *, seed: str, examples: int, progress: Callable[[int], None] | None = None
+    source: CaseSource, *, seed: str, examples: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
-    """Draw different cases, or all cases if the strategy has fewer.
+    """Draw different cases, or all cases if the strategy has fewer, or return the cases of a finite list.
 
     Parameters
     ----------
-    strategy : SearchStrategy[Case]
-        The strategy. A case that it filters out is not counted.
+    source : CaseSource
+        The strategy, or the finite list. A case that a strategy filters out is not counted.
     seed : str
         The same seed gives the same cases.
     examples : int
@@ -65,13 +72,21 @@ def draw_cases(
     -------
     PlannedCases
         The cases; the first is the simplest that the strategy makes.
+
+    Raises
+    ------
+    MisuseError
+        If a case of a finite list has no name, or two have the same.
     """
+    if isinstance(source, tuple):
+        _check_names([case.name for case in source])
+        return PlannedCases(source, exhausted=True)
     cases: list[Case] = []
     stopped: list[str] = []
 
     @seeded(seed)
     @_settings(examples, Phase.generate)
-    @given(strategy)
+    @given(source)
     def take(case: Case) -> None:
         cases.append(case)
         if progress is not None:
@@ -86,8 +101,16 @@ def draw_cases(
     return PlannedCases(tuple(cases), exhausted=stopped == ["nothing left to do"])
 
 
+def _check_names(names: list[str]) -> None:
+    """Check that each case of a finite list can be told from the others by its name."""
+    for name, times in Counter(names).items():
+        if not name or times > 1:
+            actual = f"{times} times {name!r}" if name else "a case without a name"
+            raise MisuseError("cases", actual, "a finite list whose cases have a name each, all different")
+
+
 def shrink(
-    strategy: SearchStrategy[Case],
+    source: CaseSource,
     *,
     seed: str,
     examples: int,
@@ -97,12 +120,12 @@ def shrink(
 ) -> None:
     """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
 
-    A formulation that answers differently each time ends the search early.
+    A formulation that answers differently each time ends the search early. Of a finite list nothing is smaller.
 
     Parameters
     ----------
-    strategy : SearchStrategy[Case]
-        The strategy of the planned cases.
+    source : CaseSource
+        The source of the planned cases.
     seed, examples : str or int
         The arguments of `draw_cases`, so that the same cases are drawn again.
     first : int
@@ -118,11 +141,13 @@ def shrink(
     Exception
         If `fails` raises it.
     """
+    if isinstance(source, tuple):
+        return
     n_drawn = n_judged = 0
 
     @seeded(seed)
     @_settings(examples, Phase.generate, Phase.shrink)
-    @given(strategy)
+    @given(source)
     def attempt(case: Case) -> None:
         nonlocal n_drawn, n_judged
         n_drawn += 1

@@ -4,6 +4,7 @@ Rules for the next editor:
 
 - All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early.
 - The cases of a property depend on the seed and the property alone, neither on the formulation nor on other properties.
+- A finite list of named cases is planned whole, whatever the number of examples.
 - Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
 """
 
@@ -17,7 +18,6 @@ from time import perf_counter
 from typing import Literal, cast
 
 import numpy as np
-from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
@@ -26,7 +26,7 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-from contactverif.run.driver import SHRINK_CALLS, PlannedCases, draw_cases, shrink
+from contactverif.run.driver import SHRINK_CALLS, CaseSource, PlannedCases, draw_cases, shrink
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
 from contactverif.scenes.named_states import named_case
@@ -202,26 +202,24 @@ class _Plan:
         """Return the seed of a property, which does not depend on the other properties of the run."""
         return f"{self.seed}/{question.id}"
 
-    def strategy(self, question: Property) -> SearchStrategy[Case] | None:
-        """Return the strategy of the cases; None if the property cannot be checked on this interface or scene."""
+    def source(self, question: Property) -> CaseSource | None:
+        """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
         if not question.bodies:
-            return cast("SearchStrategy[Case] | None", question.cases(self.interface))
+            return cast("CaseSource | None", question.cases(self.interface))
         if self.interface is not None and self.scene is None:
             return None
-        return cast("SearchStrategy[Case] | None", question.cases(self.scene))
+        return cast("CaseSource | None", question.cases(self.scene))
 
     def progress(self, subject: Subject, question: Property, phase: Phase, planned: int) -> Callable[[int], None]:
         """Return a function that reports how many cases are finished."""
         return lambda count: self.report_progress(Progress(subject.name, question.id, phase, count, planned))
 
-    def planned_cases(
-        self, strategy: SearchStrategy[Case], subject: Subject, question: Property
-    ) -> tuple[PlannedCases, int]:
+    def planned_cases(self, source: CaseSource, subject: Subject, question: Property) -> tuple[PlannedCases, int]:
         """Return the cases of the property, drawn once a run, and how many were planned."""
         if question.id not in self.cases:
             progress = self.progress(subject, question, "drawing", self.examples)
             self.cases[question.id] = draw_cases(
-                strategy, seed=self.key(question), examples=self.examples, progress=progress
+                source, seed=self.key(question), examples=self.examples, progress=progress
             )
         cases = self.cases[question.id]
         return cases, len(cases.cases) if cases.exhausted else self.examples
@@ -240,8 +238,8 @@ def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
         return replace(row, verdict=Verdict.NOT_PROVIDED, reason=f"{', '.join(sorted(missing))}: not provided")
-    strategy = plan.strategy(question)
-    if strategy is None:
+    source = plan.source(question)
+    if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
     if plan.scene is not None and row.promise is False:  # The formulation fails on some scene, not on every one.
         row = replace(row, promise=None)
@@ -249,8 +247,8 @@ def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
         witness = _witness(subject, question) if row.promise is False else None
     except MisuseError as error:
         return replace(row, verdict=Verdict.CRASHED, reason=f"traits: {error}")
-    row = _judge_all(plan, subject, question, row, strategy, witness)
-    return replace(row, shrunk=_shrink(plan, strategy, subject, question, row))
+    row = _judge_all(plan, subject, question, row, source, witness)
+    return replace(row, shrunk=_shrink(plan, source, subject, question, row))
 
 
 def _judge_all(
@@ -258,11 +256,11 @@ def _judge_all(
     subject: Subject,
     question: Property,
     row: Row,
-    strategy: SearchStrategy[Case],
+    source: CaseSource,
     witness: Case | None,
 ) -> Row:
     """Return the row with the outcomes of all planned cases, and the verdict over them."""
-    cases, planned = plan.planned_cases(strategy, subject, question)
+    cases, planned = plan.planned_cases(source, subject, question)
     progress = plan.progress(subject, question, "judging", planned)
     start = perf_counter()
     outcomes = []
@@ -304,13 +302,19 @@ def _verdict_over_all(row: Row) -> tuple[Verdict, str]:
     everything = [*row.outcomes, *([row.witness] if row.witness else [])]
     worst = max(everything, key=lambda outcome: _badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
-        return worst.verdict, worst.reason
+        return worst.verdict, _reason_with_name(row, worst)
     if row.judged < JUDGED_SHARE * row.planned:
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
     if everything and all(outcome.measurement is not None and outcome.measurement.idle for outcome in everything):
         return Verdict.NOT_JUDGED, "no case gave any force: nothing was judged"
     return Verdict.PASS, ""
+
+
+def _reason_with_name(row: Row, outcome: Outcome) -> str:
+    """Return the reason of an outcome, with the name of its case before it where a finite list has named it."""
+    name = outcome.case.name
+    return f"{name}: {outcome.reason}" if name and outcome is not row.witness else outcome.reason
 
 
 def _badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
@@ -326,10 +330,10 @@ def _badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
     return 1, max((number.ratio for number in checked_numbers(info, outcome.measurement)), default=inf)
 
 
-def _shrink(
-    plan: _Plan, strategy: SearchStrategy[Case], subject: Subject, question: Property, row: Row
-) -> Outcome | None:
+def _shrink(plan: _Plan, source: CaseSource, subject: Subject, question: Property, row: Row) -> Outcome | None:
     """Return the smallest case that fails as badly as the worst random one; None if no random case failed.
+
+    Of a finite list of named cases it is the first that fails as badly.
 
     It crashes if something crashed, and breaks the contract if something did. Of failures by a number it must be a
     clear one, half-way on a logarithmic scale between the tolerance and the worst value: the smallest case that fails
@@ -356,5 +360,5 @@ def _shrink(
         smallest = outcome
         return True
 
-    shrink(strategy, seed=plan.key(question), examples=plan.examples, first=first, fails=fails)
+    shrink(source, seed=plan.key(question), examples=plan.examples, first=first, fails=fails)
     return smallest

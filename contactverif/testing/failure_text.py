@@ -38,9 +38,8 @@ def explain(row: Row, *, command: str) -> str:
 
 def _example(row: Row, outcome: Outcome) -> list[str]:
     """Return the numbers and the drawing of a case."""
-    lines = [
-        "  The smallest case that fails:" if row.shrunk else f"  The witness {outcome.case.name}: {outcome.verdict}"
-    ]
+    name, role = outcome.case.name, "case" if row.shrunk else "witness"
+    lines = [f"  The {role} {name}: {outcome.verdict}" if name else "  The smallest case that fails:"]
     if outcome.measurement is None:
         lines.append(f"    {outcome.reason}")
     return [*lines, *_numbers(row.info, outcome), _drawing(outcome)]

@@ -13,7 +13,7 @@ from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 
-EXAMPLES = 100  # Cases of the property that is meant to catch the mutant.
+EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
 OTHERS = 10  # Cases of each other property, which fill the matrix and decide nothing.
 OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
 SEED = 0
@@ -35,8 +35,11 @@ def cases(property_id: str, seed: int = SEED, examples: int = EXAMPLES) -> tuple
     return draw_cases(question.cases(None), seed=f"{seed}/{property_id}", examples=examples).cases
 
 
-def caught_at(question: Property, subject: Subject, examples: int) -> int:
-    """Return the number of the first case that accuses the formulation of what it promised, from 1; 0 if none does."""
+def caught_at(question: Property, subject: Subject, examples: int | None) -> int:
+    """Return the number of the first case that accuses the formulation of what it promised, from 1; 0 if none does.
+
+    Only the first `examples` cases are asked, or all of them (None).
+    """
     if question.applicable(subject.traits) or question.needs - subject.provides:
         return 0
     promised = question.promise(subject.traits) is True
@@ -52,7 +55,7 @@ def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
     """Return {property id: `caught_at`} of a mutant."""
     subject = Subject(mutant.name, mutant.make)
     return {
-        question.id: caught_at(question, subject, EXAMPLES if question.id == mutant.caught_by else others)
+        question.id: caught_at(question, subject, None if question.id == mutant.caught_by else others)
         for question in properties()
     }
 

@@ -121,6 +121,30 @@ def test_where_there_are_fewer_cases_all_are_judged() -> None:
     assert sorted(map(segments, row.outcomes)) == [1, 2, 3, 4, 5]
 
 
+def test_all_cases_of_a_finite_list_are_judged_whatever_the_number_of_examples() -> None:
+    question = replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in (3, 1, 2)))
+    for examples in (1, 100):
+        row = one_row(subject(), question, examples=examples)
+        assert (row.verdict, row.planned, row.judged) == (Verdict.PASS, 3, 3)
+        assert [outcome.case.name for outcome in row.outcomes] == ["size 3", "size 1", "size 2"]
+
+
+def test_the_case_of_a_finite_list_that_fails_is_called_by_its_name_and_not_shrunk() -> None:
+    question = replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in (3, 1, 2)))
+    row = one_row(subject(from_size(2)), question)
+    assert (row.verdict, row.failing_names) == (Verdict.FAIL, ("size 3", "size 2"))
+    assert row.reason == "size 3: error 1, at most 1e-06"
+    assert row.shrunk is row.outcomes[0]
+    assert row.closest_name == "size 3"
+
+
+@pytest.mark.parametrize(("names", "message"), [(("a", ""), "a case without a name"), (("a", "a"), "2 times 'a'")])
+def test_the_cases_of_a_finite_list_need_names_of_their_own(names: tuple[str, ...], message: str) -> None:
+    question = replace(ZERO, cases=lambda _: tuple(a_case(1, name) for name in names))
+    with pytest.raises(MisuseError, match=f"cases: found {message}"):
+        one_row(subject(), question)
+
+
 def test_cases_that_could_not_be_made_count_as_not_judged() -> None:
     question = replace(ZERO, cases=lambda _: st.integers(0, 10**9).filter(lambda size: size < 0).map(a_case))
     row = one_row(subject(), question, examples=100)
