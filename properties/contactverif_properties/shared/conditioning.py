@@ -1,0 +1,203 @@
+"""Condition numbers of a residual, and errors counted in roundings of the input.
+
+A double holds a position relative to the centre of the interface to u |x − x̄| (u = 2⁻⁵³). Such a rounding of all
+nodes b changes the force on node a by up to u Σ_b ‖K_ab‖ |x_b − x̄|, where K is the derivative of the residual. No
+formulation can do better, so an error is divided by this, and the quotient is called ω:
+
+    ω = max_a |ΔR_a| / (u (Σ_b ‖K_ab‖ |x_b − x̄| + Σ_j ‖K_aj‖ |λ_j| + max_c |R_c|))
+
+Here a is a node or a constraint row, and ΔR_a a vector or a number. ‖·‖ is the Frobenius norm of a block, and λ_j a
+multiplier. The last term allows for the rounding of the forces themselves; for a constraint row it is the largest
+constraint row. A stable kernel has ω of order 1 at any offset, gap and ratio of lengths. In a kernel that rounds at its
+distance from the origin, ω grows like that distance over the diameter of the interface.
+
+Rules for the next editor:
+
+- K is a difference quotient of the residual, on a frozen pairing if there is one, and never the plugin's tangent. It
+  is a condition number: a few correct digits are enough.
+- Ask for K at the state near the origin. Far from it, a difference quotient has no correct digits.
+- No absolute length, gap or offset stands in a formula here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Quantity
+from contactverif.contract.subject import CheckedFormulation
+from contactverif_properties.shared.roundoff import ratio
+
+MOST_ROUNDINGS = 16.0  # The tolerance of ω; right kernels in other ways of writing reach 3.
+FORCES_REASON = "Rounding the positions relative to one another changes forces as much; no formulation can do better."
+TANGENT_REASON = "Rounding the ends of a segment relative to one another turns the segment by uD/ℓ."
+
+
+def forces_quantity(name: str) -> Quantity:
+    """Return a quantity for an ω of the residual."""
+    return Quantity(name, "1", "16 (times what rounding the positions relative to their centroid does)", FORCES_REASON)
+
+
+def tangent_quantity(name: str) -> Quantity:
+    """Return a quantity for an error of the tangent in units of u max|K| D/ℓ."""
+    return Quantity(name, "1", "16 (times u max|K| D/ℓ)", TANGENT_REASON)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conditioning:
+    """The size of the answers at a state, and what a relative rounding of the whole input may change in them.
+
+    Attributes
+    ----------
+    reach : FloatArray, shape (n_nodes + n_multipliers,)
+        For each node, and behind them for each constraint row: Σ_b ‖K_ab‖ |x_b − x̄| + Σ_j ‖K_aj‖ |λ_j| + floor, in the
+        unit of the row. A relative rounding u of the input changes the row by u times this at most.
+    floor : FloatArray, shape (n_nodes + n_multipliers,)
+        The largest force max_c |R_c| for a node; the largest constraint row for a constraint row.
+    """
+
+    reach: FloatArray
+    floor: FloatArray
+
+    def worst_row(self, error: Array) -> WorstRow:
+        """Return the row whose error is the most roundings.
+
+        Parameters
+        ----------
+        error : Array, shape (n_unknowns + n_multipliers,)
+            The error of a residual.
+
+        Returns
+        -------
+        WorstRow
+            The row, as numbers without a unit.
+        """
+        n_nodes = len(error) - len(self.reach)  # The error has two entries a node, the reach has one.
+        sizes = _row_sizes(error, n_nodes)
+        counts = np.array([ratio(size, UNIT_ROUNDOFF * reach) for size, reach in zip(sizes, self.reach, strict=True)])
+        row = int(np.argmax(counts))
+        floor = float(self.floor[row])
+        return WorstRow(float(counts[row]), ratio(sizes[row], floor), ratio(float(self.reach[row]), floor))
+
+    def count_roundings(self, error: Array) -> float:
+        """Return ω of an error of the residual (n_unknowns + n_multipliers,), a number without a unit."""
+        return self.worst_row(error).roundings
+
+
+@dataclass(frozen=True, slots=True)
+class WorstRow:
+    """The row of a residual with the largest ω.
+
+    The three numbers belong together: error = roundings × u × condition.
+
+    Attributes
+    ----------
+    roundings : float
+        The error in roundings, ω.
+    error : float
+        The error of the row over the largest force, or over the largest constraint row.
+    condition : float
+        The condition number κ of the row: the relative change of the row by a relative change of the whole input.
+        It is at least 1.
+    """
+
+    roundings: float
+    error: float
+    condition: float
+
+
+def measure_conditioning(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, forces: Array
+) -> Conditioning:
+    """Measure what roundings of the input may change in each row of a residual.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin, with its multipliers if any.
+    formulation : CheckedFormulation
+        The formulation. It is called once, with a batch of two states for each unknown.
+    pairing : Pairing | None
+        The pairing of that state, which stays frozen; None for a plugin without ``pair``.
+    forces : Array, shape (n_unknowns + n_multipliers,)
+        The residual of that state.
+
+    Returns
+    -------
+    Conditioning
+        For each node and each constraint row.
+    """
+    n_nodes = case.interface.n_nodes
+    derivative = difference_quotient(case, formulation, pairing)
+    positions = case.positions
+    distances = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
+    inputs = np.concatenate([distances, np.abs(case.multipliers)])
+    sizes = _row_sizes(forces, n_nodes)
+    floor = np.concatenate([np.full(n_nodes, sizes[:n_nodes].max()), np.full(case.n_multipliers, 0.0)])
+    floor[n_nodes:] = sizes[n_nodes:].max(initial=0.0)
+    return Conditioning(_block_norms(derivative, n_nodes) @ inputs + floor, floor)
+
+
+def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
+    """Return the central difference quotient of the residual at a state on a frozen pairing.
+
+    The step of a position is ℓ (u X/ℓ)^(1/3), at which truncation and roundoff are equal, about (u X/ℓ)^(2/3) relative.
+    That of a multiplier is the largest multiplier, since the residual is affine in them.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin, with its multipliers if any.
+    formulation : CheckedFormulation
+        The formulation.
+    pairing : Pairing | None
+        The pairing, which stays frozen; None for a plugin without ``pair``, whose one-sided differences may disagree.
+
+    Returns
+    -------
+    FloatArray, shape (n, n)
+        The derivative of each entry of the residual (row) by each unknown (column), n = n_unknowns + n_multipliers.
+    """
+    n = case.interface.n_unknowns
+    shortest = case.shortest_segment
+    largest = float(np.abs(case.positions).max())
+    step = shortest * (UNIT_ROUNDOFF * max(largest / shortest, 1.0)) ** (1 / 3)
+    steps = np.full(len(case.z), step)
+    steps[n:] = np.abs(case.multipliers).max(initial=0.0) or 1.0
+    moves = np.diag(steps)
+    answers = formulation.residual(case.interface, pairing, case.z + np.stack([moves, -moves]))
+    columns: FloatArray = (answers[0] - answers[1]) / (2 * steps[:, None])
+    return columns.T
+
+
+def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray) -> float:
+    """Return how much two tangents differ, in units of u max|K| D/ℓ.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin.
+    tangent, other : FloatArray, shape (n, n)
+        The tangent there, and the one to compare.
+    """
+    turn = case.diameter / case.shortest_segment
+    return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * float(np.abs(tangent).max()) * turn)
+
+
+def _row_sizes(rows: Array, n_nodes: int) -> FloatArray:
+    """Return |R_a| of each node and |row| of each constraint row, (n_nodes + n_multipliers,)."""
+    forces = np.hypot(*np.asarray(rows[: 2 * n_nodes], dtype=np.float64).reshape(n_nodes, 2).T)
+    sizes: FloatArray = np.concatenate([forces, np.abs(rows[2 * n_nodes :]).astype(np.float64)])
+    return sizes
+
+
+def _block_norms(matrix: FloatArray, n_nodes: int) -> FloatArray:
+    """Return the Frobenius norms of the blocks of a matrix, (n_nodes + n_multipliers,) in rows and in columns."""
+    n = 2 * n_nodes
+    rows = np.vstack([np.hypot(matrix[0:n:2], matrix[1:n:2]), matrix[n:]])
+    norms: FloatArray = np.hstack([np.hypot(rows[:, 0:n:2], rows[:, 1:n:2]), np.abs(rows[:, n:])])
+    return norms
