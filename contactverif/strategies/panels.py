@@ -15,6 +15,22 @@ from contactverif.strategies.parts import Motion
 
 
 @dataclass(frozen=True, slots=True)
+class Chain:
+    """Points that segments join one after the other.
+
+    Attributes
+    ----------
+    points : FloatArray, shape (n, 2)
+        The points in walking order, the body on the left.
+    closed : bool
+        The last point is joined to the first.
+    """
+
+    points: FloatArray
+    closed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
     """One slave chain and one master chain, at rest on the lattice.
 
@@ -76,20 +92,45 @@ def assemble_panels(
     """
     offsets = _offsets(panels)
     slaves, masters, references = (
-        [getattr(panel, side) + offset for panel, offset in zip(panels, offsets, strict=True)]
+        [Chain(getattr(panel, side) + offset, panel.closed) for panel, offset in zip(panels, offsets, strict=True)]
         for side in ("slave", "master", "reference")
     )
-    n_slave, n_master = (sum(map(len, side)) for side in (slaves, masters))
-    slave, master = _chains(slaves, panels, 0), _chains(masters, panels, n_slave)
-    order = np.arange(n_slave + n_master)  # the walking number of each node
+    interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
+    current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
+    return interface, motion(current).reshape(-1), current[:, 0] * motion.scale
+
+
+def assemble_chains(
+    slaves: Sequence[Chain], masters: Sequence[Chain], references: Sequence[Chain], scale: float, shuffle: int = 0
+) -> tuple[Interface, IntArray]:
+    """Return the interface of these chains.
+
+    Parameters
+    ----------
+    slaves, masters, references : Sequence[Chain]
+        The chains of both surfaces, and those of the slave in its reference configuration; the master is where it was.
+    scale : float
+        The factor of all lengths.
+    shuffle : int
+        0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
+
+    Returns
+    -------
+    interface : Interface
+        The interface in its reference configuration, scaled.
+    order : IntArray, shape (n_nodes,)
+        The place of each node on the walk along the slave's chains, then the master's.
+    """
+    n_slave, n_master = (sum(len(chain.points) for chain in side) for side in (slaves, masters))
+    slave, master = _segments(slaves, 0), _segments(masters, n_slave)
+    order: IntArray = np.arange(n_slave + n_master)
     if shuffle:
         random = np.random.default_rng(shuffle)
         order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(n_master)])
         number = np.argsort(order)  # the number of each node on the walk
         slave, master = (random.permutation(number[side]) for side in (slave, master))
-    interface = Interface(np.vstack(references + masters)[order] * motion.scale, Surface(slave), Surface(master))
-    current = np.vstack(slaves + masters)[order]
-    return interface, motion(current).reshape(-1), current[:, 0] * motion.scale
+    nodes = np.vstack([chain.points for chain in (*references, *masters)])[order]
+    return Interface(nodes * scale, Surface(slave), Surface(master)), order
 
 
 def _offsets(panels: Sequence[Panel]) -> list[FloatArray]:
@@ -102,12 +143,12 @@ def _offsets(panels: Sequence[Panel]) -> list[FloatArray]:
     return offsets
 
 
-def _chains(chains: Sequence[FloatArray], panels: Sequence[Panel], start: int) -> IntArray:
+def _segments(chains: Sequence[Chain], start: int) -> IntArray:
+    """Return the segments (n, 2) of chains whose nodes are numbered on the walk, from `start`."""
     segments = []
-    for chain, panel in zip(chains, panels, strict=True):
-        numbers = np.arange(start, start + len(chain))
-        ends = np.roll(numbers, -1)
-        pairs = np.column_stack([numbers, ends])
-        segments.append(pairs if panel.closed else pairs[:-1])
-        start += len(chain)
+    for chain in chains:
+        numbers = np.arange(start, start + len(chain.points))
+        pairs = np.column_stack([numbers, np.roll(numbers, -1)])
+        segments.append(pairs if chain.closed else pairs[:-1])
+        start += len(chain.points)
     return np.vstack(segments)

@@ -38,6 +38,8 @@ PARAMETER_UNITS: Mapping[str, str] = {
     "direction": RATIO,
     "cosine": RATIO,
     "variant": RATIO,
+    "probe_segment": RATIO,
+    "probe_c": RATIO,
     "approach": LENGTH,
     "pressure": STRESS,
     "compliance": "m2 N-1",

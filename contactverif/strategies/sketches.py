@@ -1,0 +1,174 @@
+"""Sketches: a few segments drawn by hand, with one slave point that projects onto the master in a certain way.
+
+Rule for the next editor: a sketch stands on a lattice so coarse that `ExactTurn` moves it without rounding, even to an
+offset of 2^20. Coordinates are below 2^8 and multiples of 2^-32, so what a sketch shows exactly (a tie, a hit node)
+stays exact. Only a sketch whose kind survives rounding may set `exact` to False.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import hypot, ldexp
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.strategies.panels import Chain, assemble_chains
+from contactverif.strategies.parts import Motion, motions, penalties, seeds, shuffles
+
+FURTHEST = 2**20  # The largest offset, in units of the lattice.
+NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
+ROUND_PLACES = (*NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75)  # Gauss points too, which are not on the lattice.
+TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
+FINEST_GAP = 28  # Gaps go down to 2^-30, 1e-9.
+_TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
+_STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
+_COUNTS = st.integers(0, 2)
+_LENGTHS = st.sampled_from([1.0, 2.0, 0.5, 0.25, 4.0])
+
+
+@dataclass(frozen=True, slots=True)
+class ExactTurn:
+    """A similarity x → 2^k (W x + shift), whose turn W is a Pythagorean one, so that lattice points are not rounded.
+
+    Attributes
+    ----------
+    turn : tuple[int, int]
+        The first column of W = [[a, −b], [b, a]]; a² + b² is a square.
+    shift : tuple[int, int]
+        The translation in units of the lattice.
+    exponent : int
+        The exponent k.
+    """
+
+    turn: tuple[int, int] = (1, 0)
+    shift: tuple[int, int] = (0, 0)
+    exponent: int = 0
+
+    @property
+    def scale(self) -> float:
+        """The factor of all lengths, an integer × 2^k."""
+        return ldexp(hypot(*self.turn), self.exponent)
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 2), moved."""
+        (a, b), (x, y) = self.turn, points.T
+        moved: FloatArray = np.column_stack([a * x - b * y, b * x + a * y]) + self.shift
+        return np.ldexp(moved, self.exponent)
+
+
+@cache
+def exact_turns() -> SearchStrategy[ExactTurn | Motion]:
+    """Return rest, or exact similarities with offsets up to 2^20."""
+    place = st.one_of(st.integers(-64, 64), st.integers(-FURTHEST + 2**12, FURTHEST - 2**12))
+    exponent = st.one_of(st.just(0), st.integers(-20, 20))
+    turns = st.builds(ExactTurn, st.sampled_from(_TURNS), st.tuples(place, place), exponent)
+    return st.one_of(st.just(ExactTurn()), turns, turns)
+
+
+@cache
+def _any_motions() -> SearchStrategy[ExactTurn | Motion]:
+    return st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """Slave and master chains, and the slave point that they are about.
+
+    Attributes
+    ----------
+    kind : str
+        The kind of projection.
+    masters : Sequence[Chain]
+        The master's chains, the body on the left: a master on the x-axis runs in −x, a slave above it in +x.
+    slave : Chain
+        The slave.
+    segment : int
+        The number of the slave segment that carries the point, on the walk.
+    c : float
+        The place of the point on its segment, from −1 to 1.
+    exact : bool
+        Rounding would spoil the kind.
+    ordered : bool
+        The numbers of nodes on the walk matter.
+    """
+
+    kind: str
+    masters: Sequence[Chain]
+    slave: Chain
+    segment: int
+    c: float
+    exact: bool = False
+    ordered: bool = False
+
+    def mirror(self) -> Sketch:
+        """Return the mirror image in the y-axis, every chain walked the other way."""
+        n_segments = len(self.slave.points) - (not self.slave.closed)
+        # A closed chain keeps its joint between the last node and the first.
+        segment = n_segments - 1 if self.slave.closed else n_segments - 1 - self.segment
+        masters = [_mirror(chain) for chain in self.masters]
+        return replace(self, masters=masters, slave=_mirror(self.slave), segment=segment, c=-self.c)
+
+
+def _mirror(chain: Chain) -> Chain:
+    return replace(chain, points=chain.points[::-1] * [-1, 1] + 0.0)
+
+
+@st.composite
+def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
+    """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about."""
+    sketch = draw(sketches)
+    if draw(st.booleans()):
+        sketch = sketch.mirror()
+    motion = draw(exact_turns() if sketch.exact else _any_motions())
+    penalty, seed = draw(penalties()), draw(seeds())
+    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(shuffles())
+    reference = replace(sketch.slave, points=sketch.slave.points * stretch)
+    interface, order = assemble_chains([sketch.slave], sketch.masters, [reference], motion.scale, shuffle)
+    current = np.vstack([sketch.slave.points, *(chain.points for chain in sketch.masters)])[order]
+    first = int(np.flatnonzero(order == sketch.segment)[0])
+    (segment,) = np.flatnonzero(interface.slave.segments[:, 0] == first)
+    parameters = {"probe_segment": np.array(float(segment)), "probe_c": np.array(sketch.c)}
+    return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=sketch.kind)
+
+
+@cache
+def gaps() -> SearchStrategy[float]:
+    """Return gaps in units of a segment: 1e-9 to 1/2, half of them in penetration, some exactly zero."""
+    size = st.builds(lambda e, part: ldexp(part, -e), st.integers(1, FINEST_GAP), st.sampled_from([1.0, 0.75]))
+    inside = size.map(lambda gap: -gap)
+    return st.one_of(inside, size, inside, size, inside, st.just(0.0))
+
+
+@cache
+def nonzero_gaps() -> SearchStrategy[float]:
+    """Return gaps as `gaps` does, without zero."""
+    size = st.builds(lambda e, part: ldexp(part, -e), st.integers(1, FINEST_GAP), st.sampled_from([1.0, 0.75]))
+    return st.one_of(size.map(lambda gap: -gap), size)
+
+
+def upper_side(left_to_right: Sequence[tuple[float, float]]) -> Chain:
+    """Return the chain of a body below these points, which go from left to right."""
+    return Chain(np.array(left_to_right, dtype=np.float64)[::-1])
+
+
+@st.composite
+def slave_steps(draw: DrawFn, unit: float) -> tuple[list[tuple[float, float]], int]:
+    """Draw the vectors of slave segments from left to right, and the number of the segment that carries the point."""
+    before, after = draw(_COUNTS), draw(_COUNTS)
+    length = unit * draw(_LENGTHS)
+    steps = [(length, length * draw(TILTS)) for _ in range(before + 1 + after)]
+    return steps, before
+
+
+def slave_through(point: tuple[float, float], c: float, steps: Sequence[tuple[float, float]], segment: int) -> Chain:
+    """Return the open chain with these vectors whose segment of this number has the point at c."""
+    vectors = np.array(steps, dtype=np.float64)
+    nodes = np.concatenate([np.zeros((1, 2)), np.cumsum(vectors, axis=0)])
+    start = np.array(point) - nodes[segment] - (1 + c) / 2 * vectors[segment]
+    return Chain(nodes + start)
