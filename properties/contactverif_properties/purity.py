@@ -1,69 +1,53 @@
 """Ask whether an answer depends on nothing but the question.
 
-**Question.** Calls are repeated, reordered and batched. Is the answer to the same question always the same, and are
-the inputs left as they are?
+**Question.** Calls are repeated, reordered, interleaved and batched. Is the answer to the same question always the
+same, and are the inputs left as they are?
 
 **Why it matters.** A formulation that remembers its last call works in a test and fails in a program that solves two
 load cases, restarts an increment, or runs in parallel.
 
-**How it is judged.** R(x1), R(x2), R(x1) must give the first answer again, also after a tangent, and by a fresh
-instance that meets the states in the other order. The measured numbers count entries that differ; the tolerance is 0,
-since the same operations on the same numbers give the same bits. A batch may sum in another order: its largest
-difference over the largest force is at most u(8X/|g| + 4N). A pairing that differs, or an interface that was changed,
-fails in words.
+**How it is judged.** Two instances answer the same questions in different orders: residual and tangent in turn, at two
+states and on two interfaces in turn, and with two pairings of one state where it has two. The measured numbers count
+entries that differ; the tolerance is 0, since the same operations on the same numbers give the same bits. A batch may
+round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k is the stiffness, and a segment
+turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|, and k is the larger of ε̂L and the
+change of the residual from one state to the other over the way between them. A pairing that differs, or an interface
+that was changed, fails in words.
 
 **Undecided.** Never.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.roundoff import GAP_TOLERANCE, gap_tolerance, mean_penetration, ratio
+from contactverif_properties.shared.interleaved_calls import Question, count_changes, renumber
+from contactverif_properties.shared.roundoff import ratio
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
+BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.
 
 REASON = "The same operations on the same numbers give the same bits."
 REPEATED = Quantity("entries that change in a repeated call", "1", "0", REASON)
 REORDERED = Quantity("entries that change with the order of calls", "1", "0", REASON)
+TANGENT = Quantity("entries of the tangent that change with the order of calls", "1", "0", REASON)
 BATCHED = Quantity(
     "difference between batch and loop",
     "1",
-    GAP_TOLERANCE,
-    "A batch may sum in another order, and a gap is rounded to uX.",
+    "8u",
+    "A batch may round otherwise, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """The pairing of a state, and the residual on it."""
-
-    pairing: Pairing | None
-    forces: Array
-
-
-def ask(formulation: CheckedFormulation, interface: Interface, z: FloatArray) -> Answer:
-    """Return the pairing of the state z and the residual on it.
-
-    Each state is asked with its own pairing: far from the state of a pairing, a right formulation may have no answer
-    (a quadratic without a root).
-    """
-    pairing = formulation.pair(interface, z)
-    return Answer(pairing, formulation.residual(interface, pairing, z))
-
-
 def measure_purity(case: Case, subject: Subject) -> Measurement:
-    """Repeat, reorder and batch calls, and count the entries that change.
+    """Repeat, reorder, interleave and batch calls, and count the entries that change.
 
     Parameters
     ----------
@@ -75,50 +59,69 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The entries that change in a repeated call, those that change for a fresh instance which meets the states in the
-        other order, tangents first, and the difference between a batch and a loop. The batch holds the state and one so
-        near that its pairing is nearly the same.
+        The entries of the residual that change in a repeated call, the entries of residual and tangent that change with
+        the order of calls, and the difference between a batch and a loop, where the formulation takes batches. The
+        batch holds the state and one so near that its pairing is nearly the same.
     """
     formulation, state = prepare_state(case, subject)
+    penalty = state.penalty if state.n_multipliers else subject.penalty(case)
     interface, z = state.interface, state.z
-    random = np.random.default_rng(state.seed)
-    distant = z + random.uniform(-1, 1, z.size) * state.shortest_segment / 4
-    before = _fingerprint(interface)
-
-    first = ask(formulation, interface, z)
-    second = ask(formulation, interface, distant)
-    repeated = ask(formulation, interface, z)
-    fresh, _ = prepare_state(case, subject)
-    pairing_first = fresh.pair(interface, distant)
-    if "tangent" in fresh.provides:
-        fresh.tangent(interface, pairing_first, distant)
-        fresh.tangent(interface, first.pairing, z)
-    n_changes = (fresh.residual(interface, pairing_first, distant) != second.forces).sum()
-    n_changes += (fresh.residual(interface, first.pairing, z) != first.forces).sum()
+    distant = z + np.random.default_rng(state.seed).uniform(-1, 1, z.size) * state.shortest_segment / 4
     near = z + NEAR * (distant - z)
-    batch = formulation.residual(interface, first.pairing, np.array([[near, z], [z, z], [z, near]]))
-    alone = formulation.residual(interface, first.pairing, near)
+    other, z_other = renumber(state, formulation)
+    before = _fingerprint(interface), _fingerprint(other)
 
+    # Each state is asked with its own pairing, or with that of a state nearby: far from the state of a pairing, a right
+    # formulation may have no answer (a quadratic without a root).
+    places = ((interface, z), (interface, distant), (other, z_other), (interface, near))
+    questions = [Question(mesh, formulation.pair(mesh, u), u) for mesh, u in places]
+    pairing, second = questions[0].pairing, subject.with_penalty(penalty)
     broken = []
-    if first.pairing != repeated.pairing:
+    if formulation.pair(interface, z) != pairing:
         broken.append("the pairing of a state differs in a repeated call")
-    if second.pairing != pairing_first:
+    if any(second.pair(question.interface, question.z) != question.pairing for question in questions[1:3]):
         broken.append("the pairing of a state depends on the state before it")
-    if _fingerprint(interface) != before:
+    if questions[3].pairing == pairing:
+        questions = questions[:3]
+    else:
+        questions.append(Question(interface, pairing, near))
+    changes = count_changes(formulation, second, questions)
+
+    values = {REPEATED.name: changes.repeated, REORDERED.name: changes.residual, TANGENT.name: changes.tangent}
+    tolerances = dict.fromkeys(values, 0.0)
+    forces = np.array([formulation.residual(interface, pairing, u) for u in (z, near)])
+    if subject.traits.batched:
+        batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
+        values[BATCHED.name] = compare_batch(state, near, forces, batch)
+        tolerances[BATCHED.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+    if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
-    loop = np.array([[alone, first.forces], [first.forces, first.forces], [first.forces, alone]])
-    largest = float(max(np.abs(first.forces).max(), np.abs(alone).max()))
-    values = {
-        REPEATED.name: float((repeated.forces != first.forces).sum()),
-        REORDERED.name: float(n_changes),
-        BATCHED.name: ratio(float(np.abs(batch - loop).max()), largest),
-    }
-    rounding = gap_tolerance(state, mean_penetration(state, first.forces))
-    tolerances = {REPEATED.name: 0.0, REORDERED.name: 0.0, BATCHED.name: rounding}
-    n = interface.n_unknowns
-    return Measurement(
-        values, tolerances, broken="; ".join(broken), idle=not (first.forces[:n].any() or alone[:n].any())
-    )
+    idle = not forces[:, : interface.n_unknowns].any()
+    return Measurement(values, tolerances, broken="; ".join(broken), idle=idle)
+
+
+def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> float:
+    """Return the largest difference of a batch over what moving the nodes by X would change.
+
+    Parameters
+    ----------
+    case : Case
+        The state z.
+    near : FloatArray, shape (n_unknowns + n_multipliers,)
+        The state nearby.
+    forces : Array, shape (2, n_unknowns + n_multipliers)
+        The residuals of both states, asked one by one.
+    batch : Array, shape (2, 2, n_unknowns + n_multipliers)
+        The residuals of the batch: both states, then both in the other order.
+    """
+    way = float(np.abs(near - case.z).max())
+    slope = float(np.abs(forces[1] - forces[0]).max()) / way if way > 0 else 0.0
+    stiffness = max(case.penalty * case.slave_length, slope)  # The slope counts where the law is stiffer than ε̂.
+    largest = np.abs(forces).max(axis=-1)
+    # Each state has its own size: where one of the two just touches, its forces say nothing about those of the other.
+    moved = case.largest_coordinate * (stiffness + largest / case.shortest_segment) + case.n_segments * largest
+    differences = np.maximum(np.abs(batch[0] - forces), np.abs(batch[1] - forces[::-1])[::-1]).max(axis=-1)
+    return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 
 
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
@@ -129,8 +132,8 @@ def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
 PURITY = Property(
     id="purity",
     family="invariants",
-    summary="An answer depends on the question alone, in a repeated call, in another order, and in a batch.",
-    quantities=(REPEATED, REORDERED, BATCHED),
+    summary="An answer depends on the question alone: repeated, in another order, interleaved, and in a batch.",
+    quantities=(REPEATED, REORDERED, TANGENT, BATCHED),
     cases=any_cases,
     measure=measure_purity,
     promise=lambda traits: True,

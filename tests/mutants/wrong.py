@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import wrong_purity
 from mutate import Mutant, Wrapped, changed_line
 
 import contactverif_mortar
@@ -383,6 +384,7 @@ MUTANTS = (
          "x, multipliers = np.array(interface.nodes), np.zeros(0)\n        tree"),
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
+    *wrong_purity.MUTANTS,
 )  # fmt: skip
 
 # The mutants that no property catches yet. Each names the property that is missing.

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from handmade import Handmade, case, subject
+from handmade import Handmade, case, over_a_node, subject
 
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.run.runner import judge_case
-from contactverif_properties.purity import BATCHED, PURITY, REORDERED, REPEATED, measure_purity
+from contactverif_properties.purity import BATCHED, PURITY, REORDERED, REPEATED, TANGENT, measure_purity
+from contactverif_properties.shared.interleaved_calls import renumber
 
 
 class Pure(Handmade):
@@ -38,7 +40,8 @@ def nonzero_quantities(plugin: Any, **traits: Any) -> set[str]:
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_function_is_pure(batched: bool) -> None:
     measurement = measure(Pure, batched=batched)
-    assert measurement.values == {REPEATED.name: 0, REORDERED.name: 0, BATCHED.name: 0}
+    batch = {BATCHED.name: 0} if batched else {}
+    assert measurement.values == {REPEATED.name: 0, REORDERED.name: 0, TANGENT.name: 0} | batch
     assert not measurement.broken
     assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
 
@@ -65,9 +68,7 @@ def test_what_a_tangent_leaves_behind_is_told_by_the_order() -> None:
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return z + self.after
 
-    assert nonzero_quantities(Trace) == {REORDERED.name}
-    z = case().z
-    assert measure(Trace).values[REORDERED.name] == 2 * z.size  # each entry of both states
+    assert nonzero_quantities(Trace) == {REPEATED.name, REORDERED.name}
 
 
 def test_what_a_state_leaves_behind_for_the_next_is_nonzero_quantities() -> None:
@@ -88,6 +89,112 @@ def test_a_batch_that_is_no_loop_is_nonzero_quantities() -> None:
 
     assert nonzero_quantities(First, batched=True) == {BATCHED.name}
     assert nonzero_quantities(First, batched=False) == set()
+
+
+class Remembers(Pure):
+    """A formulation that computes one of its two answers with the arguments of the last call of the other."""
+
+    uses, of = "tangent", 2
+    last: Any = None
+
+    def remembered(self, method: str, *arguments: Any) -> Any:
+        last = self.last or arguments
+        self.last = self.last if method == self.uses else arguments
+        chosen = list(arguments)
+        if method == self.uses and last[2].shape == arguments[2].shape:
+            chosen[self.of] = last[self.of]
+        return chosen
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        interface, pairing, z = self.remembered("residual", interface, pairing, z)
+        return interface.nodes.reshape(-1) * z**2 + np.repeat(pairing["up"], 2)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        interface, pairing, z = self.remembered("tangent", interface, pairing, z)
+        return np.diag(2 * interface.nodes.reshape(-1) * z + np.repeat(pairing["up"], 2))
+
+
+@pytest.mark.parametrize("argument", [0, 1, 2])
+@pytest.mark.parametrize(("uses", "quantity"), [("residual", REORDERED.name), ("tangent", TANGENT.name)])
+def test_a_memory_of_the_last_call_is_told_by_calls_in_turn(uses: str, quantity: str, argument: int) -> None:
+    class Forgetful(Remembers):
+        pass
+
+    Forgetful.uses, Forgetful.of = uses, argument
+    named = [measure_purity(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
+    assert max(named) > 0
+
+
+def test_what_uses_its_own_arguments_alone_is_pure_in_turn() -> None:
+    class Attentive(Remembers):
+        uses = "nothing"
+
+    assert nonzero_quantities(Attentive) == set()
+
+
+def test_an_answer_kept_by_its_positions_alone_is_told_where_two_pairings_meet() -> None:
+    class Keeps(Pure):
+        def __init__(self, **traits: Any) -> None:
+            super().__init__(**traits)
+            self.kept: dict[bytes, Any] = {}
+
+        def pair(self, interface: Any, z: Any) -> Any:
+            return {"up": z[1::2] >= 0}  # The master lies at y = 0, so that a state nearby pairs differently.
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.kept.setdefault(z.tobytes(), z + np.repeat(pairing["up"], 2))
+
+    assert measure(Pure).values[REORDERED.name] == 0
+    assert measure(Keeps).values[REORDERED.name] > 0
+
+
+def test_the_other_interface_has_the_same_positions_under_other_numbers() -> None:
+    state = case()
+    other, z = renumber(state, subject(Pure).for_case(state))
+    assert other.nodes.shape == state.interface.nodes.shape
+    for surface, renumbered in ((state.interface.slave, other.slave), (state.interface.master, other.master)):
+        assert (z.reshape(-1, 2)[renumbered.segments] == state.positions[surface.segments]).all()
+        assert (other.nodes[renumbered.segments] == 2 * state.interface.nodes[surface.segments]).all()
+    assert not (other.slave.segments == state.interface.slave.segments).any()
+
+
+class TwoRoundings(Handmade):
+    """Vertical springs at thirds of a master segment: from differences of nodes, or in a batch, from points."""
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        slave, first, second = z[..., 1:4:2], z[..., 5:6], z[..., 7:8]
+        if z.ndim == 1:
+            gap = (slave - first) / 3 + (slave - second) * (2 / 3)
+        else:
+            gap = slave - (first / 3 + second * (2 / 3))
+        forces = 0 * z
+        forces[..., 1:4:2] = self.penalty * gap
+        forces[..., 5:6] = -self.penalty / 3 * gap.sum(axis=-1, keepdims=True)
+        forces[..., 7:8] = -self.penalty * 2 / 3 * gap.sum(axis=-1, keepdims=True)
+        return forces
+
+
+def test_a_batch_that_rounds_otherwise_passes_where_one_state_just_touches() -> None:
+    """The forces of the first state are 0, and say nothing about roundoff in those of the second."""
+    touching = over_a_node(6 / 7, gap=0.0)
+    touching = replace(touching, z=touching.z + 100 / 3)
+    differences = []
+    for seed in range(200):
+        outcome = judge_case(PURITY, replace(touching, seed=seed), subject(TwoRoundings, batched=True))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+        assert outcome.measurement is not None
+        differences.append(outcome.measurement.values[BATCHED.name])
+    assert max(differences) > 0
+
+
+def test_a_batch_that_takes_one_state_for_both_fails_where_one_just_touches() -> None:
+    class First(TwoRoundings):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z if z.ndim == 1 else 0 * z + z[0, :1])
+
+    touching = over_a_node(6 / 7, gap=0.0)
+    for seed in range(20):
+        assert judge_case(PURITY, replace(touching, seed=seed), subject(First, batched=True)).verdict is Verdict.FAIL
 
 
 def test_a_batch_may_sum_in_another_order() -> None:

@@ -1,0 +1,129 @@
+"""Calls of residual and tangent in turn, for states, pairings and interfaces in turn, by two instances in two orders.
+
+A formulation that remembers something of an earlier call answers differently in the two orders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import Array, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.subject import CheckedFormulation
+
+# The questions are two states of one interface, 0 and 1, and a state of another interface, 2. The first and the last
+# call before a question, of either method, on its interface or on any, differ between the orders for at least one
+# question. So a memory of such a call shows. The first order ends with its first question again.
+_ORDERS = (
+    (("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1), ("residual", 0)),
+    (("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1), ("residual", 0)),
+)
+# Two pairings of one state, 3 and 4: a memory that looks at the positions alone shows.
+_ORDERS_OF_PAIRINGS = (
+    (("residual", 3), ("residual", 4), ("tangent", 4)),
+    (("tangent", 4), ("residual", 4), ("residual", 3)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """The arguments of a residual or a tangent.
+
+    Attributes
+    ----------
+    interface : Interface
+        The meshes.
+    pairing : Pairing | None
+        The frozen pairing.
+    z : FloatArray, shape (n_unknowns + n_multipliers,)
+        The state.
+    """
+
+    interface: Interface
+    pairing: Pairing | None
+    z: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """The number of entries that change, by what makes them change.
+
+    Attributes
+    ----------
+    repeated : float
+        Entries of the residual that change when an instance is asked the same again.
+    residual, tangent : float
+        Entries that change with the order of the questions.
+    """
+
+    repeated: float
+    residual: float
+    tangent: float
+
+
+def count_changes(first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]) -> Changes:
+    """Ask two instances the same questions in different orders, and count the entries of the answers that differ.
+
+    Parameters
+    ----------
+    first, second : CheckedFormulation
+        Two instances of one formulation.
+    questions : Sequence[Question]
+        Two states of one interface and one of another; behind them, if given, two pairings of one more state.
+    """
+    with_pairings = len(questions) > 3
+    calls, others = (
+        [call for call in order + (of_pairings if with_pairings else ()) if _provides(first, call[0])]
+        for order, of_pairings in zip(_ORDERS, _ORDERS_OF_PAIRINGS, strict=True)
+    )
+    answers: dict[tuple[str, int], Array] = {}
+    repeated = 0.0
+    for call in calls:
+        answer = _ask(first, call[0], questions[call[1]])
+        repeated += float((answer != answers.setdefault(call, answer)).sum())
+    changed = {"residual": 0.0, "tangent": 0.0}
+    for call in others:
+        changed[call[0]] += float((_ask(second, call[0], questions[call[1]]) != answers[call]).sum())
+    return Changes(repeated, changed["residual"], changed["tangent"])
+
+
+def _provides(formulation: CheckedFormulation, method: str) -> bool:
+    return method == "residual" or method in formulation.provides
+
+
+def _ask(formulation: CheckedFormulation, method: str, question: Question) -> Array:
+    """Return the residual (n,) or the tangent (n, n) that the formulation answers."""
+    call = formulation.residual if method == "residual" else formulation.tangent
+    return dense(call(question.interface, question.pairing, question.z))
+
+
+def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, FloatArray]:
+    """Return another interface with as many nodes, and the state of the case on it.
+
+    The nodes of each side are numbered from the last to the first, and the reference is twice as large.
+
+    Parameters
+    ----------
+    case : Case
+        The state, with the multipliers of the formulation if it has any.
+    formulation : CheckedFormulation
+        The formulation, for the number of its multipliers on the other interface.
+
+    Returns
+    -------
+    interface : Interface
+        The other interface.
+    z : FloatArray, shape (n_unknowns + n_multipliers,)
+        The same positions at the nodes' other numbers.
+    """
+    interface, n_slave = case.interface, case.interface.n_slave_nodes
+    number = np.concatenate([np.arange(n_slave)[::-1], np.arange(n_slave, interface.n_nodes)[::-1]])
+    slave, master = (Surface(number[surface.segments]) for surface in (interface.slave, interface.master))
+    other = Interface(2 * interface.nodes[number], slave, master)
+    multipliers = np.resize(case.multipliers, formulation.n_multipliers(other))
+    return other, np.concatenate([case.positions[number].reshape(-1), multipliers])

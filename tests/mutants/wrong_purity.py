@@ -1,0 +1,82 @@
+"""Mutants that remember something of an earlier call. Each answer is right where nothing else was asked before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mutate import Mutant, Wrapped
+
+PURITY = "purity"
+
+
+def _remembers(*, memory: str, user: str, argument: int) -> Callable[..., Any]:
+    """Return a factory: `user` takes argument number `argument` from the last call of `memory`, if the state has its shape.
+
+    The arguments are 0, the interface; 1, the pairing; 2, the state. `memory` pair remembers the pairing it returns.
+    """
+
+    def make(*, penalty: float) -> Any:
+        last: dict[str, Any] = {}
+
+        def remember(right: Any, *arguments: Any) -> Any:
+            answer = right(*arguments)
+            last["call"] = (arguments[0], answer, arguments[1]) if memory == "pair" else arguments
+            return answer
+
+        def use(right: Any, *arguments: Any) -> Any:
+            earlier = last.get("call", arguments)
+            fits = earlier[2].shape == arguments[2].shape and (argument == 0 or earlier[0] is arguments[0])
+            changed = [earlier[i] if i == argument and fits else own for i, own in enumerate(arguments)]
+            answer = right(*changed)
+            if memory == user:
+                last["call"] = arguments
+            return answer
+
+        return Wrapped(penalty, **{memory: remember, user: use})
+
+    return make
+
+
+def _keeps_first_interface(*, penalty: float) -> Any:
+    """Answer on the first interface of each size, as a search tree does that is built once."""
+    first: dict[Any, Any] = {}
+
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        return right(first.setdefault(interface.nodes.shape, interface), pairing, z)
+
+    return Wrapped(penalty, residual=residual)
+
+
+def _caches_by_positions(*, penalty: float) -> Any:
+    """Keep the last residual, and return it where the positions are the same, whatever the pairing is."""
+    last: dict[bytes, Any] = {}
+
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        key = z.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = right(interface, pairing, z)
+        return last[key]
+
+    return Wrapped(penalty, residual=residual)
+
+
+MUTANTS = (
+    Mutant(
+        "tangent at the state of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=2)
+    ),
+    Mutant(
+        "residual at the state of the last tangent", PURITY, _remembers(memory="tangent", user="residual", argument=2)
+    ),
+    Mutant(
+        "tangent on the pairing of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=1)
+    ),
+    Mutant("tangent on the last pairing", PURITY, _remembers(memory="pair", user="tangent", argument=1)),
+    Mutant("residual on the last pairing", PURITY, _remembers(memory="pair", user="residual", argument=1)),
+    Mutant(
+        "tangent of the last residual's interface", PURITY, _remembers(memory="residual", user="tangent", argument=0)
+    ),
+    Mutant("residual of the first interface", PURITY, _keeps_first_interface),
+    Mutant("residual kept by its positions alone", PURITY, _caches_by_positions),
+)
