@@ -11,7 +11,7 @@ PURITY = "purity"
 
 
 def _remembers(*, memory: str, user: str, argument: int) -> Callable[..., Any]:
-    """Return a factory: `user` takes argument number `argument` from the last call of `memory`, if the state has its shape.
+    """Return a factory: `user` takes one argument from the last call of `memory`, if the state has its shape.
 
     The arguments are 0, the interface; 1, the pairing; 2, the state. `memory` pair remembers the pairing it returns.
     """
@@ -27,11 +27,10 @@ def _remembers(*, memory: str, user: str, argument: int) -> Callable[..., Any]:
         def use(right: Any, *arguments: Any) -> Any:
             earlier = last.get("call", arguments)
             fits = earlier[2].shape == arguments[2].shape and (argument == 0 or earlier[0] is arguments[0])
-            changed = [earlier[i] if i == argument and fits else own for i, own in enumerate(arguments)]
-            answer = right(*changed)
-            if memory == user:
-                last["call"] = arguments
-            return answer
+            changed = list(arguments)
+            if fits:
+                changed[argument] = earlier[argument]
+            return right(*changed)
 
         return Wrapped(penalty, **{memory: remember, user: use})
 

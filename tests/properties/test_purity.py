@@ -94,7 +94,7 @@ def test_a_batch_that_is_no_loop_is_nonzero_quantities() -> None:
 class Remembers(Pure):
     """A formulation that computes one of its two answers with the arguments of the last call of the other."""
 
-    uses, of = "tangent", 2
+    uses, argument = "tangent", 2
     last: Any = None
 
     def remembered(self, method: str, *arguments: Any) -> Any:
@@ -102,7 +102,7 @@ class Remembers(Pure):
         self.last = self.last if method == self.uses else arguments
         chosen = list(arguments)
         if method == self.uses and last[2].shape == arguments[2].shape:
-            chosen[self.of] = last[self.of]
+            chosen[self.argument] = last[self.argument]
         return chosen
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
@@ -120,9 +120,9 @@ def test_a_memory_of_the_last_call_is_told_by_calls_in_turn(uses: str, quantity:
     class Forgetful(Remembers):
         pass
 
-    Forgetful.uses, Forgetful.of = uses, argument
-    named = [measure_purity(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
-    assert max(named) > 0
+    Forgetful.uses, Forgetful.argument = uses, argument
+    counts = [measure_purity(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
+    assert max(counts) > 0
 
 
 def test_what_uses_its_own_arguments_alone_is_pure_in_turn() -> None:
