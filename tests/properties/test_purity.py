@@ -100,10 +100,10 @@ class Remembers(Pure):
     def remembered(self, method: str, *arguments: Any) -> Any:
         last = self.last or arguments
         self.last = self.last if method == self.uses else arguments
-        chosen = list(arguments)
+        values = list(arguments)
         if method == self.uses and last[2].shape == arguments[2].shape:
-            chosen[self.argument] = last[self.argument]
-        return chosen
+            values[self.argument] = last[self.argument]
+        return values
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         interface, pairing, z = self.remembered("residual", interface, pairing, z)
@@ -136,13 +136,13 @@ def test_an_answer_kept_by_its_positions_alone_is_told_where_two_pairings_meet()
     class Keeps(Pure):
         def __init__(self, **traits: Any) -> None:
             super().__init__(**traits)
-            self.kept: dict[bytes, Any] = {}
+            self.answers: dict[bytes, Any] = {}
 
         def pair(self, interface: Any, z: Any) -> Any:
             return {"up": z[1::2] >= 0}  # The master lies at y = 0, so that a state nearby pairs differently.
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return self.kept.setdefault(z.tobytes(), z + np.repeat(pairing["up"], 2))
+            return self.answers.setdefault(z.tobytes(), z + np.repeat(pairing["up"], 2))
 
     assert measure(Pure).values[REORDERED.name] == 0
     assert measure(Keeps).values[REORDERED.name] > 0
