@@ -97,7 +97,7 @@ class Remembers(Pure):
     uses, argument = "tangent", 2
     last: Any = None
 
-    def remembered(self, method: str, *arguments: Any) -> Any:
+    def recall(self, method: str, *arguments: Any) -> Any:
         last = self.last or arguments
         self.last = self.last if method == self.uses else arguments
         values = list(arguments)
@@ -106,11 +106,11 @@ class Remembers(Pure):
         return values
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        interface, pairing, z = self.remembered("residual", interface, pairing, z)
+        interface, pairing, z = self.recall("residual", interface, pairing, z)
         return interface.nodes.reshape(-1) * z**2 + np.repeat(pairing["up"], 2)
 
     def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        interface, pairing, z = self.remembered("tangent", interface, pairing, z)
+        interface, pairing, z = self.recall("tangent", interface, pairing, z)
         return np.diag(2 * interface.nodes.reshape(-1) * z + np.repeat(pairing["up"], 2))
 
 
