@@ -6,6 +6,8 @@ It sees the master where the line along ν meets the segment:
     x_s = (1−c)/2 x_A + (1+c)/2 x_B      n = ν/|ν| (out of the slave)      τ = n turned, along the slave
     ξ = (x_s − x_1)·τ / (x_2 − x_1)·τ    x_m = (1−ξ) x_1 + ξ x_2           g = (x_m − x_s)·n, negative in penetration
 
+Neither x_s nor x_m is ever computed, only vectors between them and nodes (`projection.arm`).
+
 With the segment's own normal at both ends ν is constant. With averaged normals ν = (n_A + n_B)/2 + c (n_B − n_A)/2, and
 n_A is the unit vector along the sum of the normals of the two segments at A. A node e of the master is then seen from
 the c that solves the quadratic (x_e − x_s(c))·τ(c) |ν| = 0. In both cases x_m − x_s is along n. So forces along n at
@@ -27,7 +29,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
+from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, dot, frame, minus, node
 
 A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes
 D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # The Δ of a point, in this order.
@@ -79,13 +81,13 @@ def seen_from(x_e: Vector, view: SlaveView) -> float:
     """Return the c from which the point x_e is seen: the root at which it passes from ahead to behind as c grows."""
     x_a, x_b, n_a, n_b, straight = view
     half = ((x_b[0] - x_a[0]) / 2, (x_b[1] - x_a[1]) / 2)
-    arm = minus(x_e, between(x_a, x_b, 0.0))
+    from_e = arm(x_e, PointOnSegment(x_a, x_b, 0.0))
     tau_0 = turn(between(n_a, n_b, 0.0))
-    d, slope = dot(arm, tau_0), dot(half, tau_0)
+    d, slope = -dot(from_e, tau_0), dot(half, tau_0)
     if straight:
         return d / slope
     tau_1 = turn(((n_b[0] - n_a[0]) / 2, (n_b[1] - n_a[1]) / 2))
-    slope -= dot(arm, tau_1)
+    slope += dot(from_e, tau_1)
     c: float = 2 * d / (slope + np.sqrt(slope * slope + 4 * dot(half, tau_1) * d))
     return c
 
@@ -93,14 +95,13 @@ def seen_from(x_e: Vector, view: SlaveView) -> float:
 @compile_kernel
 def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[float, float, Vector]:
     """Return ξ, the gap g and the normal n (out of the slave) at c."""
-    x_s = between(view.x_a, view.x_b, c)
+    d, along = arm(x_1, PointOnSegment(view.x_a, view.x_b, c)), minus(x_2, x_1)
     nu = between(view.n_a, view.n_b, c)
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
     tau = turn(n)
-    xi = dot(minus(x_s, x_1), tau) / dot(minus(x_2, x_1), tau)
-    x_m = between(x_1, x_2, 2 * xi - 1)
-    return xi, dot(minus(x_m, x_s), n), n
+    xi = dot(d, tau) / dot(along, tau)
+    return xi, xi * dot(along, n) - dot(d, n), n
 
 
 @compile_kernel
@@ -162,7 +163,7 @@ def cut_gains(
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
     tau = turn(n)
-    height = dot(minus(x_e, between(x_a, x_b, c)), n)
+    height = -dot(arm(x_e, PointOnSegment(x_a, x_b, c)), n)
     slope = dot(minus(x_b, x_a), tau) / 2 + height * dot(minus(n_b, n_a), tau) / 2 / size
     part_a = height * (1 - c) / 2 * dot(tau, turn(n_a)) / size / slope
     part_b = height * (1 + c) / 2 * dot(tau, turn(n_b)) / size / slope

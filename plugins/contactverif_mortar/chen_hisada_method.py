@@ -20,6 +20,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
+    PointOnSegment,
     Tree,
     dot,
     foot_on_surface,
@@ -138,12 +139,13 @@ def _pair_nodes(
     active = np.empty(n_nodes, dtype=np.bool_)
     for number in range(n_nodes):
         p = node(x, number)
-        m = nearest_segment(p, x, master, order, boxes)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        _, _, n = frame(x_1, x_2)
+        m = nearest_segment(PointOnSegment(p, p, -1.0), x, master, order, boxes)
+        x_1 = node(x, master[m, 0])
+        length, t, n = frame(x_1, node(x, master[m, 1]))
+        d = minus(p, x_1)
+        on_surface = foot_on_surface(dot(d, t), length, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[number] = m
-        on_surface = foot_on_surface(p, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[number] = dot(minus(p, x_1), n) <= 0 and on_surface
+        active[number] = dot(d, n) <= 0 and on_surface
     return nearest, active
 
 
@@ -202,6 +204,7 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
             conserves_moment=True,
             area="current" if current else "reference",
             gap="cells and nodes",
+            translation_stable=True,
             penalty="distributed",
             batched=True,
             takes_complex=True,

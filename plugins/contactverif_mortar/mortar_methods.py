@@ -245,6 +245,7 @@ def _traits(area: str, normals: str, dual: bool) -> Traits:
         continuity=None if choose("normals", normals, NORMALS) else "C0",
         area="current" if choose("area", area, AREAS) else "reference",
         gap=None if choose("normals", normals, NORMALS) else "cells",
+        translation_stable=True,
         penalty="distributed",
         batched=True,
         takes_complex=True,

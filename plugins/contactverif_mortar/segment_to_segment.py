@@ -112,6 +112,7 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
             continuity="C0",
             area="current" if choose("area", area, AREAS) else "reference",
             gap="cells",
+            translation_stable=True,
             penalty="distributed",
             batched=True,
             takes_complex=True,

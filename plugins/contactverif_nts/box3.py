@@ -32,7 +32,7 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
+from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
 from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
@@ -67,10 +67,9 @@ class VirtualSlaveNode(NamedTuple):
 
     x_a: Vector  # the slave segment
     x_b: Vector
-    x_1: Vector  # the first node of V's master segment
-    x_v: Vector
-    x_p: Vector  # the ends of the area of competence
-    x_q: Vector
+    p: PointOnSegment  # the ends of the area of competence
+    q: PointOnSegment
+    d: Vector  # from the first node of V's master segment to V
     c: float  # V, P and Q as c
     c_p: float
     c_q: float
@@ -125,16 +124,16 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
             push(r, node_a, (1 - v.c) / 2 * f_v, v.normal)
             push(r, node_b, (1 + v.c) / 2 * f_v, v.normal)
             if area.first == area.last:  # IF only one segment is involved THEN Eq. 6
-                xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12
+                xi = dot(v.d, v.t) / v.l_12
                 push(r, node_1, -(1 - xi) * f_v, v.normal)
                 push(r, node_2, -xi * f_v, v.normal)
                 continue
             if transmission == BALANCED:  # ELSE assembly of all the involved segments
-                pressure = f_v / dot(minus(v.x_q, v.x_p), v.t)  # S = ΣW telescopes to s(Q) − s(P)
+                pressure = f_v / dot(from_p_to_q(v), v.t)  # S = ΣW telescopes to s(Q) − s(P)
             j = area.first
             while True:
                 f, m = master[j, 0], master[j, 1]
-                w_f, w_m = _parts(node(now, f), node(now, m), v.t, v.x_p, v.x_q, area, j)
+                w_f, w_m = _parts(node(now, f), node(now, m), v, area, j)
                 push(r, f, -pressure * w_f, v.normal)
                 push(r, m, -pressure * w_m, v.normal)
                 if j == area.last:
@@ -154,14 +153,14 @@ def _fill_idle_rows(
 
 
 @compile_kernel
-def _parts(x_f: Vector, x_m: Vector, t: Vector, x_p: Vector, x_q: Vector, area: Area, j: int) -> tuple[float, float]:
+def _parts(x_f: Vector, x_m: Vector, v: VirtualSlaveNode, area: Area, j: int) -> tuple[float, float]:
     """Return W_f and W_m of master segment j with the nodes f and m."""
-    length = dot(minus(x_m, x_f), t)
+    length = dot(minus(x_m, x_f), v.t)
     a, b = 0 * length, 0 * length + 1
     if j == area.first:
-        a = dot(minus(x_p, x_f), t) / length if area.clip_p == NOT_CUT else 0 * length + area.clip_p
+        a = dot(arm(x_f, v.p), v.t) / length if area.clip_p == NOT_CUT else 0 * length + area.clip_p
     if j == area.last:
-        b = dot(minus(x_q, x_f), t) / length if area.clip_q == NOT_CUT else 0 * length + area.clip_q
+        b = dot(arm(x_f, v.q), v.t) / length if area.clip_q == NOT_CUT else 0 * length + area.clip_q
     w_m = length * (b * b - a * a) / 2
     return length * ((b - a) - (b * b - a * a) / 2), w_m
 
@@ -170,10 +169,17 @@ def _parts(x_f: Vector, x_m: Vector, t: Vector, x_p: Vector, x_q: Vector, area: 
 def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: float, c_q: float) -> VirtualSlaveNode:
     """Return the virtual slave node in the middle of the area of competence [c_q, c_p] of A B, against 1 2."""
     c = (c_p + c_q) / 2
-    x_v, x_p, x_q = between(x_a, x_b, c), between(x_a, x_b, c_p), between(x_a, x_b, c_q)
+    p, q = PointOnSegment(x_a, x_b, c_p), PointOnSegment(x_a, x_b, c_q)
     l_12, t, normal = frame(x_1, x_2)
-    g = dot(minus(x_v, x_1), normal)
-    return VirtualSlaveNode(x_a, x_b, x_1, x_v, x_p, x_q, c, c_p, c_q, l_12, t, normal, g)
+    d = arm(x_1, PointOnSegment(x_a, x_b, c))
+    return VirtualSlaveNode(x_a, x_b, p, q, d, c, c_p, c_q, l_12, t, normal, dot(d, normal))
+
+
+@compile_kernel
+def from_p_to_q(v: VirtualSlaveNode) -> Vector:
+    """Return x_Q − x_P, a part of the slave segment."""
+    ab, share = minus(v.x_b, v.x_a), (v.c_q - v.c_p) / 2
+    return share * ab[0], share * ab[1]
 
 
 @compile_kernel
@@ -209,7 +215,7 @@ def area_of_competence(
 @compile_kernel
 def _cut_at(x_a: Vector, x_b: Vector, x_e: Vector, t: Vector) -> float:
     """Return where the slave segment A B meets the master node e, both projected along t, as c."""
-    return dot(minus(x_e, between(x_a, x_b, 0.0)), t) / (dot(minus(x_b, x_a), t) / 2)
+    return -dot(arm(x_e, PointOnSegment(x_a, x_b, 0.0)), t) / (dot(minus(x_b, x_a), t) / 2)
 
 
 @compile_kernel

@@ -21,12 +21,13 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import Vector, between, dot, frame, minus, node
+from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
 from contactverif_nts.box3 import (
     BALANCED,
     Area,
     VirtualSlaveNode,
     area_of_competence,
+    from_p_to_q,
     length_of_area,
     segment_length,
     virtual_slave_node,
@@ -113,7 +114,7 @@ def tangent(
         place = _add_force(index, values, place, nodes, at, A, (1 - c) / 2 * f_v, d_fa, d_omega, (1 - c) / 2 * size)
         place = _add_force(index, values, place, nodes, at, B, (1 + c) / 2 * f_v, d_fb, d_omega, (1 + c) / 2 * size)
         if area.first == area.last:
-            xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12
+            xi = dot(v.d, v.t) / v.l_12
             d_f1, d_f2 = -(1 - xi) * d_f + f_v * d_xi, -xi * d_f - f_v * d_xi
             f_1, size_1 = -(1 - xi) * f_v, -(1 - xi) * size
             place = _add_force(index, values, place, nodes, at, NODE_1, f_1, d_f1, d_omega, size_1)
@@ -154,7 +155,7 @@ def _fill_gains(
     if area.cut_q != NOT_CUT:
         _add_cut(d_cq, x, nodes, CUT_Q, v.c_q)
     d_c = (d_cp + d_cq) / 2
-    ab, xi = minus(v.x_b, v.x_a), dot(minus(v.x_v, v.x_1), v.t) / v.l_12
+    ab, xi = minus(v.x_b, v.x_a), dot(v.d, v.t) / v.l_12
     for i in range(2):
         d_omega[NODE_1, i] = -v.normal[i] / v.l_12  # ω = n·(Δx2 − Δx1)/l
         d_omega[NODE_2, i] = v.normal[i] / v.l_12
@@ -178,7 +179,7 @@ def _add_cut(d_c: FloatArray, x: FloatArray, nodes: IntArray, cutting_node: int,
     x_a, x_b, x_e = node(x, nodes[A]), node(x, nodes[B]), node(x, nodes[cutting_node])
     l_12, t, normal = frame(node(x, nodes[FRAME_1]), node(x, nodes[FRAME_2]))
     half = dot(minus(x_b, x_a), t) / 2
-    lever = dot(minus(between(x_a, x_b, c), x_e), normal)
+    lever = dot(arm(x_e, PointOnSegment(x_a, x_b, c)), normal)
     for i in range(2):
         d_c[A, i] -= (1 - c) / 2 * t[i] / half
         d_c[B, i] -= (1 + c) / 2 * t[i] / half
@@ -192,7 +193,7 @@ def _sum_of_parts(
     v: VirtualSlaveNode, d_cp: FloatArray, d_cq: FloatArray, d_omega: FloatArray
 ) -> tuple[float, FloatArray]:
     """Return S = ΣW = s(Q) − s(P) and ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω."""
-    pq = minus(v.x_q, v.x_p)
+    pq = from_p_to_q(v)
     share = (v.c_p - v.c_q) / 2
     d_s = dot(pq, v.normal) * d_omega + dot(minus(v.x_b, v.x_a), v.t) / 2 * (d_cq - d_cp)
     for i in range(2):
@@ -233,9 +234,9 @@ def _add_segments(
             d_length[M, i] += v.t[i]
         a, b = 0.0, 1.0
         if j == area.first:
-            a = _end_of_part(d_a, v, v.x_p, v.c_p, d_cp, area.clip_p, x_f, x_m, d_omega)
+            a = _end_of_part(d_a, v, v.p, d_cp, area.clip_p, x_f, x_m, d_omega)
         if j == area.last:
-            b = _end_of_part(d_b, v, v.x_q, v.c_q, d_cq, area.clip_q, x_f, x_m, d_omega)
+            b = _end_of_part(d_b, v, v.q, d_cq, area.clip_q, x_f, x_m, d_omega)
         w_m = length * (b * b - a * a) / 2
         w_f = length * ((b - a) - (b * b - a * a) / 2)
         d_wm = length * (b * d_b - a * d_a) + (b * b - a * a) / 2 * d_length
@@ -252,28 +253,27 @@ def _add_segments(
 def _end_of_part(
     d_end: FloatArray,
     v: VirtualSlaveNode,
-    x_end: Vector,
-    c_end: float,
+    p: PointOnSegment,
     d_c_end: FloatArray,
     clip: int,
     x_f: Vector,
     x_m: Vector,
     d_omega: FloatArray,
 ) -> float:
-    """Return a (of the end P) or b (of Q) on the master segment f m, and add its Δ to `d_end`.
+    """Return where the end p of the area lies on the master segment f m, a of P or b of Q, and add its Δ to `d_end`.
 
     L_j Δa = t·(Δx_P − (1−a)Δx_f − aΔx_m) + ((x_P − (1−a)x_f − a x_m)·n) ω, likewise b with Q. A clipped end is fixed.
     """
     if clip != NOT_CUT:
         return float(clip)
-    fm = minus(x_m, x_f)
+    fm, fp = minus(x_m, x_f), arm(x_f, p)
     length = dot(fm, v.t)
-    end = dot(minus(x_end, x_f), v.t) / length
-    lever = dot(minus(x_end, x_f), v.normal) - end * dot(fm, v.normal)
+    end = dot(fp, v.t) / length
+    lever = dot(fp, v.normal) - end * dot(fm, v.normal)
     d_end[:N_CORE] += (lever * d_omega + dot(minus(v.x_b, v.x_a), v.t) / 2 * d_c_end) / length
     for i in range(2):
-        d_end[A, i] += (1 - c_end) / 2 * v.t[i] / length
-        d_end[B, i] += (1 + c_end) / 2 * v.t[i] / length
+        d_end[A, i] += (1 - p.c) / 2 * v.t[i] / length
+        d_end[B, i] += (1 + p.c) / 2 * v.t[i] / length
         d_end[F, i] -= (1 - end) * v.t[i] / length
         d_end[M, i] -= end * v.t[i] / length
     return end

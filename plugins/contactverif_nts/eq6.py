@@ -30,13 +30,13 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
+    PointOnSegment,
     Tree,
     Vector,
-    between,
+    arm,
     dot,
     foot_on_surface,
     frame,
-    minus,
     nearest_segment,
     node,
 )
@@ -115,13 +115,14 @@ def pair(
     nearest = np.empty(len(segment), dtype=np.int64)
     active = np.empty(len(segment), dtype=np.bool_)
     for i in range(len(segment)):
-        x_v = between(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
-        m = nearest_segment(x_v, x, master, order, boxes)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        _, _, normal = frame(x_1, x_2)
-        on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
+        v = PointOnSegment(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
+        m = nearest_segment(v, x, master, order, boxes)
+        x_1 = node(x, master[m, 0])
+        l_12, t, normal = frame(x_1, node(x, master[m, 1]))
+        d = arm(x_1, v)
+        on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[i] = m
-        active[i] = is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
+        active[i] = is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface
     return nearest, active
 
 
@@ -194,11 +195,11 @@ def push(forces: Array, number: int, size: float, direction: Vector) -> None:
 @compile_kernel
 def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
     """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
-    x_v = between(node(x, a), node(x, b), c)
     x_1 = node(x, node_1)
     l_12, t, normal = frame(x_1, node(x, node_2))
-    g = dot(minus(x_v, x_1), normal)
-    xi = dot(minus(x_v, x_1), t) / l_12
+    d = arm(x_1, PointOnSegment(node(x, a), node(x, b), c))
+    g = dot(d, normal)
+    xi = dot(d, t) / l_12
     return Contact(a, b, node_1, node_2, c, l_12, t, normal, g, xi)
 
 

@@ -44,6 +44,7 @@ _PRINTED = Traits(
     conserves_moment=False,
     area="current",
     gap="closest point",
+    translation_stable=True,
     penalty="distributed",
     batched=True,
     takes_complex=True,
@@ -129,14 +130,15 @@ class PatchTestPassing:
         length = np.linalg.norm(x2 - x1, axis=1)
         t = (x2 - x1) / length[:, None]
         normal = np.column_stack([t[:, 1], -t[:, 0]])
-        gap = ((position - x1) * normal).sum(axis=1)
+        d = (1 - c[:, None]) / 2 * (x_a - x1) + (1 + c[:, None]) / 2 * (x_b - x1)  # differences first
+        gap = (d * normal).sum(axis=1)
         pressure = multipliers if len(multipliers) else -self.penalty * gap
         lengths = interface.slave.lengths(x if self.current_area else interface.nodes)
         return ContactPoints(
             slave_segment=segment,
             c=c,
             master_segment=pairing["master"],
-            xi=((position - x1) * t).sum(axis=1) / length,
+            xi=(d * t).sum(axis=1) / length,
             position=position,
             normal=normal,
             gap=gap,

@@ -101,7 +101,8 @@ class PointContact:
         length = np.linalg.norm(x2 - x1, axis=1)
         t = (x2 - x1) / length[:, None]
         normal = np.column_stack([t[:, 1], -t[:, 0]])
-        gap = ((position - x1) * normal).sum(axis=1)
+        d = (1 - c[:, None]) / 2 * (ends[:, 0] - x1) + (1 + c[:, None]) / 2 * (ends[:, 1] - x1)  # differences first
+        gap = (d * normal).sum(axis=1)
         measured = interface.nodes if self.area_from == eq6.REFERENCE else x
         lengths = np.append(interface.slave.lengths(measured), 0.0)  # the last one stands for "no segment", −1
         weight = self.weight[pairing["slot"]] * (lengths[pairing["segment"]] + lengths[pairing["other"]])
@@ -113,7 +114,7 @@ class PointContact:
             slave_segment=pairing["segment"],
             c=c,
             master_segment=pairing["master"],
-            xi=((position - x1) * t).sum(axis=1) / length,
+            xi=(d * t).sum(axis=1) / length,
             position=position,
             normal=normal,
             gap=gap,
@@ -260,6 +261,7 @@ def _traits(patch_witness: str, penalty: str, area_from: int | None, symmetric: 
         conserves_moment=True,
         area=areas[area_from],  # type: ignore[arg-type]
         gap="closest point",
+        translation_stable=True,
         penalty=penalty,  # type: ignore[arg-type]
         batched=True,
         takes_complex=True,

@@ -27,9 +27,10 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
+    PointOnSegment,
     Tree,
     Vector,
-    between,
+    arm,
     dot,
     foot_on_surface,
     frame,
@@ -88,41 +89,42 @@ def pair(
         x_a, x_b = node(x, slave[i // n, 0]), node(x, slave[i // n, 1])
         c = middle_of_part(i, n)
         c_p, c_q = c + 1 / n, c - 1 / n
-        m = nearest_segment(between(x_a, x_b, c), x, master, order, boxes)
+        m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
         if free_end == COVER:
             c_p, c_q, cut_p[i], cut_q[i] = _cover(x, master, neighbours, m, x_a, x_b, c_p, c_q)
             if max(cut_p[i], cut_q[i]) != NOT_CUT:
                 cutting[i] = m
                 if c_p > c_q:
                     c = (c_p + c_q) / 2
-                    m = nearest_segment(between(x_a, x_b, c), x, master, order, boxes)
+                    m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
 
         partner[i], first[i], last[i] = m, m, m
-        x_v, x_p, x_q = between(x_a, x_b, c), between(x_a, x_b, c_p), between(x_a, x_b, c_q)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        _, t, normal = frame(x_1, x_2)
-        if c_p <= c_q or dot(minus(x_p, x_1), t) >= dot(minus(x_q, x_1), t):
+        x_1 = node(x, master[m, 0])
+        l_12, t, normal = frame(x_1, node(x, master[m, 1]))
+        if c_p <= c_q or dot(minus(x_b, x_a), t) >= 0:  # s(P) ≥ s(Q)
             continue
-        on_surface = foot_on_surface(x_v, x_1, x_2, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[i] = is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface
-        first[i], last[i] = _walk(x, x_p, x_q, m, t, master, neighbours)
+        v, p, q = PointOnSegment(x_a, x_b, c), PointOnSegment(x_a, x_b, c_p), PointOnSegment(x_a, x_b, c_q)
+        d = arm(x_1, v)
+        on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
+        active[i] = is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface
+        first[i], last[i] = _walk(x, p, q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
-            clip_p[i], clip_q[i] = _truncate(x, x_p, x_q, first[i], last[i], t, master, neighbours)
+            clip_p[i], clip_q[i] = _truncate(x, p, q, first[i], last[i], t, master, neighbours)
     return partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active
 
 
 @compile_kernel
 def _walk(
-    x: FloatArray, x_p: Vector, x_q: Vector, m: int, t: Vector, master: IntArray, neighbours: IntArray
+    x: FloatArray, p: PointOnSegment, q: PointOnSegment, m: int, t: Vector, master: IntArray, neighbours: IntArray
 ) -> tuple[int, int]:
     """Return the first and the last master segment under the area of competence P … Q, in the frame of segment m."""
     first, last = m, m
-    while dot(minus(x_p, node(x, master[first, 0])), t) < 0:
+    while dot(arm(node(x, master[first, 0]), p), t) < 0:
         following = neighbours[first, 0]
         if following < 0 or _projected_length(x, master, following, t) <= 0:
             break
         first = following
-    while dot(minus(x_q, node(x, master[last, 1])), t) > 0:
+    while dot(arm(node(x, master[last, 1]), q), t) > 0:
         following = neighbours[last, 1]
         if following < 0 or _projected_length(x, master, following, t) <= 0:
             break
@@ -138,13 +140,20 @@ def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) 
 
 @compile_kernel
 def _truncate(
-    x: FloatArray, x_p: Vector, x_q: Vector, first: int, last: int, t: Vector, master: IntArray, neighbours: IntArray
+    x: FloatArray,
+    p: PointOnSegment,
+    q: PointOnSegment,
+    first: int,
+    last: int,
+    t: Vector,
+    master: IntArray,
+    neighbours: IntArray,
 ) -> tuple[int, int]:
     """Return `clip_p` and `clip_q`: where P and Q overhang a free end of the first and the last master segment."""
     clip_p = clip_q = NOT_CUT
-    if neighbours[first, 0] < 0 and dot(minus(x_p, node(x, master[first, 0])), t) < 0:
+    if neighbours[first, 0] < 0 and dot(arm(node(x, master[first, 0]), p), t) < 0:
         clip_p = 0
-    if neighbours[last, 1] < 0 and dot(minus(x_q, node(x, master[last, 1])), t) > 0:
+    if neighbours[last, 1] < 0 and dot(arm(node(x, master[last, 1]), q), t) > 0:
         clip_q = 1
     return clip_p, clip_q
 
@@ -169,13 +178,13 @@ def _cover(
     half = dot(minus(x_b, x_a), t) / 2  # s gains this for each unit of c
     if half >= 0:  # P does not come before Q: the slave is seen edge-on or from behind
         return c_q, c_q, cut_p, cut_q
-    x_p, x_q, x_mid = between(x_a, x_b, c_p), between(x_a, x_b, c_q), between(x_a, x_b, 0.0)
-    first, last = _walk(x, x_p, x_q, m, t, master, neighbours)
+    p, q, middle = PointOnSegment(x_a, x_b, c_p), PointOnSegment(x_a, x_b, c_q), PointOnSegment(x_a, x_b, 0.0)
+    first, last = _walk(x, p, q, m, t, master, neighbours)
     x_first, x_last = node(x, master[first, 0]), node(x, master[last, 1])
-    if dot(minus(x_p, x_first), t) < 0:
+    if dot(arm(x_first, p), t) < 0:
         cut_p = master[first, 0]
-        c_p = dot(minus(x_first, x_mid), t) / half
-    if dot(minus(x_q, x_last), t) > 0:
+        c_p = -dot(arm(x_first, middle), t) / half
+    if dot(arm(x_last, q), t) > 0:
         cut_q = master[last, 1]
-        c_q = dot(minus(x_last, x_mid), t) / half
+        c_q = -dot(arm(x_last, middle), t) / half
     return c_p, c_q, cut_p, cut_q

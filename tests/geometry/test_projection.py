@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from contactverif import Interface, oracle
-from contactverif.geometry.projection import nearest_segment, search_tree
+from contactverif.geometry.projection import PointOnSegment, nearest_segment, search_tree
 
 
 def find_nearest(interface: Interface, x: np.ndarray, p: np.ndarray) -> int:
     order, boxes = search_tree(interface.master, x)
-    return int(nearest_segment((p[0], p[1]), x, interface.master.segments, order, boxes))
+    node = (p[0], p[1])
+    return int(nearest_segment(PointOnSegment(node, node, -1.0), x, interface.master.segments, order, boxes))
 
 
 @pytest.mark.parametrize("seed", range(40))

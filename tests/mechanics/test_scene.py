@@ -479,9 +479,9 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
     def count(name: str, case: Case) -> Counts:
         evaluated: list[bool] = []
 
-        def counting(p: Any, x1: Any, x2: Any) -> Any:
+        def counting(origin: Any, p: Any, x1: Any, x2: Any) -> Any:
             evaluated.append(x1[0] > 1e3)
-            return distance(p, x1, x2)
+            return distance(origin, p, x1, x2)
 
         subject = load_formulation(name)
         assert isinstance(subject, Subject)

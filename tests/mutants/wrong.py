@@ -230,7 +230,7 @@ def _pushes_along_rollers(penalty: float) -> Any:
 
 MUTANTS = (
     line("pulls where the gap is open", UNILATERAL, "eq6",
-         "is_pressed(dot(minus(x_v, x_1), normal), multipliers, i, penalty) and on_surface", "on_surface",
+         "is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface", "on_surface",
          factory="vts_me"),
     line("multiplier that pulls stays active", COMPLEMENTARITY, "eq6",
          "multipliers[i] - penalty * g >= 0", "multipliers[i] - penalty * g >= 0 or multipliers[i] < 0",
@@ -265,17 +265,17 @@ MUTANTS = (
          "push(r, node_a, (1 - v.c) / 2 * f_v, v.normal)",
          "push(r, node_a, (1 - v.c) / 2 * f_v * (1 + 1e-6), v.normal)"),
     line("slave and master forces of the printed algorithm", FORCE, "box3",
-         "pressure = f_v / dot(minus(v.x_q, v.x_p), v.t)", "pressure = penalty * v.g"),
+         "pressure = f_v / dot(from_p_to_q(v), v.t)", "pressure = penalty * v.g"),
     line("shares of one segment exchanged", MOMENT, "box3",
-         "xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12", "xi = 1 - dot(minus(v.x_v, v.x_1), v.t) / v.l_12"),
+         "xi = dot(v.d, v.t) / v.l_12", "xi = 1 - dot(v.d, v.t) / v.l_12"),
     line("shares of the nodes of a segment exchanged", MOMENT, "box3",
          "push(r, f, -pressure * w_f, v.normal)", "w_f, w_m = w_m, w_f; push(r, f, -pressure * w_f, v.normal)"),
     line("ξ of the last segment from its other end", PATCH, "box3",
-         "b = dot(minus(x_q, x_f), t) / length", "b = 1 - dot(minus(x_q, x_f), t) / length"),
+         "b = dot(arm(x_f, v.q), v.t) / length", "b = 1 - dot(arm(x_f, v.q), v.t) / length"),
     line("intermediate segments skipped", PATCH, "box3",
          "w_m = length * (b * b - a * a) / 2", "w_m = length * (b * b - a * a) / 2 * (b - a < 1)"),
     line("ξ set to one half", MOMENT, "eq6",
-         "xi = dot(minus(x_v, x_1), t) / l_12", "xi = 0.5 + 0 * g", factory="vts_me"),
+         "xi = dot(d, t) / l_12", "xi = 0.5 + 0 * g", factory="vts_me"),
     line("normal of each master segment for its share", FORCE, "box3",
          "push(r, f, -pressure * w_f, v.normal)",
          "v = v._replace(normal=frame(node(now, f), node(now, m))[2]); push(r, f, -pressure * w_f, v.normal)"),
@@ -285,7 +285,7 @@ MUTANTS = (
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2",
          "f_v = penalty * pressure * l_ab * (v.c_p - v.c_q) / 2"),
     line("pushes where the gap is open", PATCH, "walk",
-         "is_pressed(dot(minus(x_v, x_1), normal),", "is_pressed(-dot(minus(x_v, x_1), normal),"),
+         "is_pressed(dot(d, normal),", "is_pressed(-dot(d, normal),"),
     line("virtual slave nodes at Gauss points", PATCH, "box3",
          "c, zero = middle_of_part(i, n), 0 * x_a[0]", "c, zero = middle_of_part(i, n) * 2 / 3**0.5, 0 * x_a[0]"),
     line("area of competence ends at the virtual slave node", PATCH, "box3",
@@ -315,13 +315,13 @@ MUTANTS = (
     line("virtual slave node not moved with its cut area", TANGENT, "box3",
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q)",
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, middle_of_part(i, n) + 1 / n, middle_of_part(i, n) - 1 / n); "
-         "v = v._replace(c_p=c_p, c_q=c_q, x_p=between(x_a, x_b, c_p), x_q=between(x_a, x_b, c_q))"),
+         "v = v._replace(c_p=c_p, c_q=c_q, p=v.p._replace(c=c_p), q=v.q._replace(c=c_q))"),
     line("last point missing in the tangent", TANGENT, "box3_tangent",
          "for i in range(len(active)):\n        unknown", "for i in range(len(active) - 1):\n        unknown"),
     line("rotation of the frame that cuts missing", TANGENT, "box3_tangent",
-         "lever = dot(minus(between(x_a, x_b, c), x_e), normal)", "lever = 0.0"),
+         "lever = dot(arm(x_e, PointOnSegment(x_a, x_b, c)), normal)", "lever = 0.0"),
     line("lever of the ends of an area missing", TANGENT, "box3_tangent",
-         "lever = dot(minus(x_end, x_f), v.normal) - end * dot(fm, v.normal)", "lever = 0.0"),
+         "lever = dot(fp, v.normal) - end * dot(fm, v.normal)", "lever = 0.0"),
     line("rotation of the projected length missing", TANGENT, "box3_tangent",
          "d_length[:N_CORE] = dot(minus(x_m, x_f), v.normal) * d_omega", "pass"),
     line("g ω missing in Δξ", TANGENT, "eq6",
@@ -339,17 +339,17 @@ MUTANTS = (
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q)",
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q); "
          "l_0, t_0, n_0 = frame(node(reference, node_1), node(reference, node_2)); "
-         "v = v._replace(l_12=l_0, t=t_0, normal=n_0, g=dot(minus(v.x_v, x_1), n_0))"),
+         "v = v._replace(l_12=l_0, t=t_0, normal=n_0, g=dot(v.d, n_0))"),
     line("normal along the axis", OBJECTIVITY, "eq6",
          "l_12, t, normal = frame(x_1, node(x, node_2))",
          "l_12, t, normal = frame(x_1, node(x, node_2)); normal = (0 * normal[0], 1.0 + 0 * normal[1])",
          factory="vts_me"),
     line("absolute tolerance for a gap", SCALING, "walk",
-         "is_pressed(dot(minus(x_v, x_1), normal),", "is_pressed(dot(minus(x_v, x_1), normal) - 1e-9,"),
+         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) - 1e-9,"),
     line("absolute guard against a division by zero", SCALING, "box3",
-         "xi = dot(minus(v.x_v, v.x_1), v.t) / v.l_12", "xi = dot(minus(v.x_v, v.x_1), v.t) / (v.l_12 + 1e-12)"),
+         "xi = dot(v.d, v.t) / v.l_12", "xi = dot(v.d, v.t) / (v.l_12 + 1e-12)"),
     line("shortest length allowed, absolute", SCALING, "eq6",
-         "xi = dot(minus(x_v, x_1), t) / l_12", "xi = dot(minus(x_v, x_1), t) / max(l_12.real, 1e-9)",
+         "xi = dot(d, t) / l_12", "xi = dot(d, t) / max(l_12.real, 1e-9)",
          factory="vts_me"),
     Mutant("small forces dropped", SCALING, lambda *, penalty: _drops_small_forces(penalty)),
     line("NaN on a segment seen edge-on", PURITY, "walk",
@@ -396,7 +396,7 @@ SURVIVORS = (
     # `tests/plugins/test_free_ends.py` catches it.
     line("share of an interior segment cut where the foot lies past its end", "free_end.interior", "walk",
          "    return clip_p, clip_q",
-         "    if dot(minus(x_q, node(x, master[last, 0])), t) < 0:\n        clip_q = 0\n"
-         "    if dot(minus(x_p, node(x, master[first, 1])), t) > 0:\n        clip_p = 1\n"
+         "    if dot(arm(node(x, master[last, 0]), q), t) < 0:\n        clip_q = 0\n"
+         "    if dot(arm(node(x, master[first, 1]), p), t) > 0:\n        clip_p = 1\n"
          "    return clip_p, clip_q", factory="vts_ppt"),
 )  # fmt: skip

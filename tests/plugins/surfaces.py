@@ -1,4 +1,4 @@
-"""Surfaces for the tests of formulations: bent and pressed into each other, flat and pressed evenly."""
+"""Surfaces for the tests of formulations: bent and pressed into each other, flat and pressed evenly, on a grid."""
 
 from __future__ import annotations
 
@@ -39,6 +39,37 @@ def make_flat(slave: Sequence[float], master: Sequence[float], shift: float = 0.
     x = interface.nodes.copy()
     x[: len(upper), 1] -= DEPTH
     return interface, x.ravel()
+
+
+def make_on_grid(kind: str, seed: int, depth: float) -> tuple[Interface, Any]:
+    """Return facing surfaces with coordinates on 2⁻³², penetrating by about `depth`: the interface and positions.
+
+    Points inside their segments need more bits than nodes, so a translation by 2²⁰ rounds them and leaves nodes exact.
+    The kinds are "flat", "turned", "tilted" (the slave alone is turned, by .05 to .4), "kinked" and "overhanging".
+    """
+    random = np.random.default_rng(seed)
+    slave, master = (np.cumsum(random.uniform(0.2, 2, random.integers(3, 9))) for _ in range(2))
+    slave += random.uniform(-0.5, 0.5)
+    along = np.append(slave - slave.mean(), master[::-1] - master.mean())
+    x = np.column_stack([along, np.zeros_like(along)])
+    if kind == "overhanging":
+        x[: len(slave), 0] += 1.5
+    if kind == "kinked":
+        x[:, 1] = random.normal(scale=0.1, size=len(x))
+    reference, on_slave = x, slice(0, len(slave))
+    x = reference - [0, depth] * (np.arange(len(x)) < len(slave))[:, None]
+    if kind == "tilted":
+        x[on_slave] = _turn(x[on_slave] - x[on_slave].mean(axis=0), random.uniform(0.05, 0.4)) + x[on_slave].mean(
+            axis=0
+        )
+    angle = 0.0 if kind == "flat" else random.uniform(0, 2 * np.pi)
+    reference, x = (np.round(_turn(each, angle) * 2.0**32) / 2.0**32 for each in (reference, x))
+    return Interface.from_chains(reference[on_slave], reference[len(slave) :]), x
+
+
+def _turn(x: Any, angle: float) -> Any:
+    """Turn positions (n_nodes, 2) about the origin."""
+    return x @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
 def contact_forces(formulation: Any, interface: Interface, z: Any) -> Any:
