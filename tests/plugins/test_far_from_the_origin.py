@@ -67,12 +67,12 @@ def answers(formulation: Any, interface: Interface, z: Any) -> tuple[dict[str, A
         formulation.tangent(interface, pairing, z).tocoo(),
         formulation.contact_points(interface, pairing, z),
     )
-    said = {f"pairing {name}": array for name, array in pairing.items()}
-    said |= {"residual": formulation.residual(interface, pairing, z)}
-    said |= {"tangent": dense(tangent)}
-    said |= {f"points {each.name}": getattr(points, each.name) for each in fields(ContactPoints)}
-    del said["points position"]
-    return said, bool(points.active.any())
+    all_arrays = {f"pairing {name}": array for name, array in pairing.items()}
+    all_arrays |= {"residual": formulation.residual(interface, pairing, z)}
+    all_arrays |= {"tangent": dense(tangent)}
+    all_arrays |= {f"points {each.name}": getattr(points, each.name) for each in fields(ContactPoints)}
+    del all_arrays["points position"]
+    return all_arrays, bool(points.active.any())
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)
@@ -90,7 +90,7 @@ def test_an_exact_translation_changes_no_bit(name: str) -> None:
                 assert np.array_equal((x + offset) - offset, x)
                 moved = Interface(interface.nodes + offset, interface.slave, interface.master)
                 far, _ = answers(formulation, moved, np.append(x + offset, multipliers))
-                for what, array in near.items():
-                    same = array.tobytes() == far[what].tobytes()
-                    assert same, (kind, seed, offset, what)
+                for name_of_array, array in near.items():
+                    same = array.tobytes() == far[name_of_array].tobytes()
+                    assert same, (kind, seed, offset, name_of_array)
     assert in_contact >= 16
