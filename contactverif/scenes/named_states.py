@@ -88,6 +88,13 @@ def _offset_case_c() -> Case:
     return Case(interface, np.vstack([slave, master]).reshape(-1), 16.0, name="offset-c")
 
 
+def _moved_case_c() -> Case:
+    """Return offset-c on coordinates of 2^-32, with the parameter "shift": a translation that rounds none of them."""
+    case = _offset_case_c()
+    nodes, z = (np.ldexp(np.round(np.ldexp(values, 32)), -32) for values in (case.interface.nodes, case.z))
+    return Case(case.interface.at(nodes), z, case.penalty, {"shift": np.array([2.0**20, -(2.0**20)])}, name="moved")
+
+
 def _places(lengths: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(lengths)])
 
@@ -96,5 +103,9 @@ def _points(x: Sequence[float] | FloatArray, height: float = 0.0) -> FloatArray:
     return np.column_stack([x, np.full(len(x), height)])
 
 
-_OTHERS: dict[str, Callable[[], Case]] = {"tilted": _tilt_segment, "offset-c": _offset_case_c}
+_OTHERS: dict[str, Callable[[], Case]] = {
+    "tilted": _tilt_segment,
+    "offset-c": _offset_case_c,
+    "moved": _moved_case_c,
+}
 NAMED: tuple[str, ...] = (*_FLAT, *_OTHERS)

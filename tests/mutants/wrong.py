@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import wrong_purity
+import wrong_stability
 from mutate import Mutant, Wrapped, changed_line
 
 import contactverif_mortar
@@ -385,6 +386,7 @@ MUTANTS = (
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
     *wrong_purity.MUTANTS,
+    *wrong_stability.MUTANTS,
 )  # fmt: skip
 
 # The mutants that no property catches yet. Each names the property that is missing.

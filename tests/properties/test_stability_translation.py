@@ -1,0 +1,145 @@
+"""The judge of far states accuses who rounds points there, however it is written, and nobody else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from gauss_springs import RIGHT, WRONG, GaussSprings, by_points_first, in_single_precision, springs_of
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case, run
+from contactverif.strategies.translations import KINDS
+from contactverif_properties.stability_translation import (
+    FORCES,
+    SEARCH,
+    STABILITY_TRANSLATION,
+    TANGENT,
+    move_case,
+)
+
+
+@cache
+def cases(count: int = 100) -> tuple[Case, ...]:
+    return draw_cases(STABILITY_TRANSLATION.cases(None), seed="0/translation", examples=count).cases
+
+
+def measured(case: Case, subject: Subject) -> Measurement:
+    measurement = judge_case(STABILITY_TRANSLATION, case, subject).measurement
+    assert measurement is not None
+    return measurement
+
+
+def test_every_case_moves_without_rounding_and_every_kind_is_drawn() -> None:
+    for case in cases():
+        far = move_case(case, case.parameters["shift"])
+        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
+        assert np.array_equal(far.interface.nodes - case.parameters["shift"], case.interface.nodes)
+        assert np.array_equal(case.z * 2.0**32, np.round(case.z * 2.0**32))
+    assert {case.kind for case in cases()} == set(KINDS)
+    assert max(float(np.abs(case.parameters["shift"]).max()) for case in cases()) == 2.0**20
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None:
+    way, before = RIGHT[name]
+    subject = springs_of(way, before, translation_stable=True)
+    outcomes = [judge_case(STABILITY_TRANSLATION, case, subject) for case in cases()]
+    assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
+    assert sum(measured(case, subject).idle for case in cases()) <= 10
+    assert max(max(measured(case, subject).values.values()) for case in cases()) <= 4
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_formulation_is_accused_by_five_orders_of_magnitude(name: str) -> None:
+    way, before = WRONG[name]
+    subject = springs_of(way, before, translation_stable=True)
+    assert max(measured(case, subject).values[FORCES.name] for case in cases()) >= 1e5
+
+
+def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
+    silent, boastful = springs_of(by_points_first), springs_of(by_points_first, translation_stable=True)
+    result = run([silent], [STABILITY_TRANSLATION], examples=20, seed=0)
+    assert result.rows[0].verdict is Verdict.FAIL
+    assert result.promises_kept
+    assert run([boastful], [STABILITY_TRANSLATION], examples=20, seed=0).rows[0].unexpected
+
+
+def test_a_statement_of_not_being_stable_is_kept_by_a_named_state() -> None:
+    witnesses = {"stability.translation": "moved"}
+    stated = springs_of(by_points_first, translation_stable=False, witnesses=witnesses)
+    assert run([stated], [STABILITY_TRANSLATION], examples=10, seed=0).promises_kept
+    way, before = RIGHT["einsum"]
+    modest = springs_of(way, before, translation_stable=False, witnesses=witnesses)
+    assert (
+        run([modest], [STABILITY_TRANSLATION], examples=10, seed=0).rows[0].unexpected == "stated to fail, but passes"
+    )
+
+
+def test_a_tangent_that_rounds_points_is_accused_where_the_forces_are_right() -> None:
+    def make(*, penalty: float) -> GaussSprings:
+        way, before = RIGHT["differences first"]
+        springs = GaussSprings(penalty, way, before, translation_stable=True)
+        springs.tangent_way = by_points_first
+        return springs
+
+    subject = Subject("wrong tangent", make)
+    measurements = [measured(case, subject) for case in cases()]
+    assert max(measurement.values[FORCES.name] for measurement in measurements) <= 4
+    assert max(measurement.values[TANGENT.name] for measurement in measurements) >= 1e4
+
+
+def test_a_search_that_rounds_is_accused_where_forces_on_the_old_pairing_are_right() -> None:
+    def make(*, penalty: float) -> GaussSprings:
+        way, before = RIGHT["differences first"]
+        springs = GaussSprings(penalty, way, before, translation_stable=True)
+        springs.search_before = in_single_precision
+        return springs
+
+    outcomes = [judge_case(STABILITY_TRANSLATION, case, Subject("search", make)) for case in cases()]
+    failures = [outcome.measurement for outcome in outcomes if outcome.verdict is Verdict.FAIL]
+    assert len(failures) >= 10
+    for measurement in failures:
+        assert measurement is not None
+        assert measurement.values[FORCES.name] <= 4 < measurement.values[SEARCH.name]
+
+
+class ResidualOnly:
+    """The same springs without `pair`: each residual decides anew."""
+
+    def __init__(self, inner: GaussSprings) -> None:
+        self.inner = inner
+        self.traits = replace(inner.traits, batched=False)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.inner.residual(interface, self.inner.pair(interface, z), z)
+
+
+@pytest.mark.parametrize("name", ["differences first", "cross product", "point rounded before the difference"])
+def test_a_plugin_that_is_a_residual_and_nothing_else_is_judged(name: str) -> None:
+    way, before = (RIGHT | WRONG)[name]
+    inner = springs_of(way, before, translation_stable=True)
+    subject = Subject(name, lambda *, penalty: ResidualOnly(inner.with_penalty(penalty).plugin))
+    verdicts = [judge_case(STABILITY_TRANSLATION, case, subject).verdict for case in cases(60)]
+    assert (Verdict.FAIL in verdicts) is (name in WRONG)
+    assert verdicts.count(Verdict.UNDECIDED) <= (10 if name in WRONG else 0)
+
+
+def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
+    distant = Interface.from_chains([[1e6, 5e5], [1e6 + 1, 5e5], [1e6 + 2, 5e5]], [[1e6 + 2.5, 5e5], [1e6 - 1, 5e5]])
+    drawn = draw_cases(STABILITY_TRANSLATION.cases(distant), seed="0", examples=20).cases
+    for case in drawn:
+        assert case.largest_coordinate < 4
+        far = move_case(case, case.parameters["shift"])
+        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
+    way, before = RIGHT["einsum"]
+    assert all(
+        judge_case(STABILITY_TRANSLATION, case, springs_of(way, before)).verdict is Verdict.PASS for case in drawn
+    )
