@@ -137,17 +137,18 @@ def _is_nearest(
     """Return whether no other candidate is nearer in the middle of the overlap of candidate `along[place]`.
 
     `along` sorts the candidates by their lower ends, and `reached` is the highest upper end of those before. Of two
-    equally near segments the one with the lower number counts as nearer.
+    equally near segments the one with the lower number counts as nearer. The middle may be at the end of the other: two
+    segments that meet there hide what is behind them as one.
     """
     i = along[place]
     middle = (table[i, LOW] + table[i, HIGH]) / 2
     # Overlapping are at most the candidates before this one, if any of them reaches its middle, and behind it those
-    # that begin before its middle.
-    start, stop = 0 if reached > middle else place + 1, place + 1
-    while stop < len(along) and table[along[stop], LOW] < middle:
+    # that do not begin behind its middle.
+    start, stop = 0 if reached >= middle else place + 1, place + 1
+    while stop < len(along) and table[along[stop], LOW] <= middle:
         stop += 1
     for other in along[start:stop]:
-        if other != i and table[other, LOW] < middle < table[other, HIGH]:
+        if other != i and table[other, LOW] <= middle <= table[other, HIGH]:
             x_1, x_2 = node(x, master[members[other], 0]), node(x, master[members[other], 1])
             _, gap, _ = facing_point(view, x_1, x_2, middle)
             if abs(gap) < table[i, GAP] or (abs(gap) == table[i, GAP] and members[other] < members[i]):
