@@ -22,14 +22,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.strategies import flat_cases
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.roundoff import gap_quantity, gap_tolerance
-from contactverif_properties.shared.uniform_pressure import forces_of_penetration, unit_forces
+from contactverif_properties.shared.uniform_pressure import forces_of_gap, forces_of_penetration
 
 FORCE_ERROR = gap_quantity("error of a nodal force")
 
@@ -49,36 +48,12 @@ def measure_transmission(case: Case, subject: Subject) -> Measurement:
     Measurement
         The largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless.
     """
-    formulation = subject.for_case(case)
     exact = forces_of_penetration(case)
     size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
     tolerance = gap_tolerance(case, case.parameter("penetration"))
-    if formulation.n_multipliers(case.interface):
-        forces, largest = _forces_of_multipliers(case, subject, formulation, exact)
-        tolerance *= largest
-    else:
-        forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
-    error = float(np.linalg.norm(forces.reshape(-1, 2) - exact, axis=1).max())
-    return Measurement({FORCE_ERROR.name: error / size}, {FORCE_ERROR.name: tolerance})
-
-
-def _forces_of_multipliers(
-    case: Case, subject: Subject, formulation: CheckedFormulation, exact: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the forces (n_unknowns,) of the multipliers that are judged, and the largest multiplier over the mean."""
-    pressure = case.penalty * case.parameter("penetration")
-    uniform = np.full(formulation.n_multipliers(case.interface), pressure)
-    state = case.with_multipliers(uniform)
-    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
-    if subject.traits.penalty == "nodal":
-        multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
-        mean = float(np.abs(multipliers).mean())
-        return transfer @ multipliers, float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
-    forces: FloatArray = transfer @ uniform
-    n = 2 * case.interface.n_slave_nodes
-    total, exact_total = (nodal[:n].reshape(-1, 2).sum(axis=0) for nodal in (forces, exact.reshape(-1)))
-    projection = float(total @ exact_total)
-    return forces * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
+    forces, largest = forces_of_gap(case, subject, exact)
+    error = float(np.linalg.norm(forces - exact, axis=1).max())
+    return Measurement({FORCE_ERROR.name: error / size}, {FORCE_ERROR.name: tolerance * largest})
 
 
 FLAT_TRANSMISSION = Property(

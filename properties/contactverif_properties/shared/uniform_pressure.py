@@ -7,7 +7,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.subject import CheckedFormulation
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import uniform_pressure_weights
 
 
@@ -38,6 +38,49 @@ def consistent_forces(case: Case, pressure: float) -> FloatArray:
 def forces_of_penetration(case: Case) -> FloatArray:
     """Return the consistent forces (n_nodes, 2) of the pressure ε̂ |g| of a flat case with a uniform penetration."""
     return consistent_forces(case, case.penalty * case.parameter("penetration"))
+
+
+def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[FloatArray, float]:
+    """Return the forces of a formulation in a state that penetrates uniformly, to compare them with the exact ones.
+
+    With multipliers only the distribution of the forces can be right or wrong, and not their size. Uniform multipliers
+    count if they are pressures, scaled to the exact total. If they are nodal forces, those count that come nearest to
+    the exact forces.
+
+    Parameters
+    ----------
+    case : Case
+        A case with the parameter `penetration`, a length.
+    subject : Subject
+        The formulation.
+    exact : FloatArray, shape (n_nodes, 2)
+        The exact forces.
+
+    Returns
+    -------
+    forces : FloatArray, shape (n_nodes, 2)
+        The forces that push the nodes.
+    largest : float
+        The largest multiplier over the mean one, by which roundoff grows; 1 without nodal multipliers.
+    """
+    formulation = subject.for_case(case)
+    count = formulation.n_multipliers(case.interface)
+    if not count:
+        forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+        return forces.reshape(-1, 2), 1.0
+    uniform = np.full(count, case.penalty * case.parameter("penetration"))
+    state = case.with_multipliers(uniform)
+    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    if subject.traits.penalty == "nodal":
+        multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
+        mean = float(np.abs(multipliers).mean())
+        largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
+        return (transfer @ multipliers).reshape(-1, 2), largest
+    nodal: FloatArray = (transfer @ uniform).reshape(-1, 2)
+    n = case.interface.n_slave_nodes
+    total, exact_total = nodal[:n].sum(axis=0), exact[:n].sum(axis=0)
+    projection = float(total @ exact_total)
+    return nodal * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
 
 
 def unit_forces(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
