@@ -31,7 +31,7 @@ def cases(count: int = 100) -> tuple[Case, ...]:
     return draw_cases(STABILITY_TRANSLATION.cases(None), seed="0/translation", examples=count).cases
 
 
-def measured(case: Case, subject: Subject) -> Measurement:
+def measure_case(case: Case, subject: Subject) -> Measurement:
     measurement = judge_case(STABILITY_TRANSLATION, case, subject).measurement
     assert measurement is not None
     return measurement
@@ -53,15 +53,15 @@ def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None
     subject = springs_of(way, before, translation_stable=True)
     outcomes = [judge_case(STABILITY_TRANSLATION, case, subject) for case in cases()]
     assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
-    assert sum(measured(case, subject).idle for case in cases()) <= 10
-    assert max(max(measured(case, subject).values.values()) for case in cases()) <= 4
+    assert sum(measure_case(case, subject).idle for case in cases()) <= 10
+    assert max(max(measure_case(case, subject).values.values()) for case in cases()) <= 4
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_formulation_is_accused_by_five_orders_of_magnitude(name: str) -> None:
     way, before = WRONG[name]
     subject = springs_of(way, before, translation_stable=True)
-    assert max(measured(case, subject).values[FORCES.name] for case in cases()) >= 1e5
+    assert max(measure_case(case, subject).values[FORCES.name] for case in cases()) >= 1e5
 
 
 def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
@@ -91,7 +91,7 @@ def test_a_tangent_that_rounds_points_is_accused_where_the_forces_are_right() ->
         return springs
 
     subject = Subject("wrong tangent", make)
-    measurements = [measured(case, subject) for case in cases()]
+    measurements = [measure_case(case, subject) for case in cases()]
     assert max(measurement.values[FORCES.name] for measurement in measurements) <= 4
     assert max(measurement.values[TANGENT.name] for measurement in measurements) >= 1e4
 
@@ -112,7 +112,7 @@ def test_a_search_that_rounds_is_accused_where_forces_on_the_old_pairing_are_rig
 
 
 class ResidualOnly:
-    """The same springs without `pair`: each residual decides anew."""
+    """Springs without `pair`, which decide anew in each residual."""
 
     def __init__(self, inner: GaussSprings) -> None:
         self.inner = inner
@@ -134,12 +134,12 @@ def test_a_plugin_that_is_a_residual_and_nothing_else_is_judged(name: str) -> No
 
 def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     distant = Interface.from_chains([[1e6, 5e5], [1e6 + 1, 5e5], [1e6 + 2, 5e5]], [[1e6 + 2.5, 5e5], [1e6 - 1, 5e5]])
-    drawn = draw_cases(STABILITY_TRANSLATION.cases(distant), seed="0", examples=20).cases
-    for case in drawn:
+    states = draw_cases(STABILITY_TRANSLATION.cases(distant), seed="0", examples=20).cases
+    for case in states:
         assert case.largest_coordinate < 4
         far = move_case(case, case.parameters["shift"])
         assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
     way, before = RIGHT["einsum"]
     assert all(
-        judge_case(STABILITY_TRANSLATION, case, springs_of(way, before)).verdict is Verdict.PASS for case in drawn
+        judge_case(STABILITY_TRANSLATION, case, springs_of(way, before)).verdict is Verdict.PASS for case in states
     )
