@@ -5,7 +5,7 @@
 
 Every kind is constructed, and none is filtered. Where exactness is the point (a hit node, a tie), coordinates are exact
 in binary and stay so under the motion. The other cases have full mantissas: sevenths, any rotation, offsets to 2^20.
-A test checks by the exact oracle that each case is of its kind.
+The oracle says whether a case is of its kind (`contactverif.oracle.is_of_kind`), and a test asks it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.strategies import given_interface, segment_kinds, vertex_kinds
+from contactverif.strategies import given_projections, segment_kinds, vertex_kinds
 from contactverif.strategies.sketches import Sketch, sketch_cases
 
 _SKETCHES: dict[str, SearchStrategy[Sketch]] = {
@@ -74,8 +74,8 @@ def projection_states(interface: Interface | None = None) -> SearchStrategy[Case
     Parameters
     ----------
     interface : Interface | None
-        Small meshes drawn for each kind if None; else random states of this one.
+        Small meshes drawn for each kind if None; else states of this one, each called by the kind that it is of.
     """
     if interface is not None:
-        return given_interface.states(interface, smooth=False)
+        return given_projections.states(interface)
     return st.one_of(*map(cases_of_kind, KINDS))

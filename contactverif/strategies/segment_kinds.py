@@ -41,12 +41,11 @@ def inside(draw: DrawFn) -> Sketch:
 @st.composite
 def angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
     """Draw a foot inside a segment; the slave segment is turned against the master by this angle, either way."""
-    length, point = draw(_feet_inside())
+    exact = {90.0: (0.0, 1.0), 180.0: (-1.0, 0.0)}
+    length, point = draw(_feet_inside(exact=degrees in exact))
     c, size = draw(st.sampled_from(NODES_AND_OTHERS)), length * draw(st.sampled_from([1.0, 0.5, 2.0]))
-    upright = draw(st.sampled_from([1.0, -1.0]))
-    exact = {90.0: (0.0, upright), 180.0: (-1.0, 0.0)}
-    along, across = exact.get(degrees, (cos(radians(degrees)), upright * sin(radians(degrees))))
-    steps = [(size * along, size * across)] * draw(st.integers(1, 3))
+    along, across = exact.get(degrees, (cos(radians(degrees)), sin(radians(degrees))))
+    steps = [(size * along, size * across * draw(st.sampled_from([1.0, -1.0])))] * draw(st.integers(1, 3))
     segment = draw(st.integers(0, len(steps) - 1))
     slave = slave_through(point, c, steps, segment)
     return Sketch(kind, [_graph(draw, length)], slave, segment, c, exact=degrees in exact)
@@ -74,7 +73,7 @@ def one_of_several(draw: DrawFn, role: str) -> Sketch:
     tilt = draw(st.sampled_from([0.0, 0.125, -0.125, 0.25]))
     point = ((1 + c) / 2 * width, draw(gaps()) * width / 8)
     slave = slave_through(point, c, [(width, tilt * width)] * (before + 1 + after), before)
-    return Sketch(f"{role} of several segments", [upper_side(line)], slave, before, c)
+    return Sketch(f"{role} of several segments", [upper_side(line)], slave, before, c, mirrored=False)
 
 
 @st.composite
@@ -102,8 +101,8 @@ def free_end(draw: DrawFn) -> Sketch:
 @st.composite
 def small_overlap(draw: DrawFn) -> Sketch:
     """Draw a slave whose last node is 2^-k of a master segment inside the master's free end, the rest outside."""
-    length, overlap = draw(_LENGTHS), ldexp(1.0, -draw(st.integers(1, 30)))
-    steps, segment = draw(slave_steps(length))
+    length, overlap = draw(_LENGTHS), ldexp(1.0, -draw(st.integers(2, 30)))
+    steps, segment = draw(slave_steps(2 * length))
     slave = slave_through((overlap * length, draw(gaps()) * length * 0.5), 1.0, steps[: segment + 1], segment)
     masters = [_graph(draw, length, left=False)]
     return Sketch("overlap going to zero", masters, slave, segment, 1.0, exact=True)
@@ -121,12 +120,12 @@ def closing_segment(draw: DrawFn) -> Sketch:
     nodes = [(0.0, 0.0), (0.0, height), *((length * part, height) for part in between), (length, height), (length, 0.0)]
     master = Chain(np.array(nodes), closed=True)
     c, point = draw(st.sampled_from(ROUND_PLACES)), (x, y / 2)
+    steps, segment = draw(slave_steps(length / 4))
     if draw(st.booleans()):
         size = length / 4
         (left, right) = slave_through(point, c, [(size, 0.0)], 0).points
         box = np.array([right, right + [0, size], left + [0, size], left])
         return Sketch("closing segment", [master], Chain(box, closed=True), 3, c, ordered=True)
-    steps, segment = draw(slave_steps(length / 4))
     slave = slave_through(point, c, steps, segment)
     return Sketch("closing segment", [master], slave, segment, c, ordered=True)
 
@@ -137,7 +136,7 @@ def second_body(draw: DrawFn) -> Sketch:
     length, part = draw(_LENGTHS), draw(st.integers(1, 7)) / 8
     behind = length * draw(st.sampled_from([1.0, 0.25, 0.0625]))
     gap = draw(gaps()) * behind
-    if gap < 0 and draw(st.booleans()) and draw(st.booleans()):
+    if draw(st.sampled_from([False, False, False, True])) and gap < 0:
         gap = -behind - gap
     c = draw(st.sampled_from(ROUND_PLACES))
     steps, segment = draw(slave_steps(length / 8))
@@ -162,9 +161,9 @@ def other_node(draw: DrawFn) -> Sketch:
 
 
 @st.composite
-def _feet_inside(draw: DrawFn) -> tuple[float, tuple[float, float]]:
+def _feet_inside(draw: DrawFn, *, exact: bool = False) -> tuple[float, tuple[float, float]]:
     """Draw a length, and a point over the inside of a segment of that length, no farther from it than from its ends."""
-    length, denominator = draw(_LENGTHS), draw(st.sampled_from([8, 7]))
+    length, denominator = draw(_LENGTHS), 8 if exact else draw(st.sampled_from([8, 7]))
     part = draw(st.integers(1, denominator - 1)) / denominator
     room = 2.0 ** floor(log2(2 * min(part, 1 - part)))
     return length, (part * length, draw(gaps()) * room * length)

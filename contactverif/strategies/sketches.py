@@ -25,7 +25,7 @@ FURTHEST = 2**20  # The largest offset, in units of the lattice.
 NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
 ROUND_PLACES = (*NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75)  # Gauss points too, which are not on the lattice.
 TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
-FINEST_GAP = 28  # Gaps go down to 2^-30, 1e-9.
+_SIZES = st.integers(1, 28), st.sampled_from([1.0, 0.75])  # The draws e and part of a gap 2^-e × part.
 _TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 _STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
 _COUNTS = st.integers(0, 2)
@@ -96,6 +96,8 @@ class Sketch:
         Rounding would spoil the kind.
     ordered : bool
         The numbers of nodes on the walk matter.
+    mirrored : bool
+        The mirror image is of the same kind.
     """
 
     kind: str
@@ -105,6 +107,7 @@ class Sketch:
     c: float
     exact: bool = False
     ordered: bool = False
+    mirrored: bool = True
 
     def mirror(self) -> Sketch:
         """Return the mirror image in the y-axis, every chain walked the other way."""
@@ -123,7 +126,7 @@ def _mirror(chain: Chain) -> Chain:
 def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
     """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about."""
     sketch = draw(sketches)
-    if draw(st.booleans()):
+    if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
     motion = draw(exact_turns() if sketch.exact else _any_motions())
     penalty, seed = draw(penalties()), draw(seeds())
@@ -140,16 +143,18 @@ def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
 @cache
 def gaps() -> SearchStrategy[float]:
     """Return gaps in units of a segment: 1e-9 to 1/2, half of them in penetration, some exactly zero."""
-    size = st.builds(lambda e, part: ldexp(part, -e), st.integers(1, FINEST_GAP), st.sampled_from([1.0, 0.75]))
-    inside = size.map(lambda gap: -gap)
-    return st.one_of(inside, size, inside, size, inside, st.just(0.0))
+    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
 
 
 @cache
 def nonzero_gaps() -> SearchStrategy[float]:
     """Return gaps as `gaps` does, without zero."""
-    size = st.builds(lambda e, part: ldexp(part, -e), st.integers(1, FINEST_GAP), st.sampled_from([1.0, 0.75]))
-    return st.one_of(size.map(lambda gap: -gap), size)
+    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
+
+
+def _gap(exponent: int, part: float, sign: int) -> float:
+    # All gaps take as many draws, or hypothesis would count zero as the simplest one.
+    return ldexp(sign * part, -exponent)
 
 
 def upper_side(left_to_right: Sequence[tuple[float, float]]) -> Chain:

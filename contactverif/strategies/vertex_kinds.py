@@ -47,14 +47,14 @@ def node_hit(draw: DrawFn) -> Sketch:
 @st.composite
 def coincident_nodes(draw: DrawFn) -> Sketch:
     """Draw matching meshes: each slave node stands over a master node, at the same place if the gap is zero."""
-    lengths, level = draw(st.lists(_LENGTHS, min_size=1, max_size=4)), draw(st.booleans())
-    gap = draw(gaps()) if level else 0.0
+    steps = draw(st.lists(st.tuples(_LENGTHS, _SLOPES, st.sampled_from([1, -1])), min_size=1, max_size=4))
+    level, gap = draw(st.sampled_from([True, False])), draw(gaps())
     line: Points = [(0.0, 0.0)]
-    for length in lengths:
-        slope = 0.0 if level else draw(_SLOPES) * draw(st.sampled_from([1, -1]))
-        line.append((line[-1][0] + length, line[-1][1] + slope * length))
+    for length, slope, sign in steps:
+        line.append((line[-1][0] + length, line[-1][1] + (0.0 if level else sign * slope * length)))
+    gap = gap if level else 0.0
     more = [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
-    segment, c = draw(st.integers(0, len(lengths) - 1)), draw(st.sampled_from([-1.0, 1.0]))
+    segment, c = draw(st.integers(0, len(steps) - 1)), draw(st.sampled_from([-1.0, 1.0]))
     slave = upper_side([(x, y + gap) for x, y in line[::-1]])
     return Sketch("coincident nodes", [upper_side(line + more)], slave, segment, c, True)
 

@@ -1,0 +1,112 @@
+"""Each case of a kind of projection is of that kind, as the exact oracle says, and every kind gets its share."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import Phase, find, settings
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.oracle import is_of_kind, kind_of, project_point
+from contactverif.oracle.projection_kinds import KIND_TESTS
+from contactverif.run.driver import draw_cases
+from contactverif.scenes.named_states import named_case
+from contactverif.strategies.projections import KINDS, cases_of_kind, projection_states
+
+FIXED = settings(derandomize=True, database=None, deadline=None, phases=[Phase.generate, Phase.shrink])
+COUNT = 40  # The number of cases of each kind.
+
+
+def collect_cases(strategy: SearchStrategy[Case], count: int) -> list[Case]:
+    """Return many cases, always the same, drawn as a run draws them."""
+    return list(draw_cases(strategy, seed="kinds", examples=count).cases)
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    return [case for kind in KINDS for case in collect_cases(cases_of_kind(kind), COUNT)]
+
+
+def probe_of(case: Case) -> tuple[int, float]:
+    return int(case.parameter("probe_segment")), case.parameter("probe_c")
+
+
+def test_every_case_is_of_the_kind_that_it_names(cases: list[Case]) -> None:
+    counts: Counter[str] = Counter()
+    for case in cases:
+        counts[case.kind] += is_of_kind(case.interface, case.z, case.kind, *probe_of(case))
+    print("\n" + "\n".join(f"{counts[kind]:6} of {COUNT}  {kind}" for kind in KINDS))
+    assert dict(counts) == dict.fromkeys(KINDS, COUNT)
+    assert tuple(KIND_TESTS) == KINDS
+
+
+def test_both_oracles_find_the_same_nearest_segment(cases: list[Case]) -> None:
+    """An inside point that `is_of_kind` finds has one nearest segment, and a foot on it, for `project_point` too."""
+    for case in cases:
+        projection = project_point(case.interface, case.z, *probe_of(case))
+        is_inside = len(projection.tied) == 1 and 0 < projection.xi < 1
+        assert is_of_kind(case.interface, case.z, "inside a segment", *probe_of(case)) == is_inside
+
+
+def test_each_kind_gets_its_share() -> None:
+    counts = Counter(case.kind for case in collect_cases(projection_states(), 1000))
+    print("\n" + "\n".join(f"{counts[kind]:6} {kind}" for kind in KINDS))
+    assert sum(counts.values()) == sum(counts[kind] for kind in KINDS)
+    assert min(counts[kind] for kind in KINDS) >= 1000 / len(KINDS) / 4
+
+
+def test_gaps_are_open_closed_and_zero_and_reach_1e_minus_9(cases: list[Case]) -> None:
+    counts: Counter[str] = Counter()
+    for case in cases:
+        projection = project_point(case.interface, case.z, *probe_of(case))
+        counts[("zero", "open", "in penetration")[projection.gap_sign]] += 1
+        size = float(abs(projection.signed_squared_gap)) ** 0.5 / case.shortest_segment
+        counts["below 1e-8"] += 0 < size < 1e-8
+        counts["above a quarter"] += size > 0.25
+    print("\n", counts)
+    assert min(counts.values()) >= len(cases) / 40
+    assert counts["in penetration"] > counts["open"] / 2
+
+
+def test_cases_are_far_away_turned_bent_and_long(cases: list[Case]) -> None:
+    counts: Counter[str] = Counter()
+    for case in cases:
+        counts["at rest"] += bool(np.abs(case.positions).max() <= 32)
+        counts["farther than 1e4 segments"] += case.largest_coordinate > 1e4 * case.shortest_segment
+        counts["of 53 bits"] += len({float(x).hex()[-1] for x in case.z.tolist()} - {"0"}) > 0
+        counts["several slave segments"] += len(case.interface.slave) > 1
+        counts["a slave of another length in the reference"] += not np.isclose(
+            case.interface.slave.lengths(case.interface.nodes)[0] * case.slave_length,
+            case.interface.slave.lengths(case.positions)[0] ** 2,
+        )
+    print("\n", counts)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_simplest_case_of_a_kind_can_be_drawn_by_hand(kind: str) -> None:
+    case = find(cases_of_kind(kind), lambda _: True, settings=FIXED)
+    assert len(case.interface.slave) <= 1 + (kind == "closing segment") * 3
+    assert len(case.interface.master) <= 6
+    assert np.abs(case.positions).max() <= 16
+    assert case.penalty == 1.0
+
+
+def test_a_given_interface_is_met_in_many_ways() -> None:
+    interface = named_case("c").interface
+    counts = Counter(case.kind for case in collect_cases(projection_states(interface), 200))
+    print("\n", counts)
+    assert len(counts) >= 6
+    for case in collect_cases(projection_states(interface), 20):
+        assert case.interface is interface
+        assert case.kind == kind_of(interface, case.z, *probe_of(case))
+
+
+def test_a_kind_that_does_not_hold_is_refused() -> None:
+    interface = Interface.from_chains(slave=[[0, 0], [1, 0]], master=[[2, 0], [-1, 0]])
+    z = np.array([0, -0.1, 1, -0.1, 2, 0, -1, 0])
+    holding = [kind for kind in KINDS if is_of_kind(interface, z, kind, 0, -1.0)]
+    assert holding == ["inside a segment"]
