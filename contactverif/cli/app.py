@@ -20,9 +20,11 @@ from contactverif.cli.compare_command import compare
 from contactverif.cli.draw_command import draw
 from contactverif.cli.list_command import list_installed
 from contactverif.cli.paper_command import paper
+from contactverif.cli.queries_command import queries
 from contactverif.cli.replay_command import replay
 from contactverif.cli.report_command import report
 from contactverif.cli.scenes_command import scenes
+from contactverif.cli.score_command import score
 from contactverif.cli.shared_options import spell_out_groups
 from contactverif.cli.verify_command import verify
 from contactverif.contract.errors import ContactverifError, MisuseError
@@ -42,6 +44,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "draw": draw,
     "paper": paper,
     "scenes": scenes,
+    "queries": queries,
+    "score": score,
 }
 for name, command in COMMANDS.items():
     app.command(name)(spell_out_groups(command))

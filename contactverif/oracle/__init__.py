@@ -5,16 +5,20 @@ the compiled geometry of plugins. Where it is affordable, the arithmetic is rati
 """
 
 from contactverif.oracle.consistent import uniform_pressure_weights, uniform_pressure_weights_exact
+from contactverif.oracle.exact_nearest import Nearest, NearSegment, nearest_segments
 from contactverif.oracle.exact_projection import Projection, project_point, projection_cases
 from contactverif.oracle.kink_distance import default_points, kink_margin
 from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 
 __all__ = [
+    "NearSegment",
+    "Nearest",
     "Projection",
     "default_points",
     "is_of_kind",
     "kind_of",
     "kink_margin",
+    "nearest_segments",
     "project_point",
     "projection_cases",
     "uniform_pressure_weights",

@@ -1,0 +1,73 @@
+"""A program under test: it reads queries from standard input and writes answers to standard output.
+
+Rule for the next editor: a clock is read here and nowhere else in this folder, and no decision depends on it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from contactverif.contract.errors import MisuseError
+from contactverif.studies.queries.answer_file import Answers, read_answers
+from contactverif.studies.queries.query_file import Queries, queries_text, read_queries
+from contactverif.studies.queries.text_lines import TextLines
+
+_RUNS = 5  # The fastest of these runs counts, with and without queries: what disturbs a machine only adds time.
+
+
+def ask_program(command: Sequence[str], path: Path) -> Answers:
+    """Run a program on a file of queries.
+
+    If the program states no seconds, it is run several times more: on the file, and on its surfaces without any query.
+    The difference of the fastest runs is the time of all decisions, with the reading and writing of their lines. So the
+    start of the program, and whatever it prepares for the surfaces, does not count.
+
+    Parameters
+    ----------
+    command : Sequence[str]
+        The program and its arguments.
+    path : Path
+        The file of queries.
+
+    Returns
+    -------
+    Answers
+        What it answers.
+
+    Raises
+    ------
+    MisuseError
+        If the program cannot be started or fails, or its answers cannot be read.
+    """
+    text = path.read_bytes()
+    queries, _ = read_queries(path)
+    answers = read_answers(TextLines(f"the output of {command[0]}", _run(command, text)), queries)
+    if answers.seconds:
+        return answers
+    bare = queries_text(Queries(queries.surfaces, ())).encode()
+    with_queries, without = (min(_time(command, part) for _ in range(_RUNS)) for part in (text, bare))
+    return replace(answers, seconds={"": max(0.0, with_queries - without)})
+
+
+def _run(command: Sequence[str], text: bytes) -> str:
+    """Return what the program writes for a text."""
+    try:
+        finished = subprocess.run(command, input=text, capture_output=True, check=False)
+    except OSError as error:
+        raise MisuseError("PROGRAM", f"{command[0]}: {error.strerror}", "a program that can be started") from error
+    if finished.returncode:
+        last = finished.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        words = f"{command[0]}, which ends with status {finished.returncode}" + "".join(f": {line}" for line in last)
+        raise MisuseError("PROGRAM", words, "a program that answers all queries and ends with status 0")
+    return finished.stdout.decode(errors="replace")
+
+
+def _time(command: Sequence[str], text: bytes) -> float:
+    """Return the seconds that a program runs."""
+    start = perf_counter()
+    _run(command, text)
+    return perf_counter() - start

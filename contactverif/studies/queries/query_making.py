@@ -1,0 +1,106 @@
+"""Queries of every kind with their exact answers: the same seed and number give the same queries, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from contactverif.contract.errors import MisuseError
+from contactverif.oracle.exact_nearest import Nearest, nearest_segments
+from contactverif.studies.queries.hard_kinds import HARD_KINDS
+from contactverif.studies.queries.kind_contract import Kind
+from contactverif.studies.queries.plain_kinds import PLAIN_KINDS
+from contactverif.studies.queries.query_dice import Dice, Vector
+from contactverif.studies.queries.query_file import ExactAnswer, Queries, Query, exact_text, queries_text
+from contactverif.studies.queries.query_shapes import Shape
+from contactverif_reports.files import whole
+
+KINDS = (*PLAIN_KINDS, *HARD_KINDS)
+_MOST_DRAWS = 1000  # Surfaces drawn in a row without a point of the kind; more is a mistake in the kind.
+
+
+def make_queries(seed: int, number: int) -> tuple[Queries, list[ExactAnswer]]:
+    """Draw queries, about as many of each kind, and find the exact answer of each.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed gives the same queries, on every machine.
+    number : int
+        The number of queries.
+
+    Returns
+    -------
+    tuple[Queries, list[ExactAnswer]]
+        The queries, kind by kind, and their answers in the same order.
+
+    Raises
+    ------
+    MisuseError
+        If the seed is negative or there are fewer queries than kinds.
+    """
+    if seed < 0:
+        raise MisuseError("seed", str(seed), "a number of at least 0")
+    if number < len(KINDS):
+        raise MisuseError("-n", str(number), f"at least {len(KINDS)}, one query of each kind")
+    surfaces: list[Shape] = []
+    queries: list[Query] = []
+    answers: list[ExactAnswer] = []
+    for place, kind in enumerate(KINDS):
+        share = number // len(KINDS) + (place < number % len(KINDS))
+        for shape, points in _draw_kind(kind, Dice(seed, place), share):
+            for point, nearest in points:
+                queries.append(Query(len(surfaces), point, kind.name))
+                answers.append(ExactAnswer.from_nearest(nearest))
+            surfaces.append(shape)
+    return Queries(tuple(surfaces), tuple(queries)), answers
+
+
+def exact_path(path: Path) -> Path:
+    """Return the name of the file of exact answers to a file of queries."""
+    return path.with_suffix(f".exact{path.suffix}")
+
+
+def write_queries(path: Path, seed: int, number: int) -> int:
+    """Write a file of queries and the file of their exact answers, each whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file of queries; `exact_path` names the other one.
+    seed, number : int
+        The seed and the number of the queries, as in `make_queries`.
+
+    Returns
+    -------
+    int
+        The number of kinds.
+
+    Raises
+    ------
+    MisuseError
+        If `make_queries` raises it.
+    """
+    queries, answers = make_queries(seed, number)
+    meanings = [f"{kind.name}: {kind.meaning}" for kind in KINDS]
+    questions = queries_text(queries, f"{number} queries of contactverif, seed {seed}, of these kinds:", *meanings)
+    about = f"exact answers to {number} queries of contactverif, seed {seed}"
+    for file, text in ((path, questions), (exact_path(path), exact_text(answers, questions, about))):
+        with whole(file) as part:
+            part.write_text(text, encoding="utf-8")
+    return len(KINDS)
+
+
+def _draw_kind(kind: Kind, dice: Dice, number: int) -> Iterator[tuple[Shape, list[tuple[Vector, Nearest]]]]:
+    """Yield surfaces with points of one kind and their exact answers, that many points in all."""
+    missing, failures = number, 0
+    while missing:
+        shape, points = kind.draw(dice)
+        answers = [(point, nearest_segments(shape.nodes, shape.segments, point)) for point in points]
+        suitable = [(point, nearest) for point, nearest in answers if kind.holds(shape, point, nearest)][:missing]
+        if suitable:
+            yield shape, suitable
+            missing -= len(suitable)
+        failures = 0 if suitable else failures + 1
+        if failures > _MOST_DRAWS:
+            raise RuntimeError(f"the kind {kind.name} draws surfaces without a point of its kind")
