@@ -11,7 +11,14 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import distance_to_segment, minus, nearest_segment, node, search_tree
+from contactverif.geometry.projection import (
+    PointOnSegment,
+    distance_to_segment,
+    minus,
+    nearest_segment,
+    node,
+    search_tree,
+)
 from contactverif.studies.queries.answer_file import Answer, Answers
 from contactverif.studies.queries.query_file import Queries
 
@@ -41,14 +48,14 @@ def _search(
         places, tree = order[begin[3] : end[3]], boxes[begin[4] : end[4]]
         for place in range(begin[0], end[0]):
             p = (points[place, 0], points[place, 1])
-            segment = nearest_segment(p, here, pairs, places, tree)
+            segment = nearest_segment(PointOnSegment(p, p, -1.0), here, pairs, places, tree)
             first, second = node(here, pairs[segment, 0]), node(here, pairs[segment, 1])
             along, towards = minus(second, first), minus(p, first)
             squared = along[0] * along[0] + along[1] * along[1]
             nearest[place] = segment
             values[place, 0] = (towards[0] * along[1] - towards[1] * along[0]) / np.sqrt(squared)
             values[place, 1] = (towards[0] * along[0] + towards[1] * along[1]) / squared
-            values[place, 2] = np.sqrt(distance_to_segment(p, first, second)[0])
+            values[place, 2] = np.sqrt(distance_to_segment(p, (0.0, 0.0), first, second)[0])
     return nearest, values
 
 
