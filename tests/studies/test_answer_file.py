@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from contactverif.contract.errors import MisuseError
+from contactverif.studies.queries import answering_program
 from contactverif.studies.queries.answer_file import Answer, Answers, read_answers
 from contactverif.studies.queries.answering_program import ask_program
 from contactverif.studies.queries.query_file import Queries, read_queries
@@ -25,16 +26,6 @@ surface 0 3 2
 query 0 0 -0.5 0.25 inside
 query 1 0 -0.5 -0.25 inside
 query 2 0 0.25 0.25 free-end
-"""
-# A program that takes a time for each query, besides a start that takes much longer.
-SLOW_PROGRAM = """
-import sys, time
-time.sleep(0.2)
-lines = sys.stdin.read().splitlines()
-for line in lines:
-    if line.startswith("query"):
-        time.sleep(0.02)
-        print(line.split()[1], "0 1 0.5 0.25")
 """
 
 
@@ -105,10 +96,20 @@ def test_a_long_line_is_cut(queries: Queries) -> None:
     assert len(str(error.value)) < 200
 
 
-def test_the_start_of_a_program_does_not_count(path: Path) -> None:
-    answers = ask_program([sys.executable, "-c", SLOW_PROGRAM], path)
+def test_the_start_of_a_program_does_not_count(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run without queries takes 3 s or a little more, a run with them 5 s; one is disturbed and takes longer."""
+    times = {True: iter([5.5, 5.0, 9.0, 5.25, 5.125]), False: iter([3.25, 3.5, 3.0, 3.125, 20.0])}
+    monkeypatch.setattr(answering_program, "_time", lambda command, text: next(times[b"\nquery" in text]))
+    script = "import sys\nfor line in sys.stdin:\n  if line[:5] == 'query': print(line.split()[1], '0 1 0.5 0.25')"
+    answers = ask_program([sys.executable, "-c", script], path)
     assert answers.answers == [Answer(0, 1, 0.5, 0.25)] * 3
-    assert 0.03 < answers.seconds[""] < 0.2  # Three queries; the start may take a little longer without them.
+    assert answers.seconds == {"": 2.0}
+
+
+def test_a_run_without_queries_still_reads_the_surfaces(path: Path) -> None:
+    script = "import sys; text = sys.stdin.read(); assert 'surface 0 3 2' in text\nif 'query 0' in text:\n"
+    script += "  for number in range(3): print(number, '?')"
+    assert ask_program([sys.executable, "-c", script], path).seconds[""] >= 0
 
 
 def test_a_program_that_states_its_seconds_runs_once(path: Path, tmp_path: Path) -> None:
