@@ -100,8 +100,8 @@ def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[f
     size = np.sqrt(dot(nu, nu))
     n = (nu[0] / size, nu[1] / size)
     tau = turn(n)
-    xi = dot(d, tau) / dot(along, tau)
-    return xi, xi * dot(along, n) - dot(d, n), n
+    length = dot(along, tau)  # negative
+    return dot(d, tau) / length, (along[0] * d[1] - along[1] * d[0]) / length, n
 
 
 @compile_kernel

@@ -18,7 +18,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -208,6 +208,7 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
             penalty="distributed",
             batched=True,
             takes_complex=True,
+            takes_longdouble=TAKES_LONGDOUBLE,
             witnesses={"patch.dead-zone": "dead-zone"},
             source="Chen & Hisada, as Zavarise & De Lorenzis describe it, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
         ),

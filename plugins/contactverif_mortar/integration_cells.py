@@ -21,7 +21,7 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_kernel, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
@@ -198,7 +198,7 @@ class Quadrature:
         Array, shape (n_states, n_cells × n_q, 6)
             Six numbers a point: c, ξ, gap (negative in penetration), weight (a length), normal out of the slave.
         """
-        return _points(x, *self._arguments(interface, cells))
+        return _points(x, *self._arguments(interface, cells, x))
 
     def gains(self, interface: Interface, cells: Cells, x: FloatArray) -> FloatArray:
         """Compute the Δ of the points of all cells.
@@ -218,14 +218,15 @@ class Quadrature:
             Δ of c, ξ, gap and weight, and the turn ω of the normal.
         """
         n_local = 6 if cells.averaged else 4
-        return _gains(x, n_local, *self._arguments(interface, cells))
+        return _gains(x, n_local, *self._arguments(interface, cells, x))
 
-    def _arguments(self, interface: Interface, cells: Cells) -> tuple[Fields, Fields, Fields]:
+    def _arguments(self, interface: Interface, cells: Cells, x: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `Segments`, `CellArrays` and `Rule`."""
+        reference, places, weights = match_precision(x, interface.nodes, self.places, self.weights)
         return (
-            (interface.slave.lengths(interface.nodes), interface.slave.segments, interface.master.segments),
+            (interface.slave.lengths(reference), interface.slave.segments, interface.master.segments),
             (cells.slave, cells.master, cells.cut_low, cells.cut_high, cells.before, cells.behind),
-            (self.places, self.weights, self.current),
+            (places, weights, self.current),
         )
 
 

@@ -21,6 +21,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
 from contactverif_mortar.weighted_gaps import Weighting, at_fixed_pressures, own_lengths
@@ -117,7 +118,8 @@ class MortarMultipliers:
         x, multipliers = split_states(interface, z)
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
         forces = weighted.forces(np.where(active, multipliers, 0.0), interface.n_nodes)
-        rows = np.where(active, -weighted.with_gap, multipliers * own_lengths(interface, interface.nodes))
+        (reference,) = match_precision(z, interface.nodes)
+        rows = np.where(active, -weighted.with_gap, multipliers * own_lengths(interface, reference))
         return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
@@ -249,5 +251,6 @@ def _traits(area: str, normals: str, dual: bool) -> Traits:
         penalty="distributed",
         batched=True,
         takes_complex=True,
+        takes_longdouble=TAKES_LONGDOUBLE,
         source=_SOURCES[dual],
     )

@@ -17,6 +17,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
 from contactverif_mortar.cell_geometry import D_GAP
@@ -116,6 +117,7 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
             penalty="distributed",
             batched=True,
             takes_complex=True,
+            takes_longdouble=TAKES_LONGDOUBLE,
             source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
         ),
         check_penalty(penalty),

@@ -29,7 +29,9 @@ UNCOVERED = 64 * UNIT_ROUNDOFF
 def own_lengths(interface: Interface, x: FloatArray) -> FloatArray:
     """Return half of the length of the segments at each slave node (n_slave_nodes,), at x (n_nodes, 2)."""
     halves = np.repeat(interface.slave.lengths(x) / 2, 2)
-    return np.bincount(interface.slave.segments.ravel(), halves, interface.n_slave_nodes).astype(np.float64)
+    ends, n_nodes = interface.slave.segments.ravel(), interface.n_slave_nodes
+    lengths: FloatArray = cell_forces.sum_by_place(halves[None], ends, n_nodes)[0]
+    return lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)

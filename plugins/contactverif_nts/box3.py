@@ -201,8 +201,9 @@ def area_of_competence(
     Where `cutting` names a master segment, master nodes cut the ends in its frame.
     """
     x_a, x_b = node(x, slave[i // n, 0]), node(x, slave[i // n, 1])
-    c, zero = middle_of_part(i, n), 0 * x_a[0]  # Zero has the type of x, real or complex.
-    c_p, c_q = c + 1 / n + zero, c - 1 / n + zero
+    unity = 1 + 0 * x_a[0]  # has the type of x
+    c = middle_of_part(i, n, unity)
+    c_p, c_q = c + unity / n, c - unity / n
     if cutting != NOT_CUT:
         _, t, _ = frame(node(x, master[cutting, 0]), node(x, master[cutting, 1]))
         if cut_p != NOT_CUT:

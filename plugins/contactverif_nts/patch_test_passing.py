@@ -29,6 +29,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
@@ -48,6 +49,7 @@ _PRINTED = Traits(
     penalty="distributed",
     batched=True,
     takes_complex=True,
+    takes_longdouble=TAKES_LONGDOUBLE,
     witnesses={"balance.force": "tilted", "balance.moment": "tilted", "patch.dead-zone": "dead-zone"},
     source=_PAPER,
 )
@@ -94,14 +96,14 @@ class PatchTestPassing:
         """Find the master segments under each area of competence, and decide which virtual slave nodes are active."""
         x, multipliers = split_state(interface, z)
         tree = search_tree(interface.master, x)
-        surfaces = self._surfaces(interface)
+        surfaces = self._surfaces(interface, interface.nodes)
         areas = walk.pair(x, multipliers, surfaces, tree, self.n, self.free_end, self.tau, self.penalty)
         return Pairing(dict(zip(Areas._fields, areas, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns) of Box 3 and, behind them, the constraints of multipliers."""
         x, multipliers = split_states(interface, z)
-        forces, rows = box3.residual(x, multipliers, *self._arguments(interface, pairing))
+        forces, rows = box3.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
@@ -109,7 +111,7 @@ class PatchTestPassing:
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
         x, multipliers = split_state(interface, z)
-        rows, columns, values = box3_tangent.tangent(x, multipliers, *self._arguments(interface, pairing))
+        rows, columns, values = box3_tangent.tangent(x, multipliers, *self._arguments(interface, pairing, z))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -150,15 +152,16 @@ class PatchTestPassing:
         )
 
     @staticmethod
-    def _surfaces(interface: Interface) -> Fields:
+    def _surfaces(interface: Interface, reference: FloatArray) -> Fields:
         """Return the fields of `Surfaces`."""
         master = interface.master
-        return interface.nodes, interface.slave.segments, master.segments, master.neighbours
+        return reference, interface.slave.segments, master.segments, master.neighbours
 
-    def _arguments(self, interface: Interface, pairing: Pairing) -> tuple[Fields, Fields, Fields]:
+    def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `Surfaces`, `Areas` and `Options`."""
+        (reference,) = match_precision(z, interface.nodes)
         areas = tuple([pairing[name] for name in Areas._fields])
-        return self._surfaces(interface), areas, (self.n, self.transmission, self.current_area, self.penalty)
+        return self._surfaces(interface, reference), areas, (self.n, self.transmission, self.current_area, self.penalty)
 
 
 def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: float = 1e-2) -> PatchTestPassing:

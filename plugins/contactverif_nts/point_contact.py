@@ -29,6 +29,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import eq6
 from contactverif_nts.eq6 import AREAS, Fields
@@ -72,20 +73,20 @@ class PointContact:
         """Find the nearest master segment of each point, and decide which points are active."""
         x, multipliers = split_state(interface, z)
         segment, other, slot = self._points(interface)
-        tree, surfaces = search_tree(interface.master, x), self._surfaces(interface)
+        tree, surfaces = search_tree(interface.master, x), self._surfaces(interface, interface.nodes)
         nearest, active = eq6.pair(x, multipliers, surfaces, tree, segment, slot, self.c, self.tau, self.penalty)
         return Pairing({"segment": segment, "other": other, "slot": slot, "master": nearest, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns) of Eq. 6 and, behind them, the constraints of multipliers."""
         x, multipliers = split_states(interface, z)
-        forces, rows = eq6.residual(x, multipliers, *self._arguments(interface, pairing))
+        forces, rows = eq6.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """Compute the derivative of the residual, sparse."""
         x, multipliers = split_state(interface, z)
-        rows, columns, values = eq6.tangent(x, multipliers, *self._arguments(interface, pairing))
+        rows, columns, values = eq6.tangent(x, multipliers, *self._arguments(interface, pairing, z))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -138,15 +139,16 @@ class PointContact:
         return segment, other, slot
 
     @staticmethod
-    def _surfaces(interface: Interface) -> Fields:
+    def _surfaces(interface: Interface, reference: FloatArray) -> Fields:
         """Return the fields of `eq6.Surfaces`."""
         master = interface.master
-        return interface.nodes, interface.slave.segments, master.segments, master.neighbours
+        return reference, interface.slave.segments, master.segments, master.neighbours
 
-    def _arguments(self, interface: Interface, pairing: Pairing) -> tuple[Fields, Fields, Fields]:
+    def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `eq6.Surfaces`, `eq6.Points` and `eq6.Options`."""
+        reference, c, weight = match_precision(z, interface.nodes, self.c, self.weight)
         points = tuple([pairing[name] for name in eq6.Points._fields])
-        return self._surfaces(interface), points, (self.c, self.weight, self.area_from, self.penalty)
+        return self._surfaces(interface, reference), points, (c, weight, self.area_from, self.penalty)
 
 
 def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
@@ -265,6 +267,7 @@ def _traits(patch_witness: str, penalty: str, area_from: int | None, symmetric: 
         penalty=penalty,  # type: ignore[arg-type]
         batched=True,
         takes_complex=True,
+        takes_longdouble=TAKES_LONGDOUBLE,
         witnesses={"patch": patch_witness, "patch.dead-zone": "dead-zone"},
         source=_PAPER,
     )

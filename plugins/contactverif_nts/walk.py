@@ -60,9 +60,12 @@ class Areas(NamedTuple):
 
 
 @compile_kernel
-def middle_of_part(i: int, n: int) -> float:
-    """Return where on its slave segment the virtual slave node i lies, c in [−1, 1]; there are n on each segment."""
-    return -1 + (2 * (i % n) + 1) / n
+def middle_of_part(i: int, n: int, unity: float) -> float:
+    """Return where on its slave segment the virtual slave node i lies, c in [−1, 1]; there are n on each segment.
+
+    The number `unity` is 1 in the type of the result.
+    """
+    return (2 * (i % n) + 1) * unity / n - 1
 
 
 @compile_kernel
@@ -87,7 +90,7 @@ def pair(
     active = np.zeros(n_points, dtype=np.bool_)
     for i in range(n_points):
         x_a, x_b = node(x, slave[i // n, 0]), node(x, slave[i // n, 1])
-        c = middle_of_part(i, n)
+        c = middle_of_part(i, n, 1.0)
         c_p, c_q = c + 1 / n, c - 1 / n
         m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
         if free_end == COVER:

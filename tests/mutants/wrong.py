@@ -288,10 +288,10 @@ MUTANTS = (
     line("pushes where the gap is open", PATCH, "walk",
          "is_pressed(dot(d, normal),", "is_pressed(-dot(d, normal),"),
     line("virtual slave nodes at Gauss points", PATCH, "box3",
-         "c, zero = middle_of_part(i, n), 0 * x_a[0]", "c, zero = middle_of_part(i, n) * 2 / 3**0.5, 0 * x_a[0]"),
+         "c = middle_of_part(i, n, unity)", "c = middle_of_part(i, n, unity) * 2 / 3**0.5"),
     line("area of competence ends at the virtual slave node", PATCH, "box3",
-         "c_p, c_q = c + 1 / n + zero, c - 1 / n + zero",
-         "c_p, c_q = c + (1 / n if i % n < n - 1 else 0) + zero, c - 1 / n + zero"),
+         "c_p, c_q = c + unity / n, c - unity / n",
+         "c_p, c_q = c + (unity / n if i % n < n - 1 else 0), c - unity / n"),
     line("walk ends one segment early", PATCH, "walk",
          "        last = following", "        last = following; break"),
     line("pushes the wrong way", PATCH, "box3",
@@ -315,7 +315,7 @@ MUTANTS = (
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2", "f_v = pressure * l_ab / n"),
     line("virtual slave node not moved with its cut area", TANGENT, "box3",
          "v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q)",
-         "v = virtual_slave_node(x_a, x_b, x_1, x_2, middle_of_part(i, n) + 1 / n, middle_of_part(i, n) - 1 / n); "
+         "c = middle_of_part(i, n, 1.0); v = virtual_slave_node(x_a, x_b, x_1, x_2, c + 1 / n, c - 1 / n); "
          "v = v._replace(c_p=c_p, c_q=c_q, p=v.p._replace(c=c_p), q=v.q._replace(c=c_q))"),
     line("last point missing in the tangent", TANGENT, "box3_tangent",
          "for i in range(len(active)):\n        unknown", "for i in range(len(active) - 1):\n        unknown"),

@@ -67,6 +67,23 @@ def make_on_grid(kind: str, seed: int, depth: float) -> tuple[Interface, Any]:
     return Interface.from_chains(reference[on_slave], reference[len(slave) :]), x
 
 
+def make_far(seed: int, ratio: float) -> tuple[Interface, Any]:
+    """Return flat surfaces near 1e6, with full mantissas and a penetration of 1e-6: the interface and positions.
+
+    They are turned by any angle. Lengths of segments are between 1/√ratio and √ratio.
+    """
+    random = np.random.default_rng(seed)
+    n_slave, n_master = random.integers(2, 8, 2)
+    chains = [np.cumsum(np.append(0, ratio ** random.uniform(-0.5, 0.5, n))) for n in (n_slave, n_master)]
+    along = np.concatenate([chain - chain.mean() for chain in (chains[0], chains[1][::-1])])
+    reference = np.column_stack([along, np.zeros_like(along)])
+    x = reference.copy()
+    x[: n_slave + 1, 1] -= 1e-6
+    angle, offset = random.uniform(0, 2 * np.pi), random.uniform(0.5, 1.5, 2) * 1e6
+    reference, x = (_turn(each, angle) + offset for each in (reference, x))
+    return Interface.from_chains(reference[: n_slave + 1], reference[n_slave + 1 :]), x
+
+
 def _turn(x: Any, angle: float) -> Any:
     """Turn positions (n_nodes, 2) about the origin."""
     return x @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])

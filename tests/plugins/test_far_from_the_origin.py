@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from every_formulation import FORMULATIONS, draw_multipliers
 from surfaces import make_on_grid
 
 from contactverif import Interface
@@ -14,50 +15,8 @@ from contactverif.contract.arrays import dense
 from contactverif.contract.formulation import ContactPoints
 from contactverif.run.registry import load_formulation
 
-FORMULATIONS = (
-    "nts",
-    "nts-ar",
-    "nts-ar:area=reference",
-    "vts-g:n=3",
-    "vts-g:area=reference",
-    "vts-me",
-    "vts-me:n=3,area=reference",
-    "vts-ppt",
-    "vts-ppt:n=3",
-    "vts-ppt:free_end=cover",
-    "vts-ppt:free_end=extend",
-    "vts-ppt-basic",
-    "vts-ppt-balanced",
-    "vts-ppt-balanced:n=3,area=reference",
-    "vts-ppt-balanced:free_end=truncate",
-    "nts-lm",
-    "vts-me-lm",
-    "vts-ppt-lm",
-    "vts-ppt-lm:transmission=balanced",
-    "two-pass/nts",
-    "two-pass/nts-ar:area=reference",
-    "two-pass/nts-lm",
-    "two-pass/mortar",
-    "sts",
-    "sts:area=reference",
-    "chen-hisada",
-    "chen-hisada:area=reference",
-    "mortar",
-    "mortar:area=reference",
-    "mortar:normals=averaged",
-    "mortar-dual",
-    "mortar-dual:normals=averaged,area=reference",
-    "mortar-lm",
-    "mortar-dual-lm:normals=averaged",
-)
 KINDS = ("flat", "turned", "tilted", "kinked", "overhanging")
 OFFSETS = ((2.0**20, 0.0), (-(2.0**20), 2.0**20), (2.0**10, -(2.0**17)))
-
-
-def multipliers_of(formulation: Any, interface: Interface, seed: int) -> Any:
-    """Return random multipliers, most of which press."""
-    n_multipliers = formulation.n_multipliers(interface)
-    return np.random.default_rng(seed).uniform(-0.1, 1, n_multipliers)
 
 
 def answers(formulation: Any, interface: Interface, z: Any) -> tuple[dict[str, Any], bool]:
@@ -83,7 +42,7 @@ def test_an_exact_translation_changes_no_bit(name: str) -> None:
     for seed in range(4):
         for kind in KINDS:
             interface, x = make_on_grid(kind, seed, depth=1e-2 if seed % 2 else 1e-6)
-            multipliers = multipliers_of(formulation, interface, seed)
+            multipliers = draw_multipliers(formulation, interface, seed)
             near, active = answers(formulation, interface, np.append(x, multipliers))
             in_contact += active
             for offset in OFFSETS:
