@@ -19,6 +19,7 @@ BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"
 FLAT = "patch.flat.transmission"
 RESULTANT, RANK, DEAD_ZONE = "patch.flat.resultant", "multipliers.rank", "patch.dead-zone"
 COMPLEMENTARITY = "complementarity"
+STIFFNESS = "stability.stiffness"
 FORCE, MOMENT, TANGENT = "balance.force", "balance.moment", "tangent.directional"
 SOLVED = frozenset({"patch.flat.solve", "patch.variants"})
 PATCHES = frozenset({FLAT, DEAD_ZONE}) | SOLVED
@@ -67,6 +68,8 @@ def applies(name: str, property_id: str) -> bool:
     if property_id in NEEDS_MULTIPLIERS and name not in WITH_MULTIPLIERS:
         return False
     if property_id in NEEDS_SOLUTION and name in NOT_UNIQUE:
+        return False
+    if property_id == STIFFNESS and name in WITH_MULTIPLIERS:  # They have no springs.
         return False
     return not (property_id == RESULTANT and name in WITHOUT_AREA)
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import wrong_purity
 import wrong_stability
+import wrong_sweeps
 from mutate import Mutant, Wrapped, changed_line
 
 import contactverif_mortar
@@ -387,6 +388,7 @@ MUTANTS = (
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
     *wrong_purity.MUTANTS,
     *wrong_stability.MUTANTS,
+    *wrong_sweeps.MUTANTS,
 )  # fmt: skip
 
 # The mutants that no property catches yet. Each names the property that is missing.
