@@ -58,7 +58,7 @@ def _translated_cases(draw: DrawFn) -> Case:
     rises = draw(_RISES) if kind == "kinked" else [0]
     tilt = draw(_TILTS) if kind == "slave tilted" else 0.0
     degrees = 0 if kind == "plain" else draw(_angles(at_least=int(kind == "turned")))
-    penalty, seed, shift = draw(penalties()), draw(seeds()), draw(_shifts())
+    penalty, seed, shift = draw(penalties()), draw(seeds()), draw(exact_shifts())
     offsets = draw(OFFSETS)
     line = _master_line(master_lengths, sum(slave_lengths), rises, offsets, covers=kind != "overhang")
     slave = _slave_below(line, slave_lengths, offsets)
@@ -76,7 +76,7 @@ def _angles(*, at_least: int) -> SearchStrategy[int]:
 
 
 @cache
-def _shifts() -> SearchStrategy[FloatArray]:
+def exact_shifts() -> SearchStrategy[FloatArray]:
     """Return translations (2,) by ±2^k or 0 along each axis, k = 0 … 20; the simplest is far along one axis."""
     exponent = st.one_of(st.just(FURTHEST), st.sampled_from(range(FURTHEST, -1, -1)))
     far = st.builds(ldexp, st.sampled_from([1.0, -1.0]), exponent)
@@ -121,7 +121,7 @@ def _onto_lattice(points: FloatArray, exponent: int) -> FloatArray:
 
 def _given_cases(interface: Interface) -> SearchStrategy[Case]:
     """Return random states of an interface, its centre moved to the origin, on a lattice fine for its size."""
-    return st.builds(_centre, given_interface.states(interface, smooth=True), _shifts())
+    return st.builds(_centre, given_interface.states(interface, smooth=True), exact_shifts())
 
 
 def _centre(case: Case, shift: FloatArray) -> Case:

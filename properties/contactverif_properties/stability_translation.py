@@ -21,16 +21,14 @@ where a decision hangs on less than 64 u D: there a right search may decide othe
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, dense
+from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies.translations import translated_cases
-from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.any_state import move_state, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
@@ -45,16 +43,6 @@ from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 FORCES = forces_quantity("change of the forces in roundings")
 TANGENT = tangent_quantity("change of the tangent in roundings")
 SEARCH = forces_quantity("change of the forces with a new pairing in roundings")
-
-
-def move_case(case: Case, shift: FloatArray) -> Case:
-    """Return the case with state and reference moved by a vector (2,), a length each.
-
-    The move is exact where every coordinate and its sum with the vector have at most 53 bits; the caller sees to that.
-    """
-    positions = (case.positions + shift).reshape(-1)
-    interface = case.interface.at(case.interface.nodes + shift)
-    return replace(case, interface=interface, z=np.concatenate([positions, case.multipliers]))
 
 
 def measure_translation(case: Case, subject: Subject) -> Measurement:
@@ -74,7 +62,7 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
         the tangent in units of u max|K| D/ℓ. All are dimensionless.
     """
     formulation, near = prepare_state(case, subject)
-    far = move_case(near, case.parameters["shift"])
+    far = move_state(near, case.parameters["shift"])
     pairing = formulation.pair(near.interface, near.z)
     forces = formulation.residual(near.interface, pairing, near.z)
     change = formulation.residual(far.interface, pairing, far.z) - forces

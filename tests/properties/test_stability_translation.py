@@ -17,12 +17,12 @@ from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
 from contactverif.strategies.translations import KINDS
+from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.stability_translation import (
     FORCES,
     SEARCH,
     STABILITY_TRANSLATION,
     TANGENT,
-    move_case,
 )
 
 
@@ -39,7 +39,7 @@ def measure_case(case: Case, subject: Subject) -> Measurement:
 
 def test_every_case_moves_without_rounding_and_every_kind_is_drawn() -> None:
     for case in cases():
-        far = move_case(case, case.parameters["shift"])
+        far = move_state(case, case.parameters["shift"])
         assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
         assert np.array_equal(far.interface.nodes - case.parameters["shift"], case.interface.nodes)
         assert np.array_equal(case.z * 2.0**32, np.round(case.z * 2.0**32))
@@ -137,7 +137,7 @@ def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     states = draw_cases(STABILITY_TRANSLATION.cases(distant), seed="0", examples=20).cases
     for case in states:
         assert case.largest_coordinate < 4
-        far = move_case(case, case.parameters["shift"])
+        far = move_state(case, case.parameters["shift"])
         assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
     way, before = RIGHT["einsum"]
     assert all(

@@ -13,6 +13,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
@@ -45,3 +46,13 @@ def prepare_state(case: Case, subject: Subject) -> tuple[CheckedFormulation, Cas
     random = np.random.default_rng([case.seed, 1])  # Other numbers than those that the property draws for itself.
     multipliers = random.uniform(low, high, formulation.n_multipliers(case.interface))
     return formulation, replace(case, penalty=1.0).with_multipliers(multipliers)
+
+
+def move_state(case: Case, shift: FloatArray) -> Case:
+    """Return the case with state and reference moved by a vector (2,), a length each.
+
+    The move is exact where every coordinate and its sum with the vector have at most 53 bits; the caller sees to that.
+    """
+    positions = (case.positions + shift).reshape(-1)
+    interface = case.interface.at(case.interface.nodes + shift)
+    return replace(case, interface=interface, z=np.concatenate([positions, case.multipliers]))

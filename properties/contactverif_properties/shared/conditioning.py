@@ -1,10 +1,11 @@
 """Condition numbers of a residual, and errors counted in roundings of the input.
 
 A double holds a position relative to the centre of the interface to u |x − x̄| (u = 2⁻⁵³). Such a rounding of all
-nodes b changes the force on node a by up to u Σ_b ‖K_ab‖ |x_b − x̄|, where K is the derivative of the residual. No
-formulation can do better, so an error is divided by this, and the quotient is called ω:
+nodes b changes the force on node a by up to u Σ_b ‖K_ab‖ |x_b − x̄|, where K is the derivative of the residual. A node
+that is the centre itself is still seen from the other end of its segment, so d_b = max(|x_b − x̄|, longest segment at b)
+stands for that distance. No formulation can do better, so an error is divided by this, and the quotient is called ω:
 
-    ω = max_a |ΔR_a| / (u (Σ_b ‖K_ab‖ |x_b − x̄| + Σ_j ‖K_aj‖ |λ_j| + max_c |R_c|))
+    ω = max_a |ΔR_a| / (u (Σ_b ‖K_ab‖ d_b + Σ_j ‖K_aj‖ |λ_j| + max_c |R_c|))
 
 Here a is a node or a constraint row, and ΔR_a a vector or a number. ‖·‖ is the Frobenius norm of a block, and λ_j a
 multiplier. The last term allows for the rounding of the forces themselves; for a constraint row it is the largest
@@ -54,8 +55,8 @@ class Conditioning:
     Attributes
     ----------
     reach : FloatArray, shape (n_nodes + n_multipliers,)
-        For each node, and behind them for each constraint row: Σ_b ‖K_ab‖ |x_b − x̄| + Σ_j ‖K_aj‖ |λ_j| + floor, in the
-        unit of the row. A relative rounding u of the input changes the row by u times this at most.
+        For each node, and behind them for each constraint row: Σ_b ‖K_ab‖ d_b + Σ_j ‖K_aj‖ |λ_j| + floor, in the unit
+        of the row. A relative rounding u of the input changes the row by u times this at most.
     floor : FloatArray, shape (n_nodes + n_multipliers,)
         The largest force max_c |R_c| for a node; the largest constraint row for a constraint row.
     """
@@ -133,9 +134,7 @@ def measure_conditioning(
     """
     n_nodes = case.interface.n_nodes
     derivative = difference_quotient(case, formulation, pairing)
-    positions = case.positions
-    distances = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
-    inputs = np.concatenate([distances, np.abs(case.multipliers)])
+    inputs = np.concatenate([_distances(case), np.abs(case.multipliers)])
     sizes = _row_sizes(forces, n_nodes)
     floor = np.concatenate([np.full(n_nodes, sizes[:n_nodes].max()), np.full(case.n_multipliers, 0.0)])
     floor[n_nodes:] = sizes[n_nodes:].max(initial=0.0)
@@ -186,6 +185,20 @@ def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray) 
     """
     turn = case.diameter / case.shortest_segment
     return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * float(np.abs(tangent).max()) * turn)
+
+
+def _distances(case: Case) -> FloatArray:
+    """Return for each node its distance from the centroid of all nodes, or its longest segment if that is longer.
+
+    A dual mortar method couples a node to the opposite one alone where meshes match; the shares of all others cancel.
+    If both are at the centroid, there is still the rounding of what cancels, which is of the length of segments.
+    """
+    positions, interface = case.positions, case.interface
+    distances: FloatArray = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
+    for surface in (interface.slave, interface.master):
+        for end in (0, 1):
+            np.maximum.at(distances, surface.segments[:, end], surface.lengths(positions))
+    return distances
 
 
 def _row_sizes(rows: Array, n_nodes: int) -> FloatArray:

@@ -1,0 +1,67 @@
+"""Flat states whose exact forces are known, with too many bits for anything but differences of positions.
+
+A state is laid out on multiples of 2^-40, or of 2^-32 if it is moved by up to 2^20, and turned and stretched by a
+Pythagorean triple. All this is exact. The turned coordinates have some 40 bits, so that products of them are rounded.
+On a flat that is parallel to an axis nearly all products would be exact, and would hide a kernel that rounds.
+"""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.scenes.flat_states import Turn, flat_master, flat_state
+from contactverif.strategies.parts import OFFSETS, penalties, repeat_cyclically, seeds
+from contactverif.strategies.translations import FINENESS, exact_shifts
+
+_TURNS: tuple[Turn, ...] = ((4, 3, 5), (12, -5, 13), (-3, 4, 5), (-5, -12, 13))
+_FINENESS_AT_REST = 40
+_LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
+
+
+def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return states of uniform penetration, near the origin, whose exact forces are rationals.
+
+    Parameters
+    ----------
+    interface : Interface | None
+        Random meshes if None. A given interface has no such states.
+
+    Returns
+    -------
+    SearchStrategy[Case] | None
+        Cases with the parameters of `contactverif.scenes.flat_states.flat_state`, and "shift" (2,), a length each: a
+        translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point
+        projects inside the master.
+    """
+    return _exact_flat_cases() if interface is None else None
+
+
+@st.composite
+def _exact_flat_cases(draw: DrawFn) -> Case:
+    turn = draw(st.sampled_from(_TURNS))
+    slave_lengths, master_lengths = draw(_LENGTHS), draw(_LENGTHS)
+    quarters, finest = draw(st.integers(1, 7)), draw(st.integers(6, 28))
+    penalty, seed = draw(penalties()), draw(seeds())
+    shift = draw(st.one_of(st.just(np.zeros(2)), exact_shifts()))
+    offsets = draw(OFFSETS)
+    end = float(sum(slave_lengths))
+    fineness = FINENESS if shift.any() else _FINENESS_AT_REST
+    slave = _places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, fineness)
+    inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
+    master = _places([-1.0, *inside, end + 1], offsets, 13, fineness)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), quarters / 4 * 2.0**-finest, turn=turn)
+    return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
+
+
+def _places(places: list[float], offsets: list[int], over: int, fineness: int) -> FloatArray:
+    """Return the places, each moved by up to 1/16 and rounded to a multiple of 2^-fineness."""
+    moved = places + repeat_cyclically(offsets, len(places)) / over / 16
+    rounded: FloatArray = np.round(moved * 2.0**fineness) * 2.0**-fineness
+    return rounded

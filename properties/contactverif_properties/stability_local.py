@@ -1,0 +1,157 @@
+"""Ask whether forces are as exact as the positions allow, on flat states whose exact forces are rationals.
+
+**Question.** A turned flat interface penetrates uniformly, by 10⁻² to 10⁻⁸ of a segment, near the origin or far from
+it. Are the forces as near to the exact ones as rounding the positions relative to one another lets them be?
+
+**Why it matters.** A small gap is a difference of large numbers, so an error of 10⁻⁷ at a gap of 10⁻⁹ is no fault: the
+positions do not contain more digits. The same error at a gap of 10⁻² is one. A tolerance that grows with the
+coordinates cannot tell them apart. And a formulation may be wrong by the same amount everywhere, as one in single
+precision, so that a translation does not show it.
+
+**How it is judged.** The error is counted in roundings (ω), as in `stability.translation`, with the same tolerance of
+16 at any gap, distance and penalty. What is exact depends on the traits. Where the flat patch test is promised, it is
+the force on every node, in rationals on the stored positions. Else it is the answer in long double, if the plugin says
+that it can (`takes_longdouble`), and the total force ε̂ |g| A, if `area` and `penalty` say that springs are distributed.
+Multipliers that are pressures are all ε̂ |g|, and only the distribution of their forces counts. A formulation promises
+this if it promises `translation_stable` and one of these. Ratios of lengths stay below 5: a kernel that moves the
+origin to a node rounds at the diameter, which is right, but costs digits on much shorter segments.
+
+**Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
+give the same gap.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.property import Measurement, Property
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.strategies.exact_flats import exact_flat_cases
+from contactverif_properties.shared.any_state import move_state
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.conditioning import (
+    MOST_ROUNDINGS,
+    Conditioning,
+    forces_quantity,
+    measure_conditioning,
+)
+from contactverif_properties.shared.roundoff import ratio
+from contactverif_properties.shared.uniform_pressure import forces_of_penetration
+
+FORCES = forces_quantity("error of the forces in roundings")
+TOTAL = forces_quantity("error of the total force in roundings")
+LARGEST_DENOMINATOR = 13  # The hypotenuses of the triples are 5 and 13.
+
+
+def measure_local(case: Case, subject: Subject) -> Measurement:
+    """Compare the forces of a uniform penetration with the exact ones, in roundings.
+
+    Parameters
+    ----------
+    case : Case
+        A state of `exact_flat_cases`.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        ω of the forces, or of the total force, dimensionless.
+    """
+    formulation = subject.for_case(case)
+    count = formulation.n_multipliers(case.interface)
+    near = case.with_multipliers(np.full(count, case.penalty * case.parameter("penetration")))
+    far = move_state(near, case.parameters["shift"])
+    pairing = formulation.pair(far.interface, far.z)
+    forces = formulation.residual(far.interface, pairing, far.z)
+    conditioning = measure_conditioning(
+        near, formulation, pairing, formulation.residual(near.interface, pairing, near.z)
+    )
+    values = {}
+    if knows_forces(subject.traits):
+        values[FORCES.name] = conditioning.count_roundings(_error_of_patch(near, forces))
+    elif subject.traits.takes_longdouble:
+        values[FORCES.name] = conditioning.count_roundings(forces - _in_long_double(far, formulation, pairing))
+    if knows_total(subject.traits) and not knows_forces(subject.traits):
+        values[TOTAL.name] = _count_total(near, forces, conditioning)
+    return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS))
+
+
+def exact_forces(case: Case) -> list[Fraction]:
+    """Return the exact residual of a uniform pressure ε̂ |g| (n_unknowns entries), which pulls nodes back."""
+    weights = uniform_pressure_weights_exact(case.interface, case.parameters["along"])
+    x, y = (Fraction(entry).limit_denominator(LARGEST_DENOMINATOR) for entry in case.parameters["direction"].tolist())
+    pressure = Fraction(case.penalty) * Fraction(case.parameter("penetration"))
+    forces = []
+    for node, weight in enumerate(weights):
+        size = -pressure * weight if node < case.interface.n_slave_nodes else pressure * weight
+        forces += [-y * size, x * size]  # The normal points to the left of the way the slave runs.
+    return forces
+
+
+def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
+    """Return the error of the position rows; constraint rows, which are not judged here, get 0."""
+    exact, n = exact_forces(case), case.interface.n_unknowns
+    scale = Fraction(1)
+    if case.n_multipliers:
+        n_slave = 2 * case.interface.n_slave_nodes
+        pulls = list(map(Fraction, forces[:n_slave].tolist()))
+        totals, exact_totals = ([sum(part[axis:n_slave:2], Fraction()) for axis in (0, 1)] for part in (pulls, exact))
+        projection = totals[0] * exact_totals[0] + totals[1] * exact_totals[1]
+        if projection > 0:
+            scale = (exact_totals[0] * exact_totals[0] + exact_totals[1] * exact_totals[1]) / projection
+    errors = [float(Fraction(force) * scale - right) for force, right in zip(forces[:n].tolist(), exact, strict=True)]
+    return np.array([*errors, *([0.0] * case.n_multipliers)])
+
+
+def _in_long_double(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> Array:
+    return formulation.residual(case.interface, pairing, case.z.astype(np.longdouble))
+
+
+def _count_total(case: Case, forces: FloatArray, conditioning: Conditioning) -> float:
+    """Return the error of the slave's total force over what roundings of all its nodes allow."""
+    n_slave = case.interface.n_slave_nodes
+    exact = exact_forces(case)
+    along_x, along_y = (
+        float(sum(map(Fraction, forces[axis : 2 * n_slave : 2].tolist())) - sum(exact[axis : 2 * n_slave : 2]))
+        for axis in (0, 1)
+    )
+    return ratio(float(np.hypot(along_x, along_y)), UNIT_ROUNDOFF * float(conditioning.reach[:n_slave].sum()))
+
+
+def knows_forces(traits: Traits) -> bool:
+    """Return whether the traits say what the force on each node is: that of springs, or of uniform pressures."""
+    if traits.enforcement == "multiplier" and traits.penalty != "distributed":
+        return False
+    return traits.passes_flat_patch is True
+
+
+def knows_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of springs is."""
+    return traits.enforcement == "penalty" and traits.penalty == "distributed" and traits.area is not None
+
+
+def refuse_unknown_forces(traits: Traits) -> str:
+    """Return why no exact force is known, or an empty string if one is."""
+    if knows_forces(traits) or knows_total(traits) or traits.takes_longdouble:
+        return refuse_barrier(traits)
+    return "no exact force is known: the traits promise no patch test, no area and no long double"
+
+
+STABILITY_LOCAL = Property(
+    id="stability.local",
+    family="stability",
+    summary="Forces are as exact as the positions allow, whatever the gap and the distance from the origin.",
+    quantities=(FORCES, TOTAL),
+    cases=exact_flat_cases,
+    measure=measure_local,
+    promise=lambda traits: True if traits.translation_stable else None,
+    applicable=refuse_unknown_forces,
+    exact=forces_of_penetration,
+)

@@ -1,0 +1,139 @@
+"""The judge of exact flat forces passes what is right in any way of writing, and finds lost digits near and far."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, single_precision_at_first_node, springs_of
+from subjects import load_subject
+
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case, run
+from contactverif_properties.shared.any_state import move_state
+from contactverif_properties.shared.uniform_pressure import forces_of_penetration
+from contactverif_properties.stability_local import (
+    LARGEST_DENOMINATOR,
+    STABILITY_LOCAL,
+    TOTAL,
+    exact_forces,
+    refuse_unknown_forces,
+)
+
+
+@cache
+def cases(count: int = 100) -> tuple[Case, ...]:
+    return draw_cases(STABILITY_LOCAL.cases(None), seed="0/local", examples=count).cases
+
+
+def worst_number(case: Case, subject: Subject) -> float:
+    measurement = judge_case(STABILITY_LOCAL, case, subject).measurement
+    assert measurement is not None
+    return max(measurement.values.values())
+
+
+def bits(value: float) -> int:
+    """Return how many bits a number has from its first to its last digit 1."""
+    numerator = abs(Fraction(value).numerator)
+    return numerator.bit_length() - (numerator & -numerator).bit_length() + 1 if numerator else 0
+
+
+def test_the_states_are_exactly_flat_and_have_many_bits_and_their_move_is_exact() -> None:
+    for case in cases():
+        far = move_state(case, case.parameters["shift"])
+        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
+        assert np.array_equal(far.interface.nodes - case.parameters["shift"], case.interface.nodes)
+        x, y = (Fraction(entry).limit_denominator(LARGEST_DENOMINATOR) for entry in case.parameters["direction"])
+        assert x**2 + y**2 == 1
+        heights = [Fraction(b) * x - Fraction(a) * y for a, b in case.positions.tolist()]
+        n_slave = case.interface.n_slave_nodes
+        assert set(heights[:n_slave]) == {-Fraction(case.parameter("penetration"))}
+        assert set(heights[n_slave:]) == {Fraction(0)}
+    widest = [max(map(bits, case.z.tolist())) for case in cases()]
+    assert min(widest) >= 32
+    assert np.mean([width >= 40 for width in widest]) > 0.4
+
+
+def test_exact_forces_balance_and_are_the_rounded_ones() -> None:
+    for case in cases(20):
+        exact = exact_forces(case)
+        assert sum(exact[::2]) == sum(exact[1::2]) == 0
+        rounded = np.array([float(force) for force in exact]).reshape(-1, 2)
+        assert np.allclose(rounded, -forces_of_penetration(case), rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None:
+    way, before = RIGHT[name]
+    subject = springs_of(way, before, translation_stable=True, takes_longdouble=False)
+    assert max(worst_number(case, subject) for case in cases()) <= 8
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_long_double_is_the_answer_where_the_plugin_takes_it(name: str) -> None:
+    way, before = RIGHT[name]
+    assert max(worst_number(case, springs_of(way, before, translation_stable=True)) for case in cases()) <= 8
+
+
+@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("takes_longdouble", [False, True])
+def test_a_wrong_formulation_is_accused_by_three_orders_of_magnitude(name: str, takes_longdouble: bool) -> None:
+    way, before = WRONG[name]
+    subject = springs_of(way, before, translation_stable=True, takes_longdouble=takes_longdouble)
+    assert max(worst_number(case, subject) for case in cases()) >= 16e3
+
+
+def test_single_precision_that_a_translation_does_not_show_is_accused_here() -> None:
+    subject = springs_of(
+        by_differences, single_precision_at_first_node, translation_stable=True, takes_longdouble=False
+    )
+    numbers = [worst_number(case, subject) for case in cases()]
+    assert np.median(numbers) > 1e6
+
+
+def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
+    (row,) = run([springs_of(by_points_first)], [STABILITY_LOCAL], examples=20, seed=0).rows
+    assert row.verdict is Verdict.FAIL
+    assert not row.unexpected
+
+
+@pytest.mark.parametrize(
+    "name", ["vts-ppt", "vts-ppt-balanced", "sts", "mortar", "mortar-dual", "chen-hisada", "nts-ar"]
+)
+def test_the_built_in_formulations_are_as_exact_as_their_positions(name: str) -> None:
+    assert max(worst_number(case, load_subject(name)) for case in cases()) <= 4
+
+
+@pytest.mark.parametrize("name", ["mortar-lm", "mortar-dual-lm", "vts-ppt-lm"])
+def test_multipliers_that_are_pressures_are_judged_by_the_distribution(name: str) -> None:
+    subject = load_subject(name)
+    assert max(worst_number(case, subject) for case in cases()) <= 4
+
+    class Doubled:
+        def __init__(self, *, penalty: float) -> None:
+            self.inner = subject.with_penalty(penalty)
+            self.traits, self.n_multipliers, self.pair = subject.traits, self.inner.n_multipliers, self.inner.pair
+
+        def residual(self, interface: object, pairing: object, z: np.ndarray) -> np.ndarray:
+            forces = self.inner.residual(interface, pairing, z)  # type: ignore[arg-type]
+            return 2 * forces
+
+    assert max(worst_number(case, Subject("doubled", Doubled)) for case in cases(30)) <= 4
+
+
+def test_what_is_exact_follows_the_traits() -> None:
+    springs = springs_of(by_differences, takes_longdouble=False)
+    assert list(STABILITY_LOCAL.measure(cases()[0], springs).values) == [TOTAL.name]
+    assert "no exact force" in refuse_unknown_forces(Traits(penalty="nodal", area="current"))
+    assert "no exact force" in refuse_unknown_forces(Traits())
+    assert not refuse_unknown_forces(Traits(takes_longdouble=True))
+    assert "no exact force" in refuse_unknown_forces(
+        Traits(passes_flat_patch=True, enforcement="multiplier", penalty="nodal")
+    )
+    assert "barrier" in refuse_unknown_forces(Traits(passes_flat_patch=True, enforcement="barrier"))
