@@ -178,34 +178,31 @@ def nearest_segment(v: PointOnSegment, x: FloatArray, segments: IntArray, order:
     p = arm(origin, v)
     n_leaves = len(boxes) // 2
     best, best_distance, best_past = -1, np.inf, np.inf
-    waiting = np.empty(64, dtype=np.int64)  # the boxes still to open, at most one for each level of the tree
-    distances = np.empty(64)  # their distances
-    waiting[0], distances[0] = 1, 0.0
-    n_waiting = 1
-    while n_waiting > 0:
-        n_waiting -= 1
-        box = waiting[n_waiting]
-        if distances[n_waiting] > best_distance:
-            continue
-        if box < n_leaves:
+    waiting, distances = np.empty(64, dtype=np.int64), np.empty(64)  # the boxes still to open, one for each level
+    n_waiting, box, distance = 0, 1, 0.0
+    while True:
+        while box < n_leaves and distance <= best_distance:  # down to a leaf, the nearer box first
             near, far = 2 * box, 2 * box + 1
-            to_near, to_far = _distance_to_box(origin, p, boxes[near]), _distance_to_box(origin, p, boxes[far])
-            if to_far < to_near:
-                near, far, to_near, to_far = far, near, to_far, to_near
+            distance, to_far = _distance_to_box(origin, p, boxes[near]), _distance_to_box(origin, p, boxes[far])
+            if to_far < distance:
+                near, far, distance, to_far = far, near, to_far, distance
             waiting[n_waiting], distances[n_waiting] = far, to_far
-            waiting[n_waiting + 1], distances[n_waiting + 1] = near, to_near
-            n_waiting += 2
-            continue
-        start = (box - n_leaves) * _LEAF
-        for place in range(start, min(start + _LEAF, len(order))):
-            segment = order[place]
-            if segment < 0:  # padding
-                continue
-            x_1, x_2 = node(x, segments[segment, 0]), node(x, segments[segment, 1])
-            distance, past = distance_to_segment(origin, p, x_1, x_2)
-            if _is_nearer(distance, past, segment, best_distance, best_past, best):
-                best, best_distance, best_past = segment, distance, past
-    return best
+            n_waiting += 1
+            box = near
+        if distance <= best_distance:
+            start = (box - n_leaves) * _LEAF
+            for place in range(start, min(start + _LEAF, len(order))):
+                segment = order[place]
+                if segment < 0:  # padding
+                    continue
+                x_1, x_2 = node(x, segments[segment, 0]), node(x, segments[segment, 1])
+                distance, past = distance_to_segment(origin, p, x_1, x_2)
+                if _is_nearer(distance, past, segment, best_distance, best_past, best):
+                    best, best_distance, best_past = segment, distance, past
+        if n_waiting == 0:
+            return best
+        n_waiting -= 1
+        box, distance = waiting[n_waiting], distances[n_waiting]
 
 
 @compile_kernel
