@@ -59,6 +59,14 @@ WITH_MULTIPLIERS = ("nts-lm", "vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm", "mor
 NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # With redundant multipliers Newton has no limit.
 NEEDS_MULTIPLIERS = frozenset({RANK, COMPLEMENTARITY})
 NEEDS_SOLUTION = frozenset({"newton.order", "newton.history", COMPLEMENTARITY})
+# Nodal springs have no area. Averaged normals are no stated rule, and decisions of multipliers and of nodes are others.
+WITHOUT_RULE = "mortar:normals=averaged"
+WITHOUT_PROJECTION: Mapping[str, tuple[str, ...]] = {
+    "projection.segment": (WITHOUT_RULE,),
+    "projection.place": (WITHOUT_RULE,),
+    "projection.activity": (WITHOUT_RULE, "chen-hisada", *WITH_MULTIPLIERS),
+    "projection.area": ("nts", "nts-lm", "two-pass/nts", "two-pass/nts-lm"),
+}
 
 MARKS = {Verdict.PASS: "✓", Verdict.FAIL: "✗", Verdict.NOT_APPLICABLE: "·"}
 
@@ -70,6 +78,8 @@ def applies(name: str, property_id: str) -> bool:
     if property_id in NEEDS_SOLUTION and name in NOT_UNIQUE:
         return False
     if property_id == STIFFNESS and name in WITH_MULTIPLIERS:  # They have no springs.
+        return False
+    if name in WITHOUT_PROJECTION.get(property_id, ()):
         return False
     return not (property_id == RESULTANT and name in WITHOUT_AREA)
 

@@ -115,7 +115,10 @@ class PatchTestPassing:
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """Return each virtual slave node with its gap, its pressure and the ends Q, P of its area of competence."""
+        """Return each virtual slave node with its gap, its pressure and the ends Q, P of its area of competence.
+
+        Where nothing of an area faces the master, the point has the whole area and no weight.
+        """
         x, multipliers = split_state(interface, z)
         slave, master = interface.slave.segments, interface.master.segments
         ends = np.array(
@@ -124,6 +127,10 @@ class PatchTestPassing:
                 for point, cut in enumerate(zip(pairing["frame"], pairing["cut_p"], pairing["cut_q"], strict=True))
             ]
         )  # (n_points, 2): P and Q
+        shares = np.maximum(ends[:, 0] - ends[:, 1], 0.0) / 2
+        whole = np.array([walk.middle_of_part(point, self.n, 1.0) for point in range(self.n)])
+        whole = np.tile(np.column_stack([whole + 1 / self.n, whole - 1 / self.n]), (len(slave), 1))
+        ends = np.where(shares[:, None] > 0, ends, whole)
         c = ends.mean(axis=1)
         segment = np.repeat(np.arange(len(slave)), self.n)
         x_a, x_b = np.swapaxes(x[slave[segment]], 0, 1)
@@ -145,7 +152,7 @@ class PatchTestPassing:
             normal=normal,
             gap=gap,
             pressure=np.where(pairing["active"], pressure, 0.0),
-            weight=lengths[segment] * (ends[:, 0] - ends[:, 1]) / 2,
+            weight=lengths[segment] * shares,
             active=pairing["active"],
             area_from=ends[:, 1],
             area_to=ends[:, 0],

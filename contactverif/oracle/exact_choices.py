@@ -1,0 +1,171 @@
+"""The exact error of a choice of master segment, for each rule of choice.
+
+A choice is judged by a length: how much farther the chosen segment is than the nearest. So a tie needs no rule, and a
+choice that roundoff decides is as good as its roundoff. Floats only sort out segments that cannot be the nearest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.oracle.exact_points import (
+    ExactPoints,
+    Integers,
+    Lattice,
+    Ratios,
+    View,
+    positions,
+    slave_normal_view,
+)
+
+_SAFE = 2.0**-20  # Floats err by less than this share of a distance, wherever a state makes sense.
+DEEP = 2.0  # Segments that penetrate by more than this many lengths of both need not be in contact.
+
+
+def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return how much farther than the nearest closed segment the chosen ones are.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The state.
+    points : ExactPoints
+        The points.
+    segments : IntArray, shape (n_points,)
+        The master segment that was chosen for each point.
+
+    Returns
+    -------
+    excess : FloatArray, shape (n_points,)
+        The distance of the chosen segment less the least distance, a length ≥ 0.
+    ties : IntArray, shape (n_points,)
+        The number of segments at the least distance, exactly.
+    """
+    point, candidate = _near_pairs(lattice, points, segments)
+    above, below = _squared_distances(lattice, points.select(point), candidate)
+    squares = dict(
+        zip(zip(point.tolist(), candidate.tolist(), strict=True), zip(above, below, strict=True), strict=True)
+    )
+    excess, ties = np.empty(len(segments)), np.empty(len(segments), dtype=np.int64)
+    ends = np.append(np.flatnonzero(np.diff(point, prepend=-1)), len(point))
+    for number, (start, stop) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
+        least = start
+        for other in range(start + 1, stop):
+            if above[other] * below[least] < above[least] * below[other]:
+                least = other
+        a, b = squares[number, int(segments[number])]
+        c, d = above[least], below[least]
+        weight = points.weight[number] * lattice.scale  # The squares still carry W².
+        total = np.sqrt(a / (b * weight**2)) + np.sqrt(c / (d * weight**2))
+        excess[number] = (a * d - c * b) / (b * d * weight**2) / total if a * d > c * b else 0.0
+        ties[number] = sum(above[other] * d == c * below[other] for other in range(start, stop))
+    return excess, ties
+
+
+def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tuple[IntArray, IntArray]:
+    """Return points and master segments, sorted by point: all that may be the nearest, and the choice."""
+    nodes = Ratios(lattice.nodes, np.array(lattice.scale, dtype=object)).floats()
+    place = positions(lattice, points).floats()
+    first, second = nodes[lattice.master[:, 0]], nodes[lattice.master[:, 1]]
+    along = second - first
+    share = ((place[:, None] - first) * along).sum(axis=-1) / (along**2).sum(axis=-1)
+    foot = first + np.clip(share, 0, 1)[..., None] * along
+    distance = np.hypot(*np.moveaxis(place[:, None] - foot, -1, 0))
+    doubt = 64 * UNIT_ROUNDOFF * np.abs(nodes).max()
+    near = distance <= distance.min(axis=1, keepdims=True) * (1 + _SAFE) + doubt
+    near[np.arange(len(choice)), choice] = True
+    point, candidate = np.nonzero(near)
+    return point, candidate
+
+
+def _squared_distances(lattice: Lattice, points: ExactPoints, segments: IntArray) -> tuple[list[int], list[int]]:
+    """Return the squared distances to closed segments, × W² × scale², as numerators and denominators."""
+    first, second = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))
+    along = second - first
+    from_first, from_second = (points.place - points.weight[:, None] * end for end in (first, second))
+    squared = (along**2).sum(axis=1)
+    foot = (from_first * along).sum(axis=1)
+    cross = from_first[:, 0] * along[:, 1] - from_first[:, 1] * along[:, 0]
+    to_first, to_second = ((arm**2).sum(axis=1) * squared for arm in (from_first, from_second))
+    inside = (foot > 0) & (foot < points.weight * squared)
+    above: Integers = np.where(inside, cross**2, np.where(foot <= 0, to_first, to_second))
+    return above.tolist(), squared.tolist()
+
+
+def seen_excess(
+    lattice: Lattice, points: ExactPoints, slave_segment: IntArray, segments: IntArray, cells: bool
+) -> FloatArray:
+    """Return how far the chosen segments are from being the nearest that the slave sees along its normal.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The state.
+    points : ExactPoints
+        The points.
+    slave_segment : IntArray, shape (n_points,)
+        Their slave segments.
+    segments : IntArray, shape (n_points,)
+        The master segment that was chosen for each point.
+    cells : bool
+        The choice may also be made in the middle of the overlap of the two segments, once for all points of a cell.
+
+    Returns
+    -------
+    FloatArray, shape (n_points,)
+        A length ≥ 0: how much farther the chosen segment is than the nearest, or how far the foot lies past its end;
+        infinite where it does not face the slave.
+    """
+    view = slave_normal_view(lattice, points, segments)
+    past = np.maximum(np.maximum(-view.xi.floats(), view.xi.floats() - 1), 0.0) * view.master_length
+    farther = _farther_than_nearest(lattice, points, slave_segment, segments, view)
+    if cells and farther.any():
+        middle = _middles(lattice, slave_segment, segments)
+        in_middle = slave_normal_view(lattice, middle, segments)
+        farther = np.minimum(farther, _farther_than_nearest(lattice, middle, slave_segment, segments, in_middle))
+    excess: FloatArray = np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
+    return excess
+
+
+def _farther_than_nearest(
+    lattice: Lattice, points: ExactPoints, slave_segment: IntArray, choice: IntArray, view: View
+) -> FloatArray:
+    """Return how much larger |gap| is on the chosen segments than on the nearest ones that are seen, a length ≥ 0.
+
+    Segments deeper or farther than two lengths of both need not count as contact, and so are no rivals.
+    """
+    n_master = len(lattice.master)
+    point, candidate = np.divmod(np.arange(len(choice) * n_master), n_master)
+    other = slave_normal_view(lattice, points.select(point), candidate)
+    xi, gap = other.xi.floats(), np.abs(other.gap.floats())
+    near = gap <= DEEP * (other.slave_length + other.master_length)
+    rival = (other.cosine > 0) & (xi > 0) & (xi < 1) & near
+    gaps = np.where(rival, gap, np.inf).reshape(len(choice), n_master).min(axis=1, initial=np.inf)
+    farther: FloatArray = np.maximum(np.abs(view.gap.floats()) - gaps, 0.0)
+    return farther
+
+
+def _middles(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> ExactPoints:
+    """Return the points in the middle of the overlaps of slave and master segments, seen along the slave's normal."""
+    low, high, squared = overlaps(lattice, slave_segment, segments)
+    return ExactPoints.at_ratios(lattice, slave_segment, low + high, 2 * squared)
+
+
+def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> tuple[Integers, Integers, Integers]:
+    """Return the overlaps of slave segments with master segments that face them, seen along the slave's normal.
+
+    Returns
+    -------
+    low, high : Integers, shape (n_pairs,)
+        The ends c of the overlap on the slave segment times `squared`, cut to the segment; high ≤ low where there is
+        none.
+    squared : Integers, shape (n_pairs,)
+        The square of the slave segment's length on the lattice.
+    """
+    x_a, x_b = (lattice.nodes[lattice.slave[slave_segment, end]] for end in (0, 1))
+    x_1, x_2 = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))
+    along = x_b - x_a
+    squared = (along**2).sum(axis=1)
+    low, high = (((2 * end - x_a - x_b) * along).sum(axis=1) for end in (x_2, x_1))
+    return np.maximum(low, -squared), np.minimum(high, squared), squared

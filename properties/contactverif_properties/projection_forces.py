@@ -1,0 +1,178 @@
+"""Ask whether the contact points account for the forces.
+
+**Question.** Are the pressures at the contact points, over their weights and along their normals, the forces that the
+formulation puts on the slave?
+
+**Why it matters.** Engineers look at contact pressures and gaps, and not at nodal forces. A report that is not what was
+computed misleads them, and no other question sees it: the forces are right.
+
+**How it is judged.** These identities hold for right formulations whether they pass the patch test or not:
+
+- A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0. An idle point carries nothing.
+- −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
+  the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
+- Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
+- Pressure = −ε̂ × gap at active points, for a linear penalty: a nodal one, or one whose traits state the configuration
+  of areas, except where pressures are interpolated between nodes.
+
+Sums are compared over Σ|R| with u(8D/min(g, ℓ) + 4N), the second identity over the lengths with 16u, the third over
+ε̂ times these lengths. X takes the place of D, the diameter, where the traits do not promise `translation_stable`.
+
+**Undecided.** Never. What does not hold for a formulation by its traits is not measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.exact_places import Reported, largest, name_places, projected_cases
+from contactverif_properties.shared.passes import Pass
+from contactverif_properties.shared.roundoff import ratio, segment_tolerance, sum_slave_forces
+
+STRAIGHT = 2.0**-26  # Normals of a straight slave, whose nodes are rounded far away, differ by less than this.
+
+UNIT = Quantity("length of the normal less 1", "1", "8u", "A difference, a root and a division are rounded.")
+FORCES = Quantity(
+    "pressures against the slave's forces",
+    "1",
+    "u(8D/min(g, ℓ) + 4N) + Δn",
+    "Both are sums of N rounded gaps and normals; a straight slave is rounded too.",
+)
+FOOT = Quantity("position − foot against gap × normal", "1", "16u", "Each vector is a sum of rounded products.")
+LAW = Quantity("pressure against −ε̂ × gap", "1", "8u", "The gap may be formed anew for the pressure.")
+
+
+def measure_account(case: Case, subject: Subject) -> Measurement:
+    """Compare what the contact points carry with the forces of the slave.
+
+    Parameters
+    ----------
+    case : Case
+        Any state.
+    subject : Subject
+        A formulation that reports contact points.
+
+    Returns
+    -------
+    Measurement
+        The errors of the identities that hold for the traits, dimensionless. Broken: an idle point carries a pressure,
+        or a pressure is negative or NaN.
+    """
+    reported = Reported.from_case(case, subject)
+    points, state = reported.points, reported.state
+    distance = reported.distant or state.diameter
+    values = {UNIT.name: _normal_error(points)}
+    tolerances = {UNIT.name: 8 * UNIT_ROUNDOFF}
+    if (difference := _force_difference(reported)) is not None:
+        size = sum_slave_forces(state, reported.forces)
+        values[FORCES.name] = ratio(float(np.abs(difference).max()), size)
+        tolerance = segment_tolerance(state, reported.forces.reshape(-1), distance)
+        tolerances[FORCES.name] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
+    if subject.traits.gap is not None:
+        values[FOOT.name] = max((_foot_error(each) for each in reported.passes), default=0.0)
+        tolerances[FOOT.name] = 16 * UNIT_ROUNDOFF
+    if _has_linear_law(subject.traits):
+        penalty = 1.0 if state.n_multipliers else subject.penalty(state)
+        active = points.select(points.active)
+        errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
+        values[LAW.name] = largest(errors)
+        tolerances[LAW.name] = 8 * UNIT_ROUNDOFF
+    return Measurement(values, tolerances, broken=_breach(points), idle=not points.active.any())
+
+
+def _breach(points: ContactPoints) -> str:
+    """Return how a pressure breaks the contract, or an empty string."""
+    if not (points.pressure[points.active] >= 0).all():
+        return "a pressure at an active point is negative or NaN"
+    if np.nan_to_num(points.pressure[~points.active]).any():
+        return "an idle point carries a pressure"
+    return ""
+
+
+def _normal_error(points: ContactPoints) -> float:
+    """Return the largest difference of a normal's length from 1, where a point has a pressure or a normal."""
+    counted = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
+    return largest(np.abs(np.hypot(points.normal[counted, 0], points.normal[counted, 1]) - 1))
+
+
+def _force_difference(reported: Reported) -> FloatArray | None:
+    """Return Σ pressure × weight × normal + ΣR of the slave (2,), or None where the two need not be equal.
+
+    A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
+    """
+    points, interface = reported.points, reported.state.interface
+    if points.on_master.any() and not reported.traits.conserves_force:
+        return None
+    if _bend(reported) > STRAIGHT:
+        return None
+    sides = np.where(points.on_master, -1.0, 1.0)
+    carrying = points.pressure > 0
+    pushes = (sides * points.pressure * points.weight)[carrying, None] * points.normal[carrying]
+    total: FloatArray = pushes.sum(axis=0) + reported.forces[: interface.n_slave_nodes].sum(axis=0)
+    return total
+
+
+def _bend(reported: Reported) -> float:
+    """Return by how much the normals of the slave differ where weighted nodes lie on it; 0 if there are none.
+
+    A pressure between two nodes acts along the normal of its segment, and is reported along that of a node.
+    """
+    bend = 0.0
+    for each in reported.passes:
+        if each.points.weighted.any():
+            ends = each.positions[each.interface.slave.segments]
+            along = (ends[:, 1] - ends[:, 0]) / each.interface.slave.lengths(each.positions)[:, None]
+            bend = max(bend, float(np.ptp(along, axis=0).max()))
+    return bend
+
+
+def _thinness(reported: Reported) -> float:
+    """Return the largest slave segment over the weight of an active weighted node on it; 0 if there are none.
+
+    Dual shapes on a covered share of a segment are differences of places, which are rounded by u over that share.
+    """
+    thinness = 0.0
+    for each in reported.passes:
+        points = each.points.select(each.points.weighted & each.points.active & name_places(each.points))
+        length = each.interface.slave.lengths(each.positions)[points.slave_segment]
+        with np.errstate(divide="ignore"):
+            thinness = max(thinness, largest(length / points.weight))
+    return thinness
+
+
+def _foot_error(each: Pass) -> float:
+    """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from."""
+    named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
+    points = each.points.select(named & np.isfinite(each.points.gap))
+    first, second = np.swapaxes(each.positions[each.interface.master.segments[points.master_segment]], 0, 1)
+    arm, along = points.position - first, second - first
+    errors = arm - points.xi[:, None] * along - points.gap[:, None] * points.normal
+    far = np.abs(each.positions).max()
+    size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * np.hypot(along[:, 0], along[:, 1])
+    return largest(np.hypot(errors[:, 0], errors[:, 1]) / size)
+
+
+def _has_linear_law(traits: Traits) -> bool:
+    """Return whether a pressure is −ε̂ × the gap that is reported beside it."""
+    if traits.enforcement != "penalty" or traits.gap in (None, "cells and nodes"):
+        return False
+    return traits.penalty == "nodal" or (traits.penalty == "distributed" and traits.area is not None)
+
+
+PROJECTION_FORCES = Property(
+    id="projection.forces",
+    family="projection",
+    summary="The pressures at the contact points are the forces on the slave, and their gaps are what the places show.",
+    quantities=(UNIT, FORCES, FOOT, LAW),
+    cases=projected_cases,
+    measure=measure_account,
+    promise=lambda traits: True,
+    needs=frozenset({"contact_points"}),
+    applicable=refuse_barrier,
+)

@@ -1,0 +1,157 @@
+"""The contact points that a formulation reports, beside what is exact at their places.
+
+A point is formed in rationals from the stored nodes of its slave segment and the reported c. Its reported position is
+rounded at its distance from the origin, and serves for nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.oracle.exact_points import (
+    ExactPoints,
+    Lattice,
+    View,
+    closest_view,
+    run_against,
+    slave_normal_view,
+)
+from contactverif.strategies.projections import projection_states
+from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.passes import Pass, split_passes
+
+CLOSEST = "closest point"
+CELLS = ("cells", "cells and nodes")
+
+LOCAL_REASON = (
+    "A gap is a difference of the lengths L of both segments and |P − A|, each rounded a few times; along the slave's "
+    "normal over the cosine. X is added where the traits do not promise `translation_stable`."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reported:
+    """The answers of a formulation in a state.
+
+    Attributes
+    ----------
+    formulation : CheckedFormulation
+        The formulation, with the penalty of the state.
+    state : Case
+        The case, with multipliers if the formulation has any.
+    forces : FloatArray, shape (n_nodes, 2)
+        The position rows of the residual.
+    points : ContactPoints
+        The contact points.
+    traits : Traits
+        The promises.
+    """
+
+    formulation: CheckedFormulation
+    state: Case
+    forces: FloatArray
+    points: ContactPoints
+    traits: Traits
+
+    @classmethod
+    def from_case(cls, case: Case, subject: Subject) -> Reported:
+        """Ask a formulation about a case without multipliers."""
+        formulation, state = prepare_state(case, subject)
+        pairing = formulation.pair(state.interface, state.z)
+        forces = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
+        points = formulation.contact_points(state.interface, pairing, state.z)
+        return cls(formulation, state, forces.reshape(-1, 2), points, subject.traits)
+
+    @property
+    def passes(self) -> Iterator[Pass]:
+        """The points by pass."""
+        return split_passes(self.state, self.points)
+
+    @property
+    def distant(self) -> float:
+        """The coordinate X at which a point may be rounded, a length: 0 where the traits promise that none is."""
+        return 0.0 if self.traits.translation_stable else self.state.largest_coordinate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """The points of a pass that name a place on a slave segment and a master segment.
+
+    Attributes
+    ----------
+    interface : Interface
+        The interface in the roles of the pass.
+    lattice : Lattice
+        Its state.
+    reported : ContactPoints
+        What the formulation says of these points.
+    exact : ExactPoints
+        The points.
+    view : View
+        What they see of the reported master segment, by the rule of the formulation.
+    scale : FloatArray, shape (n_points,)
+        The length of which rounding is a share: L + |P − A|, plus X where a point may be rounded, over the cosine;
+        infinite where the rule sees nothing of the segment.
+    facing : BoolArray, shape (n_points,)
+        True where the slave segment and the master segment run against each other.
+    """
+
+    interface: Interface
+    lattice: Lattice
+    reported: ContactPoints
+    exact: ExactPoints
+    view: View
+    scale: FloatArray
+    facing: BoolArray
+
+    @classmethod
+    def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
+        """Return the places of a pass; `rule` is the trait `gap`, `distant` the X at which points may be rounded."""
+        points = each.points.select(name_places(each.points) & (each.points.master_segment >= 0))
+        lattice = Lattice.from_state(each.interface, each.z)
+        exact = ExactPoints.at(lattice, points.slave_segment, points.c)
+        look = closest_view if rule == CLOSEST else slave_normal_view
+        view = look(lattice, exact, points.master_segment)
+        with np.errstate(divide="ignore"):
+            scale = np.where(view.cosine > 0, (view.lengths + distant) / np.abs(view.cosine), np.inf)
+        facing = run_against(lattice, exact, points.master_segment)
+        return cls(each.interface, lattice, points, exact, view, scale, facing)
+
+
+def name_places(points: ContactPoints) -> BoolArray:
+    """Return which points (n_points,) name a place on their surface."""
+    named: BoolArray = (points.slave_segment >= 0) & np.isfinite(points.c)
+    return named
+
+
+def projected_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
+    """Return cases by kind of projection; larger random states and exact ties among them.
+
+    Parameters
+    ----------
+    interface : Interface | None
+        A given interface, on which only the states are random.
+    """
+    if interface is not None:
+        return any_cases(interface)
+    return st.one_of(projection_states(), projection_states(), any_cases())
+
+
+def refuse_without_rule(traits: Traits) -> str:
+    """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
+    return "" if traits.gap is not None else "the trait `gap` states no rule of projection"
+
+
+def largest(values: FloatArray) -> float:
+    """Return the largest of some values ≥ 0; NaN if one is NaN, 0 if there are none."""
+    return float(np.max(values, initial=0.0))

@@ -1,0 +1,132 @@
+"""Mutants that report something else than they compute, or decide by something else than the exact projection.
+
+Each of the twelve arrays of `ContactPoints` that a formulation must give has at least one mutant here, and so have the
+two optional ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from mutate import Mutant, Wrapped, changed_line
+
+import contactverif_mortar
+import contactverif_nts
+from contactverif import Pairing
+from contactverif_nts.two_passes import two_pass
+
+SEGMENT, PLACE, ACTIVITY = "projection.segment", "projection.place", "projection.activity"
+AREA, FORCES = "projection.area", "projection.forces"
+VTS_ME, NTS_AR = contactverif_nts.vts_me, contactverif_nts.nts_ar
+MORTAR, STS = contactverif_mortar.mortar, contactverif_mortar.sts
+TWO_PASS = partial(two_pass, inner=NTS_AR)
+
+Change = Callable[..., Any]  # From points, interface and positions to the arrays that are reported in place of others.
+
+
+def _reports(make: Any, change: Change) -> Any:
+    """Return a factory whose formulation computes the right thing and reports other arrays."""
+
+    def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        points = right(interface, pairing, z)
+        return replace(points, **change(points, interface, z[: interface.n_unknowns].reshape(-1, 2)))
+
+    return lambda *, penalty: Wrapped(penalty, make, contact_points=contact_points)
+
+
+def reports(name: str, caught_by: str, change: Change, make: Any = VTS_ME) -> Mutant:
+    return Mutant(name, caught_by, _reports(make, change))
+
+
+def line(name: str, caught_by: str, module: str, old: str, new: str, *, factory: str = "vts_me") -> Mutant:
+    return Mutant(name, caught_by, changed_line(module, old, new, factory=factory))
+
+
+def _previous_slave_segment(points: Any, interface: Any, x: Any) -> Any:
+    return {"slave_segment": (points.slave_segment - 1) % len(interface.slave)}
+
+
+def _other_master_segment(points: Any, interface: Any, x: Any) -> Any:
+    return {"master_segment": (points.master_segment + 1) % len(interface.master)}
+
+
+def _foot_as_position(points: Any, interface: Any, x: Any) -> Any:
+    return {"position": points.position - points.gap[:, None] * points.normal}
+
+
+def _normal_of_reference(points: Any, interface: Any, x: Any) -> Any:
+    ends = interface.nodes[interface.master.segments[points.master_segment]]
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    return {"normal": np.column_stack([along[:, 1], -along[:, 0]])}
+
+
+def _gap_from_coordinates(points: Any, interface: Any, x: Any) -> Any:
+    """Return the gap as n·x_s − n·x_m, which loses digits far from the origin."""
+    first = x[interface.master.segments[points.master_segment, 0]]
+    return {"gap": (points.normal * points.position).sum(axis=1) - (points.normal * first).sum(axis=1)}
+
+
+def _weight_of_whole_segment(points: Any, interface: Any, x: Any) -> Any:
+    return {"weight": interface.slave.lengths(x)[points.slave_segment]}
+
+
+def _area_from_first_node(points: Any, interface: Any, x: Any) -> Any:
+    return {"area_from": np.full_like(points.c, -1.0)}
+
+
+def _area_of_two_thirds(points: Any, interface: Any, x: Any) -> Any:
+    return {"area_to": points.area_to - (points.area_to - points.area_from) / 3}
+
+
+def _neighbour_decides(penalty: float) -> Any:
+    """Decide for each point what is right for the one before it."""
+
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        pairing = right(interface, z)
+        return Pairing({**pairing, "active": np.roll(pairing["active"], 1)})
+
+    return Wrapped(penalty, VTS_ME, pair=pair)
+
+
+# The nearest of the segments that end at the nearest node.
+_BY_NEAREST_NODE = (
+    "from contactverif.geometry.projection import distance_to_segment; "
+    "nearest_node = min(master.ravel().tolist(), key=lambda k: dot(arm(node(x, k), v), arm(node(x, k), v))); "
+    "m = min(np.flatnonzero((master == nearest_node).any(axis=1)), key=lambda k: "
+    "distance_to_segment(v.a, arm(v.a, v), node(x, master[k, 0]), node(x, master[k, 1])))"
+)
+
+MUTANTS = (
+    reports("slave segment of the neighbour reported", PLACE, _previous_slave_segment),
+    reports("place on the slave reported from its other end", PLACE, lambda points, *_: {"c": -points.c}),
+    reports("another master segment reported", SEGMENT, _other_master_segment),
+    reports("ξ reported from the other end", PLACE, lambda points, *_: {"xi": 1 - points.xi}),
+    reports("ξ clipped in the report", PLACE, lambda points, *_: {"xi": np.clip(points.xi, 0, 1)}),
+    reports("foot reported as position", PLACE, _foot_as_position),
+    reports("normal into the master reported", PLACE, lambda points, *_: {"normal": -points.normal}),
+    reports("normal of the reference configuration reported", PLACE, _normal_of_reference),
+    reports("gap reported half as large", PLACE, lambda points, *_: {"gap": points.gap / 2}, STS),
+    reports("gap from absolute coordinates reported", PLACE, _gap_from_coordinates),
+    reports("pressure reported one in a million too large", FORCES,
+            lambda points, *_: {"pressure": points.pressure * (1 + 1e-6)}),
+    reports("idle points report a pressure", FORCES, lambda points, *_: {"pressure": np.abs(points.gap)}),
+    reports("weight reported half as large", FORCES, lambda points, *_: {"weight": points.weight / 2}),
+    reports("weight of the whole segment", AREA, _weight_of_whole_segment),
+    reports("weight of what is not covered", AREA, lambda points, *_: {"weight": points.weight * 1.25}, STS),
+    reports("area reported from the first node", AREA, _area_from_first_node, contactverif_nts.vts_ppt),
+    reports("two thirds of the area reported", AREA, _area_of_two_thirds, contactverif_nts.vts_ppt),
+    reports("activity of the neighbour reported", ACTIVITY, lambda points, *_: {"active": np.roll(points.active, 1)}),
+    Mutant("activity of the neighbour", ACTIVITY, lambda *, penalty: _neighbour_decides(penalty)),
+    line("penetrations below 1e-9 left open", ACTIVITY, "eq6",
+         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) + 1e-9,"),
+    line("gaps below 1e-9 closed", ACTIVITY, "eq6",
+         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) - 1e-9,"),
+    line("segments of the nearest node only", SEGMENT, "eq6",
+         "m = nearest_segment(v, x, master, order, boxes)", _BY_NEAREST_NODE),
+    reports("weighted nodes reported as points", PLACE, lambda points, *_: {"weighted": False}, MORTAR),
+    reports("second pass reported as points of the slave", PLACE, lambda points, *_: {"on_master": False}, TWO_PASS),
+)  # fmt: skip
