@@ -14,6 +14,7 @@ from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
 from contactverif.cli.console import PLAIN_STYLE, STYLES
+from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, Row, Run
 
@@ -49,7 +50,7 @@ class RunTable:
     """A line for each formulation and property: promise, result, and how close it came to the tolerance.
 
     A remark stands behind its line if there is room, else below it. The name of the closest number is left out if there
-    is no room: the drawing of a failure repeats it.
+    is no room: the drawing of a failure repeats it. Below the table stands what the cases were worth.
     """
 
     run: Run
@@ -63,6 +64,7 @@ class RunTable:
             yield _fold(f"{Result.NOT_LOADED}: {plugin.reason}", width, style="red")
         if self.run.rows:
             yield from _legend({row.result for row in self.run.rows}, width)
+            yield from coverage_text(self.run, width)
 
 
 def headline(provenance: Mapping[str, str]) -> str:

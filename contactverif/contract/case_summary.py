@@ -26,6 +26,8 @@ class CaseSummary:
         {name: number} of the parameters that are one number each.
     name : str
         The name of a case that has one ("C", "C′"), else empty.
+    kind : str
+        The kind of situation, in words, of a case that has one, else empty.
     """
 
     n_slave_segments: int
@@ -35,6 +37,7 @@ class CaseSummary:
     shortest_segment: float
     parameters: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
+    kind: str = ""
 
     @classmethod
     def from_case(cls, case: Case) -> CaseSummary:
@@ -48,4 +51,5 @@ class CaseSummary:
             shortest_segment=case.shortest_segment,
             parameters={name: values.item() for name, values in case.parameters.items() if values.size == 1},
             name=case.name,
+            kind=case.kind,
         )

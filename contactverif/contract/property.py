@@ -137,6 +137,9 @@ class PropertyInfo:
         "contact_points"}.
     series : Mapping[str, str]
         {name: unit} of the numbers by iterate that a measurement may hold.
+    kinds : tuple[str, ...]
+        The kinds of situation (`Case.kind`) that the strategy makes, in the order of tables. A run counts the cases of
+        each, and shows a kind of which there was no case too.
     """
 
     id: str
@@ -145,6 +148,7 @@ class PropertyInfo:
     quantities: tuple[Quantity, ...]
     needs: frozenset[str] = field(default=frozenset(), kw_only=True)
     series: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    kinds: tuple[str, ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,6 +160,7 @@ class Property(PropertyInfo):
     cases : Callable[[Any], Any]
         Makes a hypothesis strategy of `Case`. Given an interface, it makes random states on that one, or returns
         None if the property cannot be checked there. A property of bodies is given the case of a scene instead. It may
+        return a mapping {kind of situation: strategy} instead: each kind gets the same share of the cases. It may
         return a tuple of cases instead, each with a name of its own: a finite list. All of them run, whatever the
         number of examples, and tables and reports call each by its name.
     measure : Callable[[Case, Subject], Measurement]
@@ -183,7 +188,13 @@ class Property(PropertyInfo):
     def info(self) -> PropertyInfo:
         """The plain data alone."""
         return PropertyInfo(
-            self.id, self.family, self.summary, self.quantities, needs=self.needs, series=dict(self.series)
+            self.id,
+            self.family,
+            self.summary,
+            self.quantities,
+            needs=self.needs,
+            series=dict(self.series),
+            kinds=self.kinds,
         )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, key_of, total
 from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
@@ -63,6 +64,10 @@ class Tally:
         Numbers of random cases with each verdict.
     reasons : Mapping[str, int]
         {reason: number of random cases} of the cases that were not decided, the most frequent first.
+    counts : CaseCounts
+        The numbers of planned cases that were judged, failed, undecided and idle.
+    kinds : Mapping[str, CaseCounts]
+        {kind of situation: the same numbers}; empty if the cases are of no kind.
     breach : bool
         The plugin broke the contract in some case, the witness included.
     closest : ClosestNumber | None
@@ -71,6 +76,8 @@ class Tally:
 
     verdicts: Mapping[Verdict, int]
     reasons: Mapping[str, int]
+    counts: CaseCounts
+    kinds: Mapping[str, CaseCounts]
     breach: bool
     closest: ClosestNumber | None
 
@@ -79,10 +86,12 @@ class Tally:
         """Count in one pass; the first of equally close numbers is the closest."""
         verdicts: Counter[Verdict] = Counter()
         reasons: Counter[str] = Counter()
+        keys: Counter[CaseKey] = Counter()
         breach = witness is not None and witness.breach
         closest: ClosestNumber | None = None
         for case, outcome in enumerate(outcomes):
             verdicts[outcome.verdict] += 1
+            keys[key_of(outcome)] += 1
             breach = breach or outcome.breach
             if outcome.decided:
                 closest = _closer(closest, info, outcome, case)
@@ -90,7 +99,15 @@ class Tally:
                 reasons[outcome.reason] += 1
         if witness is not None and witness.decided:
             closest = _closer(closest, info, witness, None)
-        return cls(verdicts, dict(reasons.most_common()), breach, closest)
+        kinds = count_by_kind(info, keys)
+        return cls(
+            verdicts=verdicts,
+            reasons=dict(reasons.most_common()),
+            counts=total(kinds.values()),
+            kinds=kinds if any(kinds) else {},
+            breach=breach,
+            closest=closest,
+        )
 
 
 def _closer(
@@ -168,6 +185,11 @@ class Row:
     def undecided(self) -> int:
         """The number of random cases that were measured, but left open whether they pass."""
         return self.tally.verdicts.get(Verdict.UNDECIDED, 0)
+
+    @property
+    def idle(self) -> int:
+        """The number of judged random cases in which nothing was in contact."""
+        return self.tally.counts.idle
 
     def names_of(self, *verdicts: Verdict) -> tuple[str, ...]:
         """Return the names of the cases with one of these verdicts, where cases have names, in their order."""

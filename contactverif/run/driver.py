@@ -3,6 +3,9 @@
 The planned cases are drawn first, all of them, by a function that never fails. So every formulation of a run is judged
 on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
 
+A property may have a strategy for each kind of situation. Then each kind gets the same share of the planned cases;
+hypothesis itself would draw many cases of some kinds and none of others, because it varies what it has drawn before.
+
 A property may have a finite list of named cases instead of a strategy. Then all of them are planned, whatever the
 number of examples, and none is shrunk: its name says what it is.
 
@@ -14,9 +17,9 @@ stored, and `_reproducible` takes away what depends on the imported modules.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, settings
@@ -30,7 +33,8 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 
-CaseSource = SearchStrategy[Case] | tuple[Case, ...]  # A strategy, or a finite list of named cases.
+# A strategy, a strategy for each kind of situation, or a finite list of named cases.
+CaseSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]] | tuple[Case, ...]
 
 # The largest number of judgements for one counterexample. Hypothesis itself stops after 500 shrinks or 300 s.
 SHRINK_CALLS = 2000
@@ -60,7 +64,7 @@ def draw_cases(
     Parameters
     ----------
     source : CaseSource
-        The strategy, or the finite list. A case that a strategy filters out is not counted.
+        The strategy, the strategies by kind, or the finite list. A case that a strategy filters out is not counted.
     seed : str
         The same seed gives the same cases.
     examples : int
@@ -71,7 +75,7 @@ def draw_cases(
     Returns
     -------
     PlannedCases
-        The cases; the first is the simplest that the strategy makes.
+        The cases; the first is the simplest that the strategy makes. Those of one kind follow one another.
 
     Raises
     ------
@@ -81,6 +85,8 @@ def draw_cases(
     if isinstance(source, tuple):
         _check_names([case.name for case in source])
         return PlannedCases(source, exhausted=True)
+    if isinstance(source, Mapping):
+        return _draw_each_kind(source, seed=seed, examples=examples, progress=progress or (lambda _: None))
     cases: list[Case] = []
     stopped: list[str] = []
 
@@ -99,6 +105,31 @@ def draw_cases(
         except Unsatisfiable:  # The strategy filters out every case; the caller sees that there is nothing to judge.
             return PlannedCases((), exhausted=False)
     return PlannedCases(tuple(cases), exhausted=stopped == ["nothing left to do"])
+
+
+def _draw_each_kind(
+    strategies: Mapping[str, SearchStrategy[Case]], *, seed: str, examples: int, progress: Callable[[int], None]
+) -> PlannedCases:
+    cases: list[Case] = []
+    exhausted = True
+    for kind, share in _shares(strategies, examples):
+        part = draw_cases(_strategy_of_kind(strategies, kind), seed=f"{seed}/{kind}", examples=share)
+        cases += part.cases
+        exhausted = exhausted and (part.exhausted or len(part.cases) == share)
+        progress(len(cases))
+    return PlannedCases(tuple(cases), exhausted)
+
+
+def _strategy_of_kind(strategies: Mapping[str, SearchStrategy[Case]], kind: str) -> SearchStrategy[Case]:
+    """Return the strategy of a kind; a case that names no kind gets this one."""
+    return strategies[kind].map(lambda case: case if case.kind else replace(case, kind=kind))
+
+
+def _shares(kinds: Mapping[str, object], examples: int) -> list[tuple[str, int]]:
+    """Return each kind with its number of cases, equal up to one; kinds that get none are left out."""
+    least, more = divmod(examples, len(kinds))
+    shares = [(kind, least + (place < more)) for place, kind in enumerate(kinds)]
+    return [(kind, share) for kind, share in shares if share]
 
 
 def _check_names(names: list[str]) -> None:
@@ -120,7 +151,8 @@ def shrink(
 ) -> None:
     """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
 
-    A formulation that answers differently each time ends the search early. Of a finite list nothing is smaller.
+    A formulation that answers differently each time ends the search early. Of a finite list nothing is smaller. A case
+    of a kind is shrunk to another one of its kind.
 
     Parameters
     ----------
@@ -142,6 +174,15 @@ def shrink(
         If `fails` raises it.
     """
     if isinstance(source, tuple):
+        return
+    if isinstance(source, Mapping):
+        for kind, share in _shares(source, examples):
+            strategy, key = _strategy_of_kind(source, kind), f"{seed}/{kind}"
+            n_cases = len(draw_cases(strategy, seed=key, examples=share).cases)
+            if first < n_cases:
+                shrink(strategy, seed=key, examples=share, first=first, fails=fails, limit=limit)
+                return
+            first -= n_cases
         return
     n_drawn = n_judged = 0
 

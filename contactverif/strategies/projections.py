@@ -11,6 +11,7 @@ The oracle says whether a case is of its kind (`contactverif.oracle.is_of_kind`)
 from __future__ import annotations
 
 from functools import cache
+from typing import overload
 
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
@@ -68,8 +69,33 @@ def cases_of_kind(kind: str) -> SearchStrategy[Case]:
     return sketch_cases(_SKETCHES[kind])
 
 
+@overload
+def projections_by_kind(interface: None = None) -> dict[str, SearchStrategy[Case]]: ...
+@overload
+def projections_by_kind(interface: Interface | None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]: ...
+def projections_by_kind(
+    interface: Interface | None = None,
+) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
+    """Return a strategy for each kind, as the source of a property's cases: each kind gets exactly its share of a run.
+
+    Parameters
+    ----------
+    interface : Interface | None
+        Small meshes drawn for each kind if None; else states of this one, each called by the kind that it is of.
+
+    Returns
+    -------
+    dict[str, SearchStrategy[Case]] | SearchStrategy[Case]
+        {kind: strategy}; one strategy for all states of an interface.
+    """
+    return {kind: cases_of_kind(kind) for kind in KINDS} if interface is None else given_projections.states(interface)
+
+
 def projection_states(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return cases of all kinds of projection, about as many of each kind.
+    """Return cases of all kinds of projection, mixed with others by `st.one_of`.
+
+    Hypothesis varies what it has drawn before, so the shares of the kinds differ widely; `projections_by_kind` gives
+    each kind its share.
 
     Parameters
     ----------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contactverif.contract.case import Case
@@ -65,6 +67,30 @@ def awkward() -> Case:
         "a/b ′": np.array([np.nan, -np.inf]),
     }
     return Case(interface, z, np.nextafter(1.0, 2.0), parameters, seed=2**63 - 5, name="C′ №1")
+
+
+def run_with_kinds() -> Run:
+    """Two formulations on cases of three kinds; one kind has no case, another is always idle, and one case has none."""
+    info = question("projection.place", "projection", ERROR)
+    info = replace(info, kinds=("inside a segment", "from behind", "second body behind"))
+    plain, other = question("balance.force", "balance", ERROR), question("scaling", "invariants", ERROR)
+    inside, behind = (replace(flat([1], [2]), kind=kind) for kind in info.kinds[:2])
+    passed, idle = outcome(inside, 1e-15), outcome(behind, 0.0)
+    assert idle.measurement is not None
+    idle = replace(idle, measurement=replace(idle.measurement, idle=True))
+    ties = [outcome(inside, 0.5, Verdict.UNDECIDED, f"a tie of {n} segments") for n in (2, 3)]
+    strange = outcome(replace(flat([1], [2]), kind="of another strategy"), 1e-15)
+    outcomes = (passed, *ties, idle, idle, strange, outcome(flat([1], [2]), 1e-15))
+    rows = [
+        Row("mine", info, Verdict.PASS, True, planned=7, outcomes=outcomes, seconds=1.0),
+        Row("mine", plain, Verdict.PASS, True, planned=2, outcomes=(passed, idle)),
+        Row("mine", other, Verdict.PASS, True, planned=1, outcomes=(outcome(flat([1], [2]), 0.0),)),
+        Row(
+            "yours", info, Verdict.FAIL, None, planned=1, outcomes=(outcome(inside, 0.5),), shrunk=outcome(inside, 0.5)
+        ),
+    ]
+    parts = {"pair": True, "tangent": True, "contact_points": True}
+    return Run(tuple(rows), (), {"mine": parts, "yours": parts}, {"seed": "1", "examples": "7"})
 
 
 def small_run(*, passing: bool = False) -> Run:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from handmade_report import small_run
+from handmade_report import run_with_kinds, small_run
 
+from contactverif.contract.result import Run
 from contactverif_reports.netcdf.write import write
 
 README = Path(__file__).parents[2] / "reports" / "README.md"
@@ -27,10 +29,11 @@ def test_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert len(list(tmp_path.glob("*.svg"))) == 3
 
 
-def test_every_group_and_variable_is_in_the_prose(tmp_path: Path) -> None:
+@pytest.mark.parametrize("make", [small_run, run_with_kinds])
+def test_every_group_and_variable_is_in_the_prose(tmp_path: Path, make: Callable[[], Run]) -> None:
     import xarray as xr
 
-    write(small_run(), tmp_path / "report.nc")
+    write(make(), tmp_path / "report.nc")
     prose = README.read_text(encoding="utf-8")
     with xr.open_datatree(tmp_path / "report.nc") as tree:
         for group in tree.subtree:

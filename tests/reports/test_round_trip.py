@@ -13,7 +13,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, small_run
+from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_with_kinds, small_run
 from rich.console import Console, RenderableType
 
 from contactverif.cli.changes_tables import ChangesTable, regressions_text
@@ -82,6 +82,7 @@ RUNS: dict[str, Callable[[], Run]] = {
     "small": small_run,
     "passing": lambda: small_run(passing=True),
     "hard": hard_run,
+    "kinds": run_with_kinds,
     "nothing": lambda: Run((), (NotLoaded("mine", "no such module"),), {}, {"seed": "1"}),
     "real": real_run,
 }
@@ -146,7 +147,9 @@ def test_what_is_counted_is_the_same(live: Run, reread: Run) -> None:
         assert (ours.planned, ours.judged, ours.undecided, ours.breach) == (
             theirs.planned, theirs.judged, theirs.undecided, theirs.breach,
         )  # fmt: skip
-        assert ours.tally.reasons == theirs.tally.reasons
+        assert list(ours.tally.reasons.items()) == list(theirs.tally.reasons.items())
+        assert list(ours.tally.kinds.items()) == list(theirs.tally.kinds.items())
+        assert (ours.idle, ours.tally.counts, ours.info.kinds) == (theirs.idle, theirs.tally.counts, theirs.info.kinds)
         assert (ours.info.quantities, ours.info.needs, ours.info.series, ours.info.summary) == (
             theirs.info.quantities, theirs.info.needs, theirs.info.series, theirs.info.summary,
         )  # fmt: skip

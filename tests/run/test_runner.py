@@ -129,6 +129,27 @@ def test_all_cases_of_a_finite_list_are_judged_whatever_the_number_of_examples()
         assert [outcome.case.name for outcome in row.outcomes] == ["size 3", "size 1", "size 2"]
 
 
+def test_each_kind_of_case_gets_the_same_share() -> None:
+    kinds = {name: st.integers(low, low + 60).map(a_case) for name, low in (("small", 1), ("large", 9), ("long", 30))}
+    row = one_row(subject(), replace(ZERO, cases=lambda _: kinds, kinds=tuple(kinds)), examples=20)
+    assert {kind: counts.cases for kind, counts in row.tally.kinds.items()} == {"small": 7, "large": 7, "long": 6}
+    assert row.planned == row.judged == 20
+
+
+def test_a_kind_with_few_cases_gets_all_of_them() -> None:
+    kinds = {"few": sizes(3), "many": sizes(60)}
+    row = one_row(subject(), replace(ZERO, cases=lambda _: kinds), examples=20)
+    assert {kind: counts.cases for kind, counts in row.tally.kinds.items()} == {"few": 3, "many": 10}
+    assert (row.verdict, row.planned) == (Verdict.PASS, 13)
+
+
+def test_a_case_of_a_kind_shrinks_to_one_of_its_kind() -> None:
+    kinds = {"small": st.integers(1, 60).map(a_case), "large": st.integers(100, 160).map(a_case)}
+    row = one_row(subject(from_size(90)), replace(ZERO, cases=lambda _: kinds), examples=20)
+    assert row.shrunk is not None
+    assert (row.shrunk.case.kind, row.shrunk.summary.n_slave_segments) == ("large", 100)
+
+
 def test_the_case_of_a_finite_list_that_fails_is_called_by_its_name_and_not_shrunk() -> None:
     question = replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in (3, 1, 2)))
     row = one_row(subject(from_size(2)), question)

@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from contactverif.contract.case_counts import percent
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result
@@ -138,6 +139,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
+    environment.filters["percent"] = percent
     environment.globals["marks"] = {str(word): mark for word, mark in MARKS.items()}
     return environment
 

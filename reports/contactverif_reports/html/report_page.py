@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.coverage import coverage_of
 from contactverif.contract.property import CheckedNumber, checked_numbers
 from contactverif.contract.result import Result, Row, Run
 from contactverif_reports.compare.cells import Cell
@@ -154,6 +155,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
         numbers={name: n for n, name in enumerate(run.formulations, 1)},
         results=[result for result in Result if run.count(result)],
         ticks=ticks(axis),
+        coverages=coverage_of(run),
         beyond=axis.most,
         n_examples=len(examples),
         n_figures=MOST_FIGURES,

@@ -29,6 +29,7 @@ _ARRAYS = {  # {array: (dimensions, long name, unit)}
     ),
     "seed": ((), "seed of anything random that the property does with the case", "1"),
     "name": ((), "name of the case, empty if it has none", ""),
+    "kind": ((), "kind of situation of the case, empty if it has none", ""),
 }
 
 
@@ -73,7 +74,8 @@ def _mesh(example: Counterexample) -> xr.Dataset:
     table["side"].attrs |= {"mesh": "mesh", "location": "edge"}
     for current in ("current_x", "current_y"):
         table[current].attrs |= on_nodes
-    names = replace(SharedNames.from_outcomes([example.outcome]), parameters=())  # They are among the arrays.
+    names = SharedNames.from_outcomes(info, [example.outcome])
+    names = replace(names, parameters=(), kinds=())  # They are among the arrays.
     table |= coordinates(info, names)
     table |= OutcomeVariables(info, [example.outcome], {}, names).table(with_summaries=False)
     attributes = {
@@ -84,6 +86,7 @@ def _mesh(example: Counterexample) -> xr.Dataset:
         "reason": example.reason or schema.NONE,
         "origin": schema.WITNESS if example.is_witness else schema.SHRUNK,
         "case_name": case.name or schema.NONE,
+        "case_kind": case.kind or schema.NONE,
         "replay": f"contactverif replay REPORT --case {example.id}",
     }
     return xr.Dataset(table, attrs={key: schema.text(value) for key, value in attributes.items()})

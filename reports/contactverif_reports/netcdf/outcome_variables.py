@@ -34,21 +34,26 @@ class SharedNames:
         The names of the parameters that are one number each.
     n_iterates : int
         The length of the longest series.
+    kinds : tuple[str, ...]
+        The kinds of situation: those that the property declares, then others.
     """
 
     details: tuple[str, ...]
     parameters: tuple[str, ...]
     n_iterates: int
+    kinds: tuple[str, ...] = ()
 
     @classmethod
-    def from_outcomes(cls, outcomes: Sequence[Outcome]) -> SharedNames:
+    def from_outcomes(cls, info: PropertyInfo, outcomes: Sequence[Outcome]) -> SharedNames:
         """Collect the names."""
+        kinds = (outcome.case_or_summary.kind for outcome in outcomes)
         measurements = [outcome.measurement for outcome in outcomes if outcome.measurement is not None]
         series = [values for measurement in measurements for values in measurement.series.values()]
         return cls(
             details=tuple(dict.fromkeys(name for measurement in measurements for name in measurement.details)),
             parameters=tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.summary.parameters)),
             n_iterates=max(map(len, series), default=0),
+            kinds=tuple(dict.fromkeys([*info.kinds, *sorted({kind for kind in kinds if kind})])),
         )
 
 
@@ -196,6 +201,16 @@ class OutcomeVariables:
 
             unit = schema.PARAMETER_UNITS.get(name, schema.UNKNOWN)
             table[f"parameter_{safe}"] = real(parameter, f"parameter of the case: {schema.text(name)}", unit)
+        if self._names.kinds:
+            place = {kind: number for number, kind in enumerate(self._names.kinds)}
+            table["case_kind"] = numbers(
+                self._dims,
+                self._array([place.get(summary.kind, -1) if summary else -1 for summary in summaries], np.int32),
+                "kind of situation of the case",
+                "1",
+                "the index along `kind`; missing where the case is of none",
+                fill=-1,
+            )
         case_names = ["" if summary is None else summary.name for summary in summaries]
         return table | self._words("case_name", case_names, "name of the case")
 
@@ -219,7 +234,7 @@ class OutcomeVariables:
 
 
 def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
-    """Return what stands along `quantity`, `detail` and `series`: names, units, formulas and reasons."""
+    """Return what stands along `quantity`, `detail`, `series` and `kind`: names, units, formulas and reasons."""
     table: Table = {}
     if quantities := info.quantities:
         axis = ["quantity"]
@@ -242,6 +257,10 @@ def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
     if info.series:
         table["series"] = words(["series"], list(info.series), "name of the numbers by iterate, as in series_NAME")
         table["series_units"] = words(["series"], list(info.series.values()), "unit of the numbers by iterate")
+    if names.kinds:
+        comment = "n_declared: so many of them, the first ones, the property declares"
+        table["kind"] = words(["kind"], names.kinds, "kind of situation that cases are of", comment)
+        table["kind"].attrs["n_declared"] = np.int32(len(info.kinds))
     if names.parameters:
         long_name = "name of the parameter, as in parameter_NAME"
         table["parameter"] = words(["parameter"], names.parameters, long_name)

@@ -39,7 +39,7 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
     for row in outcomes:
         padded += [*row, *[None] * (n_cases - len(row))]
     everything = [outcome for outcome in chain(padded, witnesses) if outcome is not None]
-    names = SharedNames.from_outcomes(everything)
+    names = SharedNames.from_outcomes(info, everything)
     table = {
         "formulation": words(["formulation"], formulations, "formulation, as typed on the command line"),
         "case": numbers(["case"], np.arange(n_cases, dtype=np.int32), "number of the case, in order of judging", "1"),
@@ -49,6 +49,8 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
     table |= OutcomeVariables(info, padded, {**axes, "case": n_cases}, names).table()
     if any(witness is not None for witness in witnesses):
         table |= OutcomeVariables(info, witnesses, axes, names, "witness_").table()
+    if names.kinds:
+        table |= _kind_counts(names.kinds, [rows.get(name) for name in formulations])
     attributes = {
         "property_id": schema.text(info.id),
         "family": schema.text(info.family),
@@ -58,3 +60,20 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
         "named case with which a formulation proves that it fails",
     }
     return xr.Dataset(table, attrs=attributes)
+
+
+def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> dict[str, xr.Variable]:
+    """Return how many cases of each kind were planned, judged, and so on."""
+    counted = ("planned", "judged", "failed", "undecided", "idle")
+    counts = np.zeros((len(rows), len(kinds), len(counted)), dtype=np.int32)
+    for i, row in enumerate(rows):
+        for kind, cases in (row.tally.kinds if row is not None else {}).items():
+            if kind:
+                counts[i, kinds.index(kind)] = cases.cases, cases.judged, cases.failed, cases.undecided, cases.idle
+    comment = "failed and idle ones are among those judged; idle: nothing was in contact"
+    return {
+        "counted": words(["counted"], counted, "what kind_count counts"),
+        "kind_count": numbers(
+            ["formulation", "kind", "counted"], counts, "number of random cases of each kind", "1", comment
+        ),
+    }

@@ -76,6 +76,8 @@ class OutcomeArrays:
         columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
         self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
         self._case_names = self._read("case_name") if self._has("case_name") else None
+        self._kinds = [*_names(self._dataset, "kind"), ""]  # A case of none has the code −1, which is the last.
+        self._case_kinds = self._read("case_kind") if self._has("case_kind") else np.full(len(self.verdicts), -1)
 
     def outcome(self, number: int, case: Case | None = None, seconds: float = 0.0) -> Outcome | None:
         """Return an outcome, with the whole case if it is given; None where there is none."""
@@ -96,7 +98,16 @@ class OutcomeArrays:
         n_slave, n_master = self._counts[number].tolist()
         penalty, largest, shortest, *parameters = self._reals[number].tolist()
         name = "" if self._case_names is None else str(self._case_names[number])
-        return CaseSummary(n_slave, n_master, penalty, largest, shortest, _present(self._parameters, parameters), name)
+        return CaseSummary(
+            n_slave,
+            n_master,
+            penalty,
+            largest,
+            shortest,
+            _present(self._parameters, parameters),
+            name,
+            self._kinds[self._case_kinds[number]],
+        )
 
     def _measurement(self, number: int, *, idle: bool) -> Measurement:
         return Measurement(
@@ -179,6 +190,7 @@ def read_info(dataset: xr.Dataset) -> PropertyInfo:
         tuple(Quantity(*row) for row in zip(*(_names(dataset, name) for name in columns), strict=True)),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
         series=dict(zip(_names(dataset, "series"), _names(dataset, "series_units"), strict=True)),
+        kinds=tuple(_names(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
     )
 
 

@@ -126,6 +126,7 @@ def _rows(grid: _Grid, run: Run) -> Table:
         "reason": words(_ROW, grid.each(lambda row: row.reason, ""), "why the verdict is no pass, in the worst case"),
         "planned": grid.count(lambda row: row.planned, "number of random cases planned"),
         "judged": grid.count(lambda row: row.judged, "number of random cases that were decided"),
+        "idle": grid.count(lambda row: row.idle, "number of judged random cases in which nothing was in contact"),
         "count": numbers(
             [*_ROW, "verdict"], np.array(counts, dtype=np.int32), "number of random cases with each verdict", "1"
         ),
