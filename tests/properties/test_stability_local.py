@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from expected_verdicts import FAILS
 from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, single_precision_at_first_node, springs_of
 from subjects import load_subject
 
@@ -125,6 +130,33 @@ def test_multipliers_that_are_pressures_are_judged_by_the_distribution(name: str
             return 2 * forces
 
     assert max(worst_number(case, Subject("doubled", Doubled)) for case in cases(30)) <= 4
+
+
+UNCOMPILED = """
+from expected_verdicts import FAILS
+from subjects import load_property, load_subject
+
+from contactverif.contract.property import Verdict
+from contactverif.run.runner import run
+
+result = run([load_subject(name) for name in FAILS], [load_property("stability.local")], examples=10, seed=0)
+for row in result.rows:
+    assert row.verdict is Verdict.PASS and row.promise, (row.formulation, row.verdict, row.reason)
+    assert row.closest.number.value <= 4, (row.formulation, row.closest)
+print(len(result.rows), "formulations")
+"""
+
+
+@pytest.mark.skipif(
+    np.finfo(np.longdouble).nmant <= np.finfo(np.float64).nmant, reason="long double is not longer than double here"
+)
+def test_every_built_in_formulation_is_judged_where_nothing_is_compiled() -> None:
+    here = str(Path(__file__).parents[1])
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": here}
+    command = [sys.executable, "-W", "error", "-c", UNCOMPILED]
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert not process.returncode, process.stderr
+    assert process.stdout.split()[0] == str(len(FAILS))
 
 
 def test_what_is_exact_follows_the_traits() -> None:
