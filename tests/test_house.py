@@ -47,7 +47,7 @@ class Room:
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
 BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "scenes", "strategies")
-REPORTS = ("reports", "reports.netcdf", "reports.draw", "reports.html", "reports.compare")
+REPORTS = ("reports", "reports.netcdf", "reports.draw", "reports.html", "reports.compare", "reports.stability")
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
@@ -79,8 +79,9 @@ ROOMS = {
     ),
     "reports": Room(("contract",), ("numpy",)),
     "reports.netcdf": Room(("contract", "reports"), ("numpy", "xarray", "netCDF4")),
-    "reports.draw": Room(("contract", "reports"), ("numpy", "matplotlib", "meshio")),
+    "reports.draw": Room(("contract", "reports", "reports.stability"), ("numpy", "matplotlib", "meshio")),
     "reports.compare": Room(("contract", "reports"), ("numpy",)),
+    "reports.stability": Room(("contract", "reports"), ("numpy",)),
     "reports.html": Room(
         ("contract", "reports", "reports.draw", "reports.compare"), ("numpy", "matplotlib", "jinja2", "markupsafe")
     ),

@@ -26,6 +26,7 @@ from contactverif.cli.report_command import report
 from contactverif.cli.scenes_command import scenes
 from contactverif.cli.score_command import score
 from contactverif.cli.shared_options import spell_out_groups
+from contactverif.cli.stability_command import stability
 from contactverif.cli.verify_command import verify
 from contactverif.contract.errors import ContactverifError, MisuseError
 
@@ -42,6 +43,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "report": report,
     "replay": replay,
     "draw": draw,
+    "stability": stability,
     "paper": paper,
     "scenes": scenes,
     "queries": queries,

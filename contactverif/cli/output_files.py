@@ -17,7 +17,15 @@ REPORT = ".nc"
 PAGE = ".html"
 PICTURES = (".png", ".svg")
 SOLVED_SCENE = ".vtu"
-LABELS = {REPORT: "report", PAGE: "page", ".png": "picture", ".svg": "picture", SOLVED_SCENE: "for ParaView"}
+MARKDOWN = ".md"
+LABELS = {
+    REPORT: "report",
+    PAGE: "page",
+    MARKDOWN: "page",
+    ".png": "picture",
+    ".svg": "picture",
+    SOLVED_SCENE: "for ParaView",
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,8 @@ class RunTable:
 def headline(provenance: Mapping[str, str]) -> str:
     """Say how many cases there are, and where they come from."""
     profile, examples, seed = (provenance.get(name) for name in ("profile", "examples", "seed"))
+    if profile is None:
+        return "named cases alone, no random ones"
     return f"profile {profile}: {examples} random cases for each property, seed {seed}"
 
 

@@ -68,7 +68,7 @@ def verify(
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import run
 
-    names = _select_names(names or [], all_)
+    names = select_names(names or [], all_)
     files = OutputFiles.check(out, (REPORT, PAGE))
     folder = PictureFolder.make(pictures)
     scene = place.make_scene()
@@ -147,7 +147,7 @@ def _draw_counterexample(
     typer.echo(f"    picture: {folder.name / name}")
 
 
-def _select_names(names: list[str], every: bool) -> list[str]:
+def select_names(names: list[str], every: bool) -> list[str]:
     """Return the formulations that the user named, or all of them."""
     from contactverif.run.registry import formulation_names, standalone_names
 

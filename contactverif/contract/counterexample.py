@@ -85,6 +85,22 @@ def counterexample_of(row: Row) -> Outcome | None:
     return row.witness if failed or (row.promise is False and row.unexpected) else None
 
 
+def named_failures(run: Run) -> dict[str, Counterexample]:
+    """Return the named cases that a formulation fails {id: counterexample}, of those that the run holds whole.
+
+    A property with a finite list of cases names each of them. The id is `FORMULATION.PROPERTY.CASE`.
+    """
+    failures = {}
+    for row in run.rows:
+        for outcome in row.outcomes:
+            failed = outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
+            case = outcome.case_or_summary
+            if failed and isinstance(case, Case) and case.name:
+                id_ = named_case_id(row.formulation, row.property_id, case.name)
+                failures[id_] = Counterexample(id_, row, outcome)
+    return failures
+
+
 def find_counterexample(run: Run, id_: str) -> Counterexample:
     """Return the counterexample of that id.
 
@@ -93,7 +109,7 @@ def find_counterexample(run: Run, id_: str) -> Counterexample:
     MisuseError
         If there is none; the message names ids that exist.
     """
-    examples = counterexamples(run)
+    examples = {**named_failures(run), **counterexamples(run)}
     if id_ not in examples:
         raise MisuseError("--case", repr(id_), _suggestion(id_, list(examples)))
     return examples[id_]
@@ -102,6 +118,11 @@ def find_counterexample(run: Run, id_: str) -> Counterexample:
 def case_id(formulation: str, property_id: str, *, witness: bool = False) -> str:
     """Return `vts-me_n_4.patch.flat.transmission`, with `.witness` behind it for a witness."""
     return typeable(f"{formulation}.{property_id}") + (".witness" if witness else "")
+
+
+def named_case_id(formulation: str, property_id: str, name: str) -> str:
+    """Return `vts-ppt.stability.sweep.offset-1e6-a`, the id of a case with a name."""
+    return typeable(f"{formulation}.{property_id}.{name}")
 
 
 def typeable(name: str) -> str:

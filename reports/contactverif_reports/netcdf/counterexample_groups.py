@@ -44,7 +44,7 @@ def counterexample_groups(run: Run) -> dict[str, xr.Dataset]:
     groups = {folder: xr.Dataset(attrs={"comment": comment, "ids": " ".join(examples) or schema.NONE})}
     for id_, example in examples.items():
         groups[f"{folder}/{id_}"] = _mesh(example)
-        groups[f"{folder}/{id_}/{schema.CASE}"] = _arrays(example.case)
+        groups[f"{folder}/{id_}/{schema.CASE}"] = case_group(example.case)
     return groups
 
 
@@ -92,7 +92,7 @@ def _mesh(example: Counterexample) -> xr.Dataset:
     return xr.Dataset(table, attrs={key: schema.text(value) for key, value in attributes.items()})
 
 
-def _arrays(case: Case) -> xr.Dataset:
+def case_group(case: Case) -> xr.Dataset:
     """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
     table: dict[str, xr.Variable] = {}
@@ -119,7 +119,7 @@ def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
 
 
 def case_of_group(dataset: xr.Dataset) -> Case:
-    """Return the case that `_arrays` wrote.
+    """Return the case that `case_group` made a group of.
 
     Raises
     ------

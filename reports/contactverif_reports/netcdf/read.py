@@ -18,12 +18,18 @@ import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.counterexample import Counterexample, counterexamples, find_counterexample
+from contactverif.contract.counterexample import (
+    Counterexample,
+    counterexamples,
+    find_counterexample,
+    named_failures,
+)
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.counterexample_groups import case_of_group
+from contactverif_reports.netcdf.named_case_groups import read_named_cases
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
 from contactverif_reports.netcdf.summary_group import root_attributes
 
@@ -69,14 +75,15 @@ def read_case(path: str | os.PathLike[str], case_id: str) -> Counterexample:
 
 
 def case_ids(path: str | os.PathLike[str]) -> list[str]:
-    """Return the ids of the counterexamples of a report, in the order of the run.
+    """Return the ids of the counterexamples of a report, in the order of the run, then those of named cases.
 
     Raises
     ------
     MisuseError
         If the report cannot be read.
     """
-    return list(counterexamples(read_run(path)))
+    run = read_run(path)
+    return list({**counterexamples(run), **named_failures(run)})
 
 
 @contextmanager
@@ -160,6 +167,7 @@ class _Reader:
             if "property_id" in dataset.attrs and not name.startswith(f"/{schema.COUNTEREXAMPLES}/")
         }
         self._examples = _examples(groups)
+        self._named = read_named_cases(groups)
 
     def run(self) -> Run:
         """Return the run."""
@@ -185,6 +193,7 @@ class _Reader:
         outcomes = OutcomeArrays(dataset, info, ("formulation", "case"))
         witnesses = OutcomeArrays(dataset, info, ("formulation",), "witness_") if "witness_verdict" in dataset else None
         n_cases = dataset.sizes["case"]
+        named = {name: case for (id_, name), case in self._named.items() if id_ == property_id}
         codes = outcomes.verdicts.reshape(len(formulations), n_cases)
         for i, formulation in enumerate(formulations):
             verdict = int(self._summary["row_verdict"].values[i, j])
@@ -202,7 +211,7 @@ class _Reader:
                     known=str(self._summary["known"].values[i, j]),
                     reason=str(self._summary["reason"].values[i, j]),
                     planned=int(self._summary["planned"].values[i, j]),
-                    outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length)),
+                    outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
                     witness=None if witnesses is None else witnesses.outcome(i, case),
                     shrunk=shrunk,
                     seconds=float(self._timing["row_seconds"].values[i, j]),

@@ -26,7 +26,8 @@ ROOT_NOTE = (
 )
 
 SUMMARY, COUNTEREXAMPLES, TIMING, CASE = "summary", "counterexamples", "timing", "case"
-RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING})
+NAMED_CASES = "named_cases"  # The group of the named cases that some formulation fails; only some reports have it.
+RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING, NAMED_CASES})
 OFF_THE_RECORD = frozenset({"created", "command", "platform"})  # Root attributes in which two equal runs may differ.
 PARTS = ("pair", "tangent", "contact_points")
 
@@ -41,6 +42,12 @@ PARAMETER_UNITS: Mapping[str, str] = {
     "probe_segment": RATIO,
     "probe_c": RATIO,
     "approach": LENGTH,
+    "gap": LENGTH,
+    "offset": LENGTH,
+    "shift": LENGTH,
+    "ratio": RATIO,
+    "stiffness": RATIO,
+    "turn": RATIO,
     "pressure": STRESS,
     "compliance": "m2 N-1",
     "bodies_nodes": LENGTH,

@@ -5,7 +5,8 @@ A report may hold millions of cases. Made all at once, they would take a hundred
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, overload
 
 import numpy as np
@@ -150,10 +151,15 @@ class StoredOutcomes(Sequence[Outcome]):
         The flat number of the first outcome, and the number of outcomes.
     seconds : FloatArray, shape (n_cases,)
         The time that each took.
+    named : Mapping[str, Case]
+        {name: case} of the cases that the report stores whole, of a property whose cases have names.
     """
 
-    def __init__(self, arrays: OutcomeArrays, first: int, n_cases: int, seconds: FloatArray) -> None:
+    def __init__(
+        self, arrays: OutcomeArrays, first: int, n_cases: int, seconds: FloatArray, named: Mapping[str, Case]
+    ) -> None:
         self._arrays, self._first, self._n_cases, self._seconds = arrays, first, n_cases, seconds
+        self._named = named
 
     def __len__(self) -> int:
         return self._n_cases
@@ -170,7 +176,8 @@ class StoredOutcomes(Sequence[Outcome]):
         number %= self._n_cases
         outcome = self._arrays.outcome(self._first + number, seconds=float(self._seconds[number]))
         assert outcome is not None
-        return outcome
+        case = self._named.get(outcome.summary.name)
+        return outcome if case is None else replace(outcome, case_or_summary=case)
 
 
 def read_info(dataset: xr.Dataset) -> PropertyInfo:

@@ -10,8 +10,17 @@ from contactverif_reports.files import check_writable, whole
 __all__ = ["check_writable", "write"]
 
 
-def write(run: Run, path: str | os.PathLike[str]) -> None:
+def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
     """Write the report of a run, whole or not at all, in place of a file that is there.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str | os.PathLike[str]
+        The file.
+    with_named_cases : bool
+        Store each named case that a formulation fails, so that each can be replayed, and not only the worst.
 
     Raises
     ------
@@ -22,4 +31,4 @@ def write(run: Run, path: str | os.PathLike[str]) -> None:
 
     check_writable(path)
     with whole(path) as part:
-        tree_of(run).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+        tree_of(run, with_named_cases=with_named_cases).to_netcdf(part, engine="netcdf4", format="NETCDF4")

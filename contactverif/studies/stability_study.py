@@ -1,0 +1,47 @@
+"""The stability sweeps: formulations on named states that get harder and harder, as a run like any other."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from contactverif.contract.result import NotLoaded, Run
+from contactverif.contract.subject import Subject
+from contactverif.run.provenance import collect_provenance
+from contactverif.run.registry import load_properties
+from contactverif.run.runner import Progress, run
+
+PROPERTIES = ("stability.sweep", "stability.stiffness")  # Their cases are finite lists of named states.
+
+
+def run_stability(
+    subjects: Sequence[Subject | NotLoaded],
+    *,
+    progress: Callable[[Progress], None] | None = None,
+    outputs: Sequence[str] = (),
+) -> Run:
+    """Judge formulations on all states of the sweeps.
+
+    Parameters
+    ----------
+    subjects : Sequence[Subject | NotLoaded]
+        The formulations, as the registry loads them.
+    progress : Callable[[Progress], None] | None
+        A function that is called after every state.
+    outputs : Sequence[str]
+        The names of the files that are written, for the command that makes them again.
+
+    Returns
+    -------
+    Run
+        The run. Its provenance is the same on every machine: versions, commit and command.
+    """
+    result = run(subjects, load_properties(PROPERTIES), seed=0, progress=progress)
+    names = [item.name if isinstance(item, Subject) else item.formulation for item in subjects]
+    options = [word for output in outputs for word in ("--out", output)]
+    facts = collect_provenance(profile="", examples=0, seed=0)
+    same_everywhere = {name: value for name, value in facts.items() if name.endswith("_version") or name == "commit"}
+    return replace(
+        result, provenance=same_everywhere | {"command": shlex.join(["contactverif", "stability", *names, *options])}
+    )

@@ -1,0 +1,88 @@
+"""The page in Markdown that stands beside a kept figure: a sentence for each formulation and the table of ω."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from contactverif.contract.result import Run
+from contactverif_reports.stability.sentences import sentence_of
+from contactverif_reports.stability.sweep_points import (
+    COLUMNS,
+    FAR_AND_CLOSE,
+    LINE_FACTOR,
+    SweepPanel,
+    short_number,
+    sweep_panels,
+)
+
+_MEANING = f"""\
+A state is a flat interface that is turned and moved without rounding. The reference is the forces of the same state,
+flat at the origin, turned. κ is the condition number of a force: Σ ‖K‖ |z − z̄| over the largest force. K is the
+derivative of the residual and z̄ the centroid of the interface. No formulation can keep all errors below u κ, with
+u = 2⁻⁵³. The line of the figure is {LINE_FACTOR:g} u κ. The states of ε̂h/E are two blocks, solved; there K is the
+matrix of bodies and contact."""
+
+
+def stability_page(run: Run, files: Mapping[str, str]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    run : Run
+        A run of the sweeps.
+    files : Mapping[str, str]
+        {suffix: name} of the files that were written beside it, ".nc", ".svg" or ".png".
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    panels = sweep_panels(run)
+    parts = [
+        "# Error against condition number",
+        "",
+        f"`{run.provenance['command']}`",
+        "",
+        _origin(run),
+        "",
+        _MEANING,
+        "",
+    ]
+    parts += [f"![Error against condition number, one panel a formulation]({name})\n" for name in _pictures(files)]
+    parts += ["## One sentence for each formulation", ""]
+    parts += [f"- `{panel.formulation}` {sentence_of(panel)}" for panel in panels]
+    parts += [f"- `{plugin.formulation}` was not loaded: {plugin.reason}" for plugin in run.not_loaded]
+    parts += ["", "## ω, the error over u κ", "", *_table(panels), ""]
+    if ".nc" in files:
+        parts += [_how_to_replay(panels, files[".nc"]), ""]
+    return "\n".join(parts)
+
+
+def _origin(run: Run) -> str:
+    version, commit = (run.provenance.get(name, "unknown") for name in ("contactverif_version", "commit"))
+    return f"The command above wrote these files with contactverif {version}, commit {commit}."
+
+
+def _pictures(files: Mapping[str, str]) -> list[str]:
+    return [files[suffix] for suffix in (".svg", ".png") if suffix in files][:1]
+
+
+def _table(panels: Sequence[SweepPanel]) -> list[str]:
+    """Return the lines of the table; the last column is the relative error of the forces."""
+    headings = ["", *COLUMNS, "error of the forces at offset 1e6, gap 1e-6"]
+    lines = [f"| {' | '.join(headings)} |", f"|---|{'--:|' * (len(headings) - 1)}"]
+    for panel in panels:
+        numbers = [panel.roundings_at(stem) for stem in COLUMNS.values()] + [panel.force_error_at(FAR_AND_CLOSE)]
+        lines.append(f"| `{panel.formulation}` | {' | '.join(map(short_number, numbers))} |")
+    return lines
+
+
+def _how_to_replay(panels: Sequence[SweepPanel], report: str) -> str:
+    """Return how a point is judged again, with the worst one above the line for an example, if there is one."""
+    above = [point for panel in panels for point in panel.above]
+    if not above:
+        return f"No point is above the line. `{report}` holds the numbers; `contactverif report {report}` shows them."
+    worst = max(above, key=lambda point: point.roundings)
+    command = f"    contactverif replay {report} --case {worst.case_id}"
+    return f"Each point above the line can be judged again, for example the worst one:\n\n{command}"
