@@ -75,9 +75,13 @@ def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> No
     assert row.verdict is verdict, row.reason
     assert not row.unexpected
     if verdict is not Verdict.NOT_APPLICABLE:
-        assert row.promise is (verdict is Verdict.PASS)
-        assert row.planned == 100
-        assert row.judged >= 90
+        if property_id.startswith("hard."):  # Finite lists; who fails there states nothing about them.
+            assert row.promise in (None, verdict is Verdict.PASS)
+            assert row.planned == len(load_property(property_id).cases(None))
+        else:
+            assert row.promise is (verdict is Verdict.PASS)
+            assert row.planned == 100
+        assert row.judged >= 0.9 * row.planned
 
 
 def test_the_table_in_the_readme_is_what_is_expected() -> None:

@@ -152,9 +152,9 @@ def _remark(row: Row) -> str:
         row.unexpected if row.result is Result.BROKEN_PROMISE else "",
         f"known: {row.known}" if row.known else "",
         row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
-        f"fails in {_list(row.failing_names)}" if row.failing_names else "",
+        f"fails in: {_list(row.failing_names)}" if row.failing_names else "",
         f"{row.undecided} undecided" if row.undecided else "",
-        f"undecided in {_list(row.undecided_names)}" if row.undecided_names else "",
+        f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
     ]
     return "; ".join(part for part in parts if part)
 
@@ -162,7 +162,7 @@ def _remark(row: Row) -> str:
 def _list(names: Sequence[str]) -> str:
     """Return the first names of a finite list of cases, and how many more there are."""
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(names[:_MOST_NAMES]) + more
+    return "; ".join(names[:_MOST_NAMES]) + more
 
 
 def _align(cells: Sequence[str], widths: Sequence[int]) -> str:

@@ -14,7 +14,7 @@ from contactverif.scenes.flat_states import STEEP, TURNED, UPRIGHT, Master, flat
 _TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED, ", turned 5-12-13": STEEP}
 _TWO_TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED}
 _TINY = 1.2e-5  # The length of the shortest segment in an interface of length 12.
-TINY_MESHES = {
+TINY_MESHES: dict[str, tuple[list[float], list[float]]] = {
     "slave": ([0, 2, 4, 4 + _TINY, 8, 12], [0, 3, 6, 9, 12]),
     "master": ([0, 2, 4, 8, 12], [0, 3, 6, 6 + _TINY, 9, 12]),
     "both": ([0, 2, 6, 6 + _TINY, 12], [0, 3, 6 - _TINY / 2, 6 + _TINY / 2, 12]),

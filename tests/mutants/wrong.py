@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import wrong_hard
 import wrong_projection
 import wrong_purity
 import wrong_stability
@@ -387,6 +388,7 @@ MUTANTS = (
          "x, multipliers = np.array(interface.nodes), np.zeros(0)\n        tree"),
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
+    *wrong_hard.MUTANTS,
     *wrong_projection.MUTANTS,
     *wrong_purity.MUTANTS,
     *wrong_stability.MUTANTS,

@@ -20,7 +20,7 @@ from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.roundoff import ratio
-from contactverif_properties.shared.uniform_pressure import forces_of_gap, unit_forces
+from contactverif_properties.shared.uniform_pressure import forces_of_gap, forces_of_penetration, unit_forces
 
 _TOLERANCE = "u(8Z/|g| + 4N)"
 _REASON = (
@@ -82,7 +82,12 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
 
 
 def exact_forces(case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2) of the pressure ε̂ |g| that push the nodes of a flat state."""
+    """Return the exact forces (n_nodes, 2) of the pressure ε̂ |g| that push the nodes of a flat state.
+
+    A case without the parameter `weights` has no other surface than the flat one.
+    """
+    if "weights" not in case.parameters:
+        return forces_of_penetration(case)
     sides = np.where(np.arange(case.interface.n_nodes) < case.interface.n_slave_nodes, 1.0, -1.0)
     pressure = case.penalty * case.parameter("penetration")
     forces: FloatArray = pressure * (sides * case.parameters["weights"])[:, None] * _normal(case)

@@ -1,0 +1,128 @@
+"""Hard cases of two blocks: tiny segments, contrasts of stiffness and mesh, overlaps that vanish, and no load at all.
+
+In all but the last the pressure is uniform and known exactly. With no load, nothing is strained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from math import cos, radians, sin
+
+import numpy as np
+
+from contactverif.contract.case import Case
+from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle
+from contactverif.scenes.blocks import two_blocks
+from contactverif.scenes.catalogue import load_scene_case
+from contactverif.scenes.hard_flat_states import TINY_MESHES, TINY_PENALTIES
+from contactverif.scenes.named_states import named_case
+
+_STRAIN = 2.0**-6  # The pressure over the softer body's E.
+_HEIGHT = 6.0
+_POISSON = (0.3, 0.2)
+_UNITS = ("1e-6", "1", "1e6")  # E of the master over E of the slave.
+
+
+@cache
+def case_c() -> tuple[Case, ...]:
+    """Return the paper's case C and its variant C′, as states and solved with unequal materials at two penalties."""
+    states = [named_case(name) for name in ("c", "c-prime")]
+    scenes = [
+        replace(load_scene_case(f"{name}:ratio=3,penalty={penalty}"), name=f"{name} solved, ε̂ = {label}")
+        for name, (label, penalty) in product(("c", "c-prime"), (("E", 1e4), ("1e4 E", 1e8)))
+    ]
+    return (*states, *scenes)
+
+
+@cache
+def tiny_segment_scenes() -> tuple[Case, ...]:
+    """Return blocks with a segment of 1.2e-5 in an interface of 12, pressed together at three penalties."""
+    return tuple(
+        _blocks(f"{side} solved, ε̂ = {penalty:g}", *mesh, penalty=penalty)
+        for (side, mesh), penalty in product(TINY_MESHES.items(), TINY_PENALTIES)
+    )
+
+
+@cache
+def stiff_scenes() -> tuple[Case, ...]:
+    """Return blocks whose springs are 1e10 times as stiff as the slave, on masters of 1e-6 to 1e6 of its stiffness."""
+    mesh = [0.0, 2.0, 4.0, 8.0, 12.0], [0.0, 3.0, 6.0, 9.0, 12.0]
+    return tuple(
+        _blocks(f"ε̂h/E = {stiff}, E ratio {ratio}", *mesh, ratio=float(ratio), penalty=float(stiff) / 3)
+        for stiff, ratio in product(("1e4", "1e10"), _UNITS)
+    )
+
+
+@cache
+def contrast_scenes() -> tuple[Case, ...]:
+    """Return a fine block and a coarse one, each as the slave, the stiffer one or the softer one, at two penalties."""
+    fine, coarse = np.linspace(0.0, 12.0, 17).tolist(), [0.0, 5.0, 8.0, 12.0]
+    cases = []
+    for (mesh, (slave, master)), ratio, (label, stiff) in product(
+        {"16 on 3": (fine, coarse), "3 on 16": (coarse, fine)}.items(), _UNITS, (("10 E/h", 10.0), ("1e5 E/h", 1e5))
+    ):
+        penalty = stiff * min(1.0, float(ratio)) * (len(slave) - 1) / 12
+        cases.append(_blocks(f"{mesh}, E ratio {ratio}, ε̂ = {label}", slave, master, float(ratio), penalty=penalty))
+    return tuple(cases)
+
+
+@cache
+def vanishing_overlap_scenes() -> tuple[Case, ...]:
+    """Return blocks whose master covers 1e-1 to 1e-12 of the last slave segment, upright and inclined."""
+    inclined = Placing((cos(radians(17.3)), sin(radians(17.3))))
+    places = [("", UPRIGHT, exponent) for exponent in range(1, 13)]
+    places += [(", inclined", inclined, exponent) for exponent in (2, 6, 10, 12)]
+    return tuple(
+        _blocks(
+            f"overlap 1e-{exponent}{label}",
+            [0.0, 2.0, 5.0, 8.0],
+            [-1.0, 1.5, 3.0, 5.0 + 3 * 10.0**-exponent],
+            penalty=10.0 / 3,
+            placing=placing,
+        )
+        for label, placing, exponent in places
+    )
+
+
+@cache
+def unloaded_scenes() -> tuple[Case, ...]:
+    """Return blocks that touch with no load, started in touch, pushed in or lifted, upright and inclined."""
+    starts = {"touching": 0.0, "pushed in": 2.0**-4, "lifted": -(2.0**-4)}
+    placings = {"": UPRIGHT, ", inclined": Placing((cos(radians(33.0)), sin(radians(33.0))))}
+    cases = []
+    for (start, lowered), (label, placing), (way, load) in product(
+        starts.items(), placings.items(), {"free": {"pressure": 0.0}, "held": {"approach": 0.0}}.items()
+    ):
+        scene = two_blocks(
+            Rectangle([0.0, 2.0, 4.0, 8.0, 12.0], [0.0, 3.0, 6.0], poisson=0.3),
+            Rectangle([0.0, 3.0, 6.0, 9.0, 12.0], [-6.0, -3.0, 0.0], young=3.0, poisson=0.2),
+            penalty=10.0 / 3,
+            lowered=lowered,
+            placing=placing,
+            **load,  # type: ignore[arg-type]
+        )
+        cases.append(replace(scene.case(), name=f"{way}, {start}{label}"))
+    return tuple(cases)
+
+
+def _blocks(
+    name: str,
+    slave: Sequence[float],
+    master: Sequence[float],
+    ratio: float = 1.0,
+    *,
+    penalty: float,
+    placing: Placing = UPRIGHT,
+) -> Case:
+    """Return two blocks under a uniform pressure; the slave has E = 1, the master `ratio` times that."""
+    scene = two_blocks(
+        Rectangle(slave, [0.0, _HEIGHT / 2, _HEIGHT], young=1.0, poisson=_POISSON[0]),
+        Rectangle(master, [-_HEIGHT, -_HEIGHT / 2, 0.0], young=ratio, poisson=_POISSON[1]),
+        penalty=penalty,
+        pressure=_STRAIN * min(1.0, ratio),
+        placing=placing,
+    )
+    return replace(scene.case(), name=name)
