@@ -30,6 +30,7 @@ from contactverif.contract.subject import Subject
 from contactverif.oracle.exact_choices import DEEP
 from contactverif_properties.shared.exact_places import (
     CLOSEST,
+    PROJECTED_KINDS,
     Places,
     Reported,
     name_places,
@@ -139,6 +140,7 @@ PROJECTION_ACTIVITY = Property(
     summary="A contact point is active exactly where its gap is closed and its foot is on the master.",
     quantities=(WRONG,),
     cases=projected_cases,
+    kinds=PROJECTED_KINDS,
     measure=measure_activity,
     promise=lambda traits: True,
     needs=frozenset({"contact_points"}),

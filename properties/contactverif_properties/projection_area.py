@@ -31,7 +31,14 @@ from contactverif.contract.subject import Subject
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_points import Lattice
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.exact_places import CELLS, Reported, largest, name_places, projected_cases
+from contactverif_properties.shared.exact_places import (
+    CELLS,
+    PROJECTED_KINDS,
+    Reported,
+    largest,
+    name_places,
+    projected_cases,
+)
 from contactverif_properties.shared.passes import Pass
 
 ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
@@ -165,6 +172,7 @@ PROJECTION_AREA = Property(
     summary="Areas of competence and weights add up to the slave's length, or to what of it is covered.",
     quantities=(WEIGHT, ENDS, SUM),
     cases=projected_cases,
+    kinds=PROJECTED_KINDS,
     measure=measure_areas,
     promise=lambda traits: True,
     needs=frozenset({"contact_points"}),

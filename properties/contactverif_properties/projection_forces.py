@@ -12,6 +12,7 @@ computed misleads them, and no other question sees it: the forces are right.
 - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
   the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
 - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
+  Foot and gap along the slave's normal are quotients by the cosine between the surfaces, which is allowed for.
 - Pressure = −ε̂ × gap at active points, for a linear penalty: a nodal one, or one whose traits state the configuration
   of areas, except where pressures are interpolated between nodes.
 
@@ -31,7 +32,7 @@ from contactverif.contract.formulation import ContactPoints, Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.exact_places import Reported, largest, name_places, projected_cases
+from contactverif_properties.shared.exact_places import PROJECTED_KINDS, Reported, largest, name_places, projected_cases
 from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.roundoff import ratio, segment_tolerance, sum_slave_forces
 
@@ -147,7 +148,11 @@ def _thinness(reported: Reported) -> float:
 
 
 def _foot_error(each: Pass) -> float:
-    """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from."""
+    """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from.
+
+    A foot along the slave's normal is a quotient by the cosine of the angle between the surfaces, and so is its gap. So
+    the lengths are over that cosine.
+    """
     named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
     points = each.points.select(named & np.isfinite(each.points.gap))
     first, second = np.swapaxes(each.positions[each.interface.master.segments[points.master_segment]], 0, 1)
@@ -155,7 +160,8 @@ def _foot_error(each: Pass) -> float:
     errors = arm - points.xi[:, None] * along - points.gap[:, None] * points.normal
     far = np.abs(each.positions).max()
     size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * np.hypot(along[:, 0], along[:, 1])
-    return largest(np.hypot(errors[:, 0], errors[:, 1]) / size)
+    cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / np.hypot(*along.T)
+    return largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)
 
 
 def _has_linear_law(traits: Traits) -> bool:
@@ -171,6 +177,7 @@ PROJECTION_FORCES = Property(
     summary="The pressures at the contact points are the forces on the slave, and their gaps are what the places show.",
     quantities=(UNIT, FORCES, FOOT, LAW),
     cases=projected_cases,
+    kinds=PROJECTED_KINDS,
     measure=measure_account,
     promise=lambda traits: True,
     needs=frozenset({"contact_points"}),

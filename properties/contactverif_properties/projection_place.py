@@ -32,6 +32,7 @@ from contactverif.oracle.exact_points import positions
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_places import (
     LOCAL_REASON,
+    PROJECTED_KINDS,
     Places,
     Reported,
     largest,
@@ -98,6 +99,7 @@ PROJECTION_PLACE = Property(
     summary="Position, ξ, normal and gap of each contact point are those of its place.",
     quantities=(GAP, XI, NORMAL, POSITION),
     cases=projected_cases,
+    kinds=PROJECTED_KINDS,
     measure=measure_places,
     promise=lambda traits: True,
     needs=frozenset({"contact_points"}),

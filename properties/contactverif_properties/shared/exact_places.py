@@ -26,10 +26,13 @@ from contactverif.oracle.exact_points import (
     run_against,
     slave_normal_view,
 )
-from contactverif.strategies.projections import projection_states
+from contactverif.strategies import general_cases, tie_cases
+from contactverif.strategies.projections import KINDS, projection_states, projections_by_kind
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.passes import Pass, split_passes
 
+LARGER_MESHES = ("larger random mesh", "larger mesh, exact ties")
+PROJECTED_KINDS = (*KINDS, *LARGER_MESHES)
 CLOSEST = "closest point"
 CELLS = ("cells", "cells and nodes")
 
@@ -134,17 +137,22 @@ def name_places(points: ContactPoints) -> BoolArray:
     return named
 
 
-def projected_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return cases by kind of projection; larger random states and exact ties among them.
+def projected_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
+    """Return a strategy for each kind of projection, and for larger random states and exact ties.
 
     Parameters
     ----------
     interface : Interface | None
         A given interface, on which only the states are random.
+
+    Returns
+    -------
+    dict[str, SearchStrategy[Case]] | SearchStrategy[Case]
+        {kind: strategy}, the kinds of `PROJECTED_KINDS`; one strategy for a given interface.
     """
     if interface is not None:
-        return any_cases(interface)
-    return st.one_of(projection_states(), projection_states(), any_cases())
+        return st.one_of(projection_states(interface), any_cases(interface))
+    return projections_by_kind() | dict(zip(LARGER_MESHES, (general_cases(), tie_cases()), strict=True))
 
 
 def refuse_without_rule(traits: Traits) -> str:
