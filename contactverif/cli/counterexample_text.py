@@ -25,6 +25,8 @@ def counterexample_text(example: Counterexample, report: Path | None) -> Text:
     """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
     row, outcome = example.row, example.outcome
     description = f"the case {outcome.case.name}" if outcome.case.name else "the smallest case found"
+    if outcome.case.kind:
+        description += f" ({outcome.case.kind})"
     lines = [
         f"{row.formulation}, {row.property_id}: {row.result}, {description}",
         *(f"    {line}" for line in _numbers(row.info, outcome)),

@@ -17,7 +17,7 @@ stored, and `_reproducible` takes away what depends on the imported modules.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -75,7 +75,7 @@ def draw_cases(
     Returns
     -------
     PlannedCases
-        The cases; the first is the simplest that the strategy makes. Those of one kind follow one another.
+        The cases; the first is the simplest that the strategy makes. Kinds follow one another in turn.
 
     Raises
     ------
@@ -86,7 +86,12 @@ def draw_cases(
         _check_names([case.name for case in source])
         return PlannedCases(source, exhausted=True)
     if isinstance(source, Mapping):
-        return _draw_each_kind(source, seed=seed, examples=examples, progress=progress or (lambda _: None))
+        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=progress or (lambda _: None))
+        complete = zip(parts, _shares(source, examples), strict=True)
+        return PlannedCases(
+            tuple(parts[n].cases[place] for n, place in _deal(parts)),
+            exhausted=all(part.exhausted or len(part.cases) == share for part, (_, share) in complete),
+        )
     cases: list[Case] = []
     stopped: list[str] = []
 
@@ -109,15 +114,22 @@ def draw_cases(
 
 def _draw_each_kind(
     strategies: Mapping[str, SearchStrategy[Case]], *, seed: str, examples: int, progress: Callable[[int], None]
-) -> PlannedCases:
-    cases: list[Case] = []
-    exhausted = True
+) -> list[PlannedCases]:
+    """Return the cases of each kind that gets any."""
+    parts = []
     for kind, share in _shares(strategies, examples):
-        part = draw_cases(_strategy_of_kind(strategies, kind), seed=f"{seed}/{kind}", examples=share)
-        cases += part.cases
-        exhausted = exhausted and (part.exhausted or len(part.cases) == share)
-        progress(len(cases))
-    return PlannedCases(tuple(cases), exhausted)
+        parts.append(draw_cases(_strategy_of_kind(strategies, kind), seed=f"{seed}/{kind}", examples=share))
+        progress(sum(len(part.cases) for part in parts))
+    return parts
+
+
+def _deal(parts: Sequence[PlannedCases]) -> list[tuple[int, int]]:
+    """Return (part, place in it) of all cases in the order of a run: the first of each part, then the second, ….
+
+    So the first cases of a run are of all kinds.
+    """
+    most = max((len(part.cases) for part in parts), default=0)
+    return [(n, place) for place in range(most) for n, part in enumerate(parts) if place < len(part.cases)]
 
 
 def _strategy_of_kind(strategies: Mapping[str, SearchStrategy[Case]], kind: str) -> SearchStrategy[Case]:
@@ -176,13 +188,11 @@ def shrink(
     if isinstance(source, tuple):
         return
     if isinstance(source, Mapping):
-        for kind, share in _shares(source, examples):
-            strategy, key = _strategy_of_kind(source, kind), f"{seed}/{kind}"
-            n_cases = len(draw_cases(strategy, seed=key, examples=share).cases)
-            if first < n_cases:
-                shrink(strategy, seed=key, examples=share, first=first, fails=fails, limit=limit)
-                return
-            first -= n_cases
+        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=lambda _: None)
+        number, place = _deal(parts)[first]
+        kind, share = _shares(source, examples)[number]
+        strategy = _strategy_of_kind(source, kind)
+        shrink(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
         return
     n_drawn = n_judged = 0
 

@@ -34,11 +34,12 @@ def rows(printed: str) -> list[tuple[str, ...]]:
     """Return (property, promise, verdict) of every line of the tables in a text."""
     lines = [re.split(r" {2,}", line.strip()) for line in printed.splitlines() if line.startswith("  ")]
     known = set(property_ids())
-    return [
+    table = [
         (cells[0], *(cell for cell in cells[1:] if cell in ("passes", "fails", "–") or VERDICT.fullmatch(cell)))
         for cells in lines
         if cells[0] in known
     ]
+    return [cells for cells in table if len(cells) > 1]  # Shares of undecided and idle cases have no verdict.
 
 
 def last_lines(printed: str) -> list[str]:

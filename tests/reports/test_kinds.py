@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from handmade_report import run_with_kinds
 
+from contactverif.cli.counterexample_text import counterexample_text, failing_examples
 from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.case_counts import CaseCounts, percent
 from contactverif.contract.coverage import coverage_of
@@ -84,6 +85,12 @@ def test_the_page_shows_the_counts() -> None:
     assert "<td>2: a tie of … segments</td>" in page
     cells = "".join(f'<td class="n">{count}</td>' for count in (4, 2, 1, 2, 0))
     assert f'<tr><th scope="row">inside a segment</th>{cells}</tr>' in page
+
+
+def test_a_counterexample_says_its_kind() -> None:
+    (example,) = failing_examples(run_with_kinds())
+    assert "the smallest case found (inside a segment)" in str(counterexample_text(example, None))
+    assert "projection.place, inside a segment</h4>" in report_page(run_with_kinds(), "report.nc")
 
 
 def test_a_report_without_kinds_is_read(tmp_path: Path) -> None:
