@@ -9,7 +9,8 @@ or not. A wrong total means a wrong area of competence, and so a wrong stiffness
 **How it is judged.** The measured number is |ΣF − ε̂ |g| A n| / (ε̂ |g| A) over the slave's nodes, with the current
 or the reference length A. The reference is scaled by a power of two, so that the two configurations differ.
 Multipliers that are pressures are all ε̂ |g| here. The tolerance is u(8X/|g| + 4N): a gap is a difference of
-coordinates, each rounded to uX, and N forces are summed.
+coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation, because the state is
+turned and moved, and stored as it is rounded.
 
 **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly: roundoff decides
 whether the node is over the master.

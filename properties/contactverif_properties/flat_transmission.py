@@ -6,11 +6,12 @@ forces the consistent forces of the pressure ε̂ |g|, on the slave and on the m
 **Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure onto the
 bodies that is not there. Finer meshes do not help, because the error is made anew at every node.
 
-**How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces.
-The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap is
-a difference of coordinates, each rounded to uX, and N forces are summed. With multipliers only the distribution of
-the forces is judged, and not their size: of uniform multipliers if they are pressures, and of those that come nearest
-to the exact forces if they are nodal forces.
+**How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces. The
+exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap is a
+difference of coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation, because the
+state is turned and moved, and stored as it is rounded; `stability.local` asks on states that are exact. With
+multipliers only the distribution of the forces is judged, and not their size: of uniform multipliers if they are
+pressures, and of those that come nearest to the exact forces if they are nodal forces.
 
 **Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
 give the same gap.

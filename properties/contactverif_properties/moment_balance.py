@@ -5,8 +5,8 @@
 **Why it matters.** Two forces that balance but do not lie on one line turn a free body without any cause.
 
 **How it is judged.** Moments are taken about the centroid of the nodes. The measured number is |Σ x×R| over D Σ|R| of
-the slave, with the diameter D of the state. The tolerance is u(8X/|g| + 4N): a gap is a difference of coordinates,
-each rounded to uX, and N forces are summed.
+the slave, with the diameter D of the state. The tolerance is u(8Z/|g| + 4N), with the distance Z of
+`balance.force`: a gap is a difference of positions, each rounded to uZ, and N forces are summed.
 
 **Undecided.** Never: on either side of a kink a formulation that balances moments does so.
 """
@@ -20,14 +20,15 @@ from contactverif_properties.shared.any_state import any_cases
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.nodal_forces import forces_of_any_state
 from contactverif_properties.shared.roundoff import (
-    gap_quantity,
     gap_tolerance,
     mean_penetration,
     ratio,
+    rounding_distance,
+    stated_gap_quantity,
     sum_slave_forces,
 )
 
-IMBALANCE = gap_quantity("moment imbalance")
+IMBALANCE = stated_gap_quantity("moment imbalance")
 
 
 def measure_moment_imbalance(case: Case, subject: Subject) -> Measurement:
@@ -36,7 +37,7 @@ def measure_moment_imbalance(case: Case, subject: Subject) -> Measurement:
     arms = state.positions - state.positions.mean(axis=0)
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
     imbalance = ratio(moment, state.diameter * sum_slave_forces(state, forces))
-    tolerance = gap_tolerance(state, mean_penetration(state, forces))
+    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
     return Measurement({IMBALANCE.name: imbalance}, {IMBALANCE.name: tolerance}, idle=not forces.any())
 
 

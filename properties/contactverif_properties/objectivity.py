@@ -9,7 +9,7 @@ the assembly. In large rotations it creates energy.
 **How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of the slave, and the tangent K(Qx + c)
 with Q K Qᵀ over max|K|. Nothing turns multipliers; their constraint rows are compared too. The tolerance is
 u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment turns the segment and
-its force by uX/ℓ.
+its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the turned positions to uX.
 
 **Undecided.** A failing case is undecided where either state lies at a kink, or where moving the nodes by 64 u X
 changes the answer by a quarter of the error or more.

@@ -7,7 +7,8 @@ and is the tangent the same, for a penalty that changes with its unit?
 and fails in metres or micrometres.
 
 **How it is judged.** Differences of the forces count over max|R|, those of the tangent over max|K|. The tolerance is
-u(8X/min(g, ℓ) + 4N). Powers of two scale the four operations and square roots exactly, so a formulation that uses
+u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises `translation_stable`, and the largest
+coordinate of any other. Powers of two scale the four operations and square roots exactly, so a formulation that uses
 nothing else gives 0; a power or an angle is rounded anew. A multiplier stays the same if it is a pressure, and scales
 if it is a nodal force. Of a formulation with multipliers only the position rows are compared.
 
@@ -31,15 +32,16 @@ from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
-    SEGMENT_TOLERANCE,
     ratio,
+    rounding_distance,
     segment_tolerance,
     select_failures,
 )
 
 REASON = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
-FORCES = Quantity("error of the forces in another unit", "1", SEGMENT_TOLERANCE, REASON)
-TANGENT = Quantity("error of the tangent in another unit", "1", SEGMENT_TOLERANCE, REASON)
+TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+FORCES = Quantity("error of the forces in another unit", "1", TOLERANCE, REASON)
+TANGENT = Quantity("error of the tangent in another unit", "1", TOLERANCE, REASON)
 LARGEST_EXPONENT = 60
 
 
@@ -76,7 +78,7 @@ def measure_scaling(case: Case, subject: Subject) -> Measurement:
         tangent_there = dense(rescaled.tangent(there.interface, pairing_there, there.z))[:n, :n]
         errors["tangent"] = float(np.abs(tangent_there - tangent).max())
         values[TANGENT.name] = ratio(errors["tangent"], float(np.abs(tangent).max()))
-    tolerance = segment_tolerance(case, forces, case.largest_coordinate)
+    tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
     failures = select_failures(errors, values, tolerance)
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
     undecided = explain_by_kink(case, formulation, pairing, rounding, failures) if failures else ""

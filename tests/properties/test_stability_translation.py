@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, WRONG, GaussSprings, by_points_first, in_single_precision, springs_of
+from subjects import load_property
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
@@ -143,3 +144,14 @@ def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     assert all(
         judge_case(STABILITY_TRANSLATION, case, springs_of(way, before)).verdict is Verdict.PASS for case in states
     )
+
+
+@pytest.mark.parametrize("property_id", ["balance.force", "balance.moment", "scaling"])
+@pytest.mark.parametrize("name", RIGHT)
+def test_whoever_promises_to_be_stable_is_asked_for_balance_and_scaling_at_its_diameter(
+    name: str, property_id: str
+) -> None:
+    way, before = RIGHT[name]
+    subject = springs_of(way, before, translation_stable=True, conserves_force=True, conserves_moment=True)
+    (row,) = run([subject], [load_property(property_id)], examples=30, seed=0).rows
+    assert row.verdict is Verdict.PASS, row.reason

@@ -1,6 +1,7 @@
 """The tolerances that several properties share: what roundoff alone may do to a force, each formula with its reason.
 
-Symbols: u = 2⁻⁵³; X is the largest coordinate; g is the penetration; ℓ is the shortest segment; L is the slave's
+Symbols: u = 2⁻⁵³; X is the largest coordinate; Z is X, or the diameter D of a formulation that promises
+`translation_stable` (`rounding_distance`); g is the penetration; ℓ is the shortest segment; L is the slave's
 length; N is the number of segments of both sides. Where the penetration varies, g is the uniform one that would give
 the same forces, Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole list.
 """
@@ -13,10 +14,16 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
 from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Quantity
 
 GAP_TOLERANCE = "u(8X/|g| + 4N)"
 GAP_REASON = "A gap is a difference of coordinates, each rounded to uX, and N forces are summed."
+STATED_GAP_TOLERANCE = "u(8Z/|g| + 4N)"
+STATED_GAP_REASON = (
+    "A gap is a difference of positions, each rounded to uZ, and N forces are summed. Z is the largest coordinate X, "
+    "and the diameter D where the trait `translation_stable` is True."
+)
 SEGMENT_TOLERANCE = "u(8X/min(g, ℓ) + 4N)"
 SEGMENT_REASON = (
     "A gap is a difference of coordinates, each rounded to uX, and N forces are summed. "
@@ -43,8 +50,22 @@ def mean_penetration(case: Case, forces: Array) -> float:
     return sum_slave_forces(case, forces) / (case.penalty * case.slave_length)
 
 
-def gap_tolerance(case: Case, penetration: float) -> float:
-    """Return GAP_TOLERANCE as a number.
+def rounding_distance(case: Case, traits: Traits) -> float:
+    """Return the distance Z, a length, at which a formulation may round the position of a point.
+
+    Parameters
+    ----------
+    case : Case
+        The state that is judged.
+    traits : Traits
+        The promises of the formulation. One that promises `translation_stable` rounds positions relative to one
+        another, so Z is the diameter D. Any other may form a point before it subtracts, so Z is the largest coordinate.
+    """
+    return case.diameter if traits.translation_stable else case.largest_coordinate
+
+
+def gap_tolerance(case: Case, penetration: float, distance: float | None = None) -> float:
+    """Return GAP_TOLERANCE as a number, or STATED_GAP_TOLERANCE.
 
     Parameters
     ----------
@@ -52,8 +73,11 @@ def gap_tolerance(case: Case, penetration: float) -> float:
         The state that is judged.
     penetration : float
         The penetration g, a length. Where it is 0 there is no gap to round, and a force of any size is wrong.
+    distance : float | None
+        The distance Z at which positions are rounded, a length; the largest coordinate X if None.
     """
-    gap_rounding = 8 * case.largest_coordinate / penetration if penetration > 0 else 0.0
+    largest = case.largest_coordinate if distance is None else distance
+    gap_rounding = 8 * largest / penetration if penetration > 0 else 0.0
     return UNIT_ROUNDOFF * (gap_rounding + 4 * case.n_segments)
 
 
@@ -101,3 +125,8 @@ def ratio(part: float, whole: float) -> float:
 def gap_quantity(name: str) -> Quantity:
     """Return a dimensionless quantity that only the rounding of gaps may keep from zero."""
     return Quantity(name, "1", GAP_TOLERANCE, GAP_REASON)
+
+
+def stated_gap_quantity(name: str) -> Quantity:
+    """Return a quantity as `gap_quantity` does; how gaps are rounded follows from the traits (`rounding_distance`)."""
+    return Quantity(name, "1", STATED_GAP_TOLERANCE, STATED_GAP_REASON)
