@@ -20,6 +20,7 @@ from contactverif import Pairing
 from contactverif_nts.two_passes import two_pass
 
 SEGMENT, PLACE, ACTIVITY = "projection.segment", "projection.place", "projection.activity"
+RESULTANT = "patch.flat.resultant"
 AREA, FORCES = "projection.area", "projection.forces"
 VTS_ME, NTS_AR = contactverif_nts.vts_me, contactverif_nts.nts_ar
 MORTAR, STS = contactverif_mortar.mortar, contactverif_mortar.sts
@@ -127,6 +128,9 @@ MUTANTS = (
          "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) - 1e-9,"),
     line("segments of the nearest node only", SEGMENT, "eq6",
          "m = nearest_segment(v, x, master, order, boxes)", _BY_NEAREST_NODE),
+    # At a vertex of a flat master both segments meet the foot at their ends, and neither counts it as its own.
+    line("force dropped where a slave node stands over a master node", RESULTANT, "eq6",
+         "on_surface = foot_on_surface(", "on_surface = 0 < dot(d, t) < l_12 and foot_on_surface(", factory="nts_ar"),
     reports("weighted nodes reported as points", PLACE, lambda points, *_: {"weighted": False}, MORTAR),
     reports("second pass reported as points of the slave", PLACE, lambda points, *_: {"on_master": False}, TWO_PASS),
 )  # fmt: skip

@@ -11,7 +11,12 @@ from scipy import sparse
 
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
-from contactverif_properties.shared.kinks import find_kink, measure_jump
+from contactverif_properties.shared.kinks import (
+    explain_by_kink,
+    find_kink,
+    is_like_its_surroundings,
+    measure_jump,
+)
 
 REACH = 1e-6
 
@@ -116,3 +121,28 @@ def test_sparse_and_dense_tangents_are_the_same() -> None:
     array = np.arange(9.0).reshape(3, 3)
     assert np.array_equal(dense(sparse.coo_array(array)), array)
     assert np.array_equal(dense(array), array)
+
+
+class Dropping(Springs):
+    """The springs again, which push with the same stiffness on both sides, and not exactly over the node."""
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        forces[1] = z[1] * (0.0 if z[0] + z[2] == 0 else 1.0)
+        return forces
+
+
+def test_a_choice_between_the_sides_of_a_kink_is_excused() -> None:
+    state = over_a_node(0.0)
+    formulation = subject(Springs).for_case(state)
+    assert is_like_its_surroundings(state, formulation, REACH)
+    assert explain_by_kink(state, formulation, None, REACH, {"forces": 0.1}).startswith("a kink")
+
+
+def test_a_force_that_is_missing_at_a_kink_and_on_neither_side_is_not() -> None:
+    state = over_a_node(0.0)
+    formulation = subject(Dropping).for_case(state)
+    assert measure_jump(state, formulation, REACH, np.ones((1, state.z.size)))[0] == pytest.approx(0.125, rel=1e-4)
+    assert not is_like_its_surroundings(state, formulation, REACH)
+    assert explain_by_kink(state, formulation, None, REACH, {"forces": 0.1}) == ""
+    assert is_like_its_surroundings(over_a_node(1 / 7), formulation, REACH)

@@ -4,6 +4,9 @@ A kink is where a contact point changes its master segment, its gap changes sign
 passes a master node. The harness decides, and not the plugin's pairing, or a plugin whose pairing changes at every call
 would never fail. Where the plugin says where its contact points are, the harness computes the distance to the nearest
 kink from the positions. Where the plugin does not, one-sided differences of its residual must agree.
+
+A kink excuses a choice between the answers on its sides, and no other answer: a force that is missing exactly where a
+slave node stands over a master node, and there only, is no choice.
 `docs/concepts/tolerances.md` explains kinks and the verdict `undecided`.
 """
 
@@ -20,6 +23,8 @@ from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.passes import split_passes
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
+N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.
+N_RARE = 4  # Answers that are larger, or smaller, than all but so many of those around are no side of the kink.
 
 
 def explain_by_kink(
@@ -44,16 +49,41 @@ def explain_by_kink(
     -------
     str
         A reason if a decision hangs on less than `reach`, or if moving the nodes by `reach` changes the answer by a
-        quarter of each error or more.
+        quarter of each error or more; and if the forces are among those around the state.
     """
     directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
-    near = find_kink(case, formulation, pairing, reach, directions[0])
-    if near:
-        return near
-    jumps = dict(zip(("forces", "tangent"), measure_jump(case, formulation, reach, directions), strict=True))
-    if all(4 * jumps[part] >= error for part, error in errors.items()):
-        return "a kink: moving the nodes by roundoff changes the answer as much"
-    return ""
+    reason = find_kink(case, formulation, pairing, reach, directions[0])
+    if not reason:
+        jumps = dict(zip(("forces", "tangent"), measure_jump(case, formulation, reach, directions), strict=True))
+        if all(4 * jumps[part] >= error for part, error in errors.items()):
+            reason = "a kink: moving the nodes by roundoff changes the answer as much"
+    return reason if reason and is_like_its_surroundings(case, formulation, reach) else ""
+
+
+def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach: float) -> bool:
+    """Return whether the forces of a state are among those of the states around it, as a choice at a kink is.
+
+    The nodes are moved by `reach` forth and back, so that every kink is crossed both ways, and half of the moves or
+    more stay on the side of the state. So the rarest answers are left out. A force counts as one of the others if it
+    is between the least and the largest of them, or outside by no more than their difference: where several decisions
+    meet in one node, not all of their combinations are drawn.
+
+    Parameters
+    ----------
+    case : Case
+        The state.
+    formulation : CheckedFormulation
+        The formulation that answers, with a new pairing in each state.
+    reach : float
+        The length of the moves.
+    """
+    here = _forces(case, formulation, case.z)
+    moves = reach * random_directions(case.seed, N_AROUND, case.z.size)
+    around = np.array([_forces(case, formulation, case.z + move) for move in (*moves, *-moves)])
+    low, high = np.sort(around, axis=0)[[N_RARE, -1 - N_RARE]]
+    rounding = 8 * UNIT_ROUNDOFF * case.n_segments * max(np.abs(low).max(), np.abs(high).max())
+    outside = np.maximum(low - here, here - high)
+    return bool((outside <= high - low + rounding).all())
 
 
 def measure_jump(
@@ -87,6 +117,11 @@ def measure_jump(
         max(float(np.abs(other_force - force).max()) for other_force, _ in others),
         max(float(np.abs(other_tangent - tangent).max()) for _, other_tangent in others),
     )
+
+
+def _forces(case: Case, formulation: CheckedFormulation, z: FloatArray) -> FloatArray:
+    forces: FloatArray = formulation.residual(case.interface, formulation.pair(case.interface, z), z)
+    return forces
 
 
 def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
