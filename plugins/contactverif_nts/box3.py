@@ -129,7 +129,7 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
                 push(r, node_2, -xi * f_v, v.normal)
                 continue
             if transmission == BALANCED:  # ELSE assembly of all the involved segments
-                pressure = f_v / dot(from_p_to_q(v), v.t)  # S = ΣW telescopes to s(Q) − s(P)
+                pressure = f_v / sum_of_parts(v)
             j = area.first
             while True:
                 f, m = master[j, 0], master[j, 1]
@@ -173,6 +173,16 @@ def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: 
     l_12, t, normal = frame(x_1, x_2)
     d = arm(x_1, PointOnSegment(x_a, x_b, c))
     return VirtualSlaveNode(x_a, x_b, p, q, d, c, c_p, c_q, l_12, t, normal, dot(d, normal))
+
+
+@compile_kernel
+def sum_of_parts(v: VirtualSlaveNode) -> float:
+    """Return S = ΣW, which telescopes to s(Q) − s(P).
+
+    It is a multiple of the number by which the pairing decides that the slave faces the master. So it is not zero where
+    the pairing decides so, however nearly edge-on the slave is.
+    """
+    return (v.c_q - v.c_p) / 2 * dot(minus(v.x_b, v.x_a), v.t)
 
 
 @compile_kernel

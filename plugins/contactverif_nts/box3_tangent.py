@@ -30,6 +30,7 @@ from contactverif_nts.box3 import (
     from_p_to_q,
     length_of_area,
     segment_length,
+    sum_of_parts,
     virtual_slave_node,
 )
 from contactverif_nts.eq6 import Fields
@@ -199,7 +200,7 @@ def _sum_of_parts(
     for i in range(2):
         d_s[A, i] += share * v.t[i]
         d_s[B, i] -= share * v.t[i]
-    return dot(pq, v.t), d_s
+    return sum_of_parts(v), d_s
 
 
 @compile_kernel

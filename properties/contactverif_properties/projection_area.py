@@ -8,12 +8,14 @@ that is too stiff or too soft in one place. A sum over the whole interface hides
 
 **How it is judged.** A weight is a number ≥ 0. Where ends are reported, the weight is the length between them, in the
 configuration of the trait `area` (without the trait, in either); the point lies between them, and areas of one segment
-do not XX Cells cover what the slave sees along its normal, segment by segment. By other rules the sum is the slave's
-length, unless the trait `covers_overhang` is not False: then it is that length if the whole slave faces one master
-chain in all its normals, and at most that elsewhere.
+do not overlap: 16u of the interface's diameter. The sum of the weights is held against an exact length, 64u of the
+diameter for each segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up
+to the slave's length; unless the trait `covers_overhang` is False, they need to only where the whole slave faces one
+master chain in all its normals. Points that look along the slave's normal need to where all of the slave sees the
+master. Elsewhere the sum is at most the slave's length.
 
-**Undecided.** Never; what is left out, the coverage of segments that see several bodies behind one another or
-deeper than two lengths, is not measured. A nodal penalty has no areas and is not asked.
+**Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is deeper
+than two lengths, is not measured. A nodal penalty has no areas and is not asked.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from contactverif.oracle.exact_points import Lattice
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_places import (
     CELLS,
+    CLOSEST,
     PROJECTED_KINDS,
     Reported,
     largest,
@@ -124,15 +127,25 @@ class _Areas:
     def _sum_errors(self, size: FloatArray) -> Iterator[float]:
         """Yield the errors of sums of weights, over the lengths that they are formed from."""
         points, slave = self.each.points, self.each.interface.slave
-        rule, covers = self.traits.gap, self.traits.covers_overhang
+        rule = self.traits.gap
         scale = len(slave) * float((size * self.length / self._current()).max())
         total, whole = float(points.weight.sum()), float(self.length.sum())
         yield max(total - whole, 0.0) / scale
         lattice = Lattice.from_state(self.each.interface, self.each.z)
         if rule in CELLS:
             yield from self._cell_errors(Coverage.along_slave_normals(lattice), scale)
-        elif rule is not None and ((covers is False and self.one_pass) or lies_in_shadow(lattice, self.each.interface)):
+        elif self._covers_all(lattice):
             yield abs(total - whole) / scale
+
+    def _covers_all(self, lattice: Lattice) -> bool:
+        """Return whether the weights of the points must add up to the slave's length."""
+        rule, covers = self.traits.gap, self.traits.covers_overhang
+        if rule == CLOSEST:
+            return (covers is False and self.one_pass) or lies_in_shadow(lattice, self.each.interface)
+        if rule is None:
+            return False
+        coverage = Coverage.along_slave_normals(lattice)
+        return bool(coverage.clear.all() and (coverage.share.floats() == 1).all())
 
     def _cell_errors(self, coverage: Coverage, scale: float) -> Iterator[float]:
         """Yield the errors of sums over the cells, segment by segment where points lie on one segment."""

@@ -16,8 +16,9 @@ computed misleads them, and no other question sees it: the forces are right.
 - Pressure = −ε̂ × gap at active points, for a linear penalty: a nodal one, or one whose traits state the configuration
   of areas, except where pressures are interpolated between nodes.
 
-Sums are compared over Σ|R| with u(8D/min(g, ℓ) + 4N), the second identity over the lengths with 16u, the third over
-ε̂ times these lengths. X takes the place of D, the diameter, where the traits do not promise `translation_stable`.
+Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X and the lengths that they are
+formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the diameter D where the
+traits do not promise `translation_stable`.
 
 **Undecided.** Never. What does not hold for a formulation by its traits is not measured.
 """
@@ -108,7 +109,9 @@ def _force_difference(reported: Reported) -> FloatArray | None:
     A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
     """
     points, interface = reported.points, reported.state.interface
-    if points.on_master.any() and not reported.traits.conserves_force:
+    size = sum_slave_forces(reported.state, reported.forces)
+    balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * reported.state.n_segments * size
+    if points.on_master.any() and not balanced:  # `balance.force` asks for that.
         return None
     if _bend(reported) > STRAIGHT:
         return None

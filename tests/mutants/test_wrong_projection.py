@@ -1,0 +1,33 @@
+"""Each array of the contact points has a mutant that reports it wrong."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import wrong_projection
+
+from contactverif.contract.formulation import ContactPoints
+
+WORDS = {
+    "slave_segment": "slave segment",
+    "c": "place on the slave",
+    "master_segment": "master segment",
+    "xi": "ξ",
+    "position": "position",
+    "normal": "normal",
+    "gap": "gap",
+    "pressure": "pressure",
+    "weight": "weight",
+    "active": "activity",
+    "area_from": "area reported from",
+    "area_to": "of the area reported",
+    "weighted": "weighted nodes",
+    "on_master": "second pass",
+}  # What the names of the mutants call the arrays
+
+
+def test_each_array_has_a_mutant() -> None:
+    """The kill matrix says that each of them dies."""
+    assert set(WORDS) == {entry.name for entry in fields(ContactPoints)}
+    names = [mutant.name for mutant in wrong_projection.MUTANTS]
+    assert all(any(word in name for name in names) for word in WORDS.values())

@@ -1,0 +1,184 @@
+"""The judges of projections accuse who reports something else than is there, and no right formulation of a stranger."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from strangers import STRANGERS, PointsFirst
+from subjects import Changed, load_property, load_subject
+
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case
+
+IDS = ("projection.segment", "projection.place", "projection.activity", "projection.area", "projection.forces")
+
+
+@cache
+def cases(property_id: str, count: int = 60) -> tuple[Case, ...]:
+    return draw_cases(load_property(property_id).cases(None), seed=f"0/{property_id}", examples=count).cases
+
+
+def outcome_of(property_id: str, case: Case, subject: Subject) -> Outcome:
+    return judge_case(load_property(property_id), case, subject)
+
+
+def measurement_of(property_id: str, case: Case, subject: Subject) -> Measurement:
+    measurement = outcome_of(property_id, case, subject).measurement
+    assert measurement is not None
+    return measurement
+
+
+@pytest.mark.parametrize("property_id", IDS)
+@pytest.mark.parametrize("name", STRANGERS)
+def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id: str) -> None:
+    subject = Subject(name, STRANGERS[name])
+    outcomes = [outcome_of(property_id, case, subject) for case in cases(property_id)]
+    assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
+
+
+@pytest.mark.parametrize(
+    "name", ["nts:tau=0", "two-pass/sts", "two-pass/mortar", "two-pass/vts-ppt-balanced", "sts:area=reference"]
+)
+@pytest.mark.parametrize("property_id", IDS)
+def test_built_in_formulations_with_options_pass(name: str, property_id: str) -> None:
+    subject, question = load_subject(name), load_property(property_id)
+    if not question.applicable(subject.traits):
+        assert {outcome_of(property_id, case, subject).verdict for case in cases(property_id)} == {Verdict.PASS}
+
+
+def over_a_vertex(gap: float, place: float = 0.0) -> Case:
+    """One slave segment of length 2 over a flat master; its first node stands at `place` from the master's vertex."""
+    slave, master = np.array([[0.0, 0], [2, 0]]) + [place, gap], np.array([[4.0, 0], [0, 0], [-4, 0]])
+    interface = Interface.from_chains(slave, master)
+    return Case(interface, interface.nodes.reshape(-1), 4.0)
+
+
+def reporting(change: Callable[[ContactPoints], dict[str, Any]], make: Any = PointsFirst) -> Subject:
+    """Return a formulation that computes the right thing, and reports other arrays."""
+
+    def make_reporter(*, penalty: float) -> Changed:
+        inner = make(penalty=penalty)
+
+        def contact_points(*state: Any) -> ContactPoints:
+            points = inner.contact_points(*state)
+            return replace(points, **change(points))
+
+        return Changed(inner, contact_points=contact_points)
+
+    return Subject("reporter", make_reporter)
+
+
+def test_at_a_tie_either_segment_is_right() -> None:
+    case = over_a_vertex(-0.25)
+    for segment in (0, 1):
+
+        def choose(points: ContactPoints, segment: int = segment) -> dict[str, Any]:
+            return {"master_segment": np.where(points.c < 0, segment, points.master_segment)}
+
+        outcome = outcome_of("projection.segment", case, reporting(choose))
+        assert outcome.verdict is Verdict.PASS
+        assert outcome.measurement is not None
+        assert outcome.measurement.details["tied points"] == 1
+
+
+def test_beside_a_tie_the_farther_segment_is_wrong_by_how_much_farther_it_is() -> None:
+    case = over_a_vertex(-0.25, place=0.125)
+    subject = reporting(lambda points: {"master_segment": np.ones_like(points.master_segment)})
+    (value,) = measurement_of("projection.segment", case, subject).values.values()
+    # The second node is 2.125 beyond the vertex; the lengths are 2 and 4, and X is 4.
+    farther, lengths = np.hypot(2.125, 0.25) - 0.25, 2 + 4 + np.hypot(2.125, 0.25) + 4
+    assert value == pytest.approx(farther / lengths, rel=1e-12)
+    assert outcome_of("projection.segment", case, subject).verdict is Verdict.FAIL
+
+
+def test_a_gap_of_roundoff_may_have_either_sign_and_either_decision() -> None:
+    case = over_a_vertex(0.0, place=0.5)
+    for active in (True, False):
+        subject = reporting(lambda points, active=active: {"active": np.full_like(points.active, active)})  # type: ignore[misc]
+        assert measurement_of("projection.activity", case, subject).details["decided points"] == 0
+    for gap in (1e-17, -1e-17):
+        subject = reporting(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})  # type: ignore[misc]
+        assert outcome_of("projection.place", case, subject).verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize(("place", "wrong"), [(4 + 1e-3, 0), (4 + 0.5, 0), (4 + 5.0, 2)])
+def test_past_a_free_end_a_formulation_decides_up_to_one_segment_for_itself(place: float, wrong: int) -> None:
+    case = over_a_vertex(-0.25, place=place)
+    subject = reporting(lambda points: {"active": np.ones_like(points.active)})
+    (value,) = measurement_of("projection.activity", case, subject).values.values()
+    assert value == 2 * wrong  # The state is asked about in two units.
+
+
+def test_a_foot_on_a_node_of_the_surface_is_decided() -> None:
+    subject = reporting(lambda points: {"active": points.active & (points.xi > 0) & (points.xi < 1)})
+    assert outcome_of("projection.activity", over_a_vertex(-0.25), subject).verdict is Verdict.FAIL
+
+
+def test_far_away_only_who_promises_it_must_keep_the_digits_of_a_gap() -> None:
+    """The stranger forms points first. Far away its gap is wrong by the rounding of a point."""
+    case = over_a_vertex(-0.25, place=1 / 3)
+    far = replace(case, z=(case.positions @ [[0.6, 0.8], [-0.8, 0.6]] + 2.0**20).reshape(-1))
+
+    class Boaster(PointsFirst):
+        traits = replace(PointsFirst.traits, translation_stable=True)
+        places = np.array([-0.3, 0.7])
+
+    class Modest(PointsFirst):
+        places = np.array([-0.3, 0.7])
+
+    assert outcome_of("projection.place", far, Subject("modest", Modest)).verdict is Verdict.PASS
+    assert outcome_of("projection.place", far, Subject("boaster", Boaster)).verdict is Verdict.FAIL
+    assert outcome_of("projection.place", case, Subject("boaster", Boaster)).verdict is Verdict.PASS
+
+
+def test_points_of_a_second_pass_are_judged_with_roles_exchanged() -> None:
+    subject = load_subject("two-pass/nts-ar")
+    formulation = subject.for_case(over_a_vertex(-0.25))
+    case = over_a_vertex(-0.25)
+    points = formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
+    second = points.select(points.on_master)
+    assert len(second.c) == 3  # The nodes of the master
+    assert second.slave_segment.max() == 1
+    assert second.master_segment.max() == 0
+    assert second.normal[0] == pytest.approx([0, -1])  # Out of the slave, which is on top
+    assert outcome_of("projection.place", case, subject).verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda points: {"pressure": np.abs(points.gap) + 1}, "an idle point carries a pressure"),
+        (lambda points: {"pressure": -points.pressure - 1}, "a pressure at an active point is negative or NaN"),
+        (lambda points: {"pressure": np.full_like(points.gap, np.nan)}, "pressure against −ε̂ × gap is nan"),
+    ],
+)
+def test_a_pressure_that_breaks_the_contract_is_named(change: Any, reason: str) -> None:
+    case = over_a_vertex(-0.25, place=3.0)  # The second node lies past the free end.
+    assert reason in outcome_of("projection.forces", case, reporting(change)).reason
+
+
+@pytest.mark.parametrize(
+    ("property_id", "change", "reason"),
+    [
+        ("projection.area", lambda points: {"weight": -points.weight}, "a weight is negative or NaN"),
+        ("projection.activity", lambda points: {"slave_segment": 0 * points.slave_segment - 1}, "names no place"),
+        ("projection.place", lambda points: {"xi": np.full_like(points.xi, np.nan)}, "error of ξ is nan"),
+        (
+            "projection.place",
+            lambda points: {"normal": np.full_like(points.normal, np.nan)},
+            "error of the normal is nan",
+        ),
+    ],
+)
+def test_what_an_active_point_leaves_out_is_named(property_id: str, change: Any, reason: str) -> None:
+    assert reason in outcome_of(property_id, over_a_vertex(-0.25, place=0.5), reporting(change)).reason
