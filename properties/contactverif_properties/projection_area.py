@@ -12,7 +12,8 @@ do not overlap: 16u of the interface's diameter. The sum of the weights is held 
 diameter for each segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up
 to the slave's length; unless the trait `covers_overhang` is False, they need to only where the whole slave faces one
 master chain in all its normals. Points that look along the slave's normal need to where all of the slave sees the
-master. Elsewhere the sum is at most the slave's length.
+master. Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
+slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
 
 **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is deeper
 than two lengths, is not measured. A nodal penalty has no areas and is not asked.
@@ -130,12 +131,12 @@ class _Areas:
         rule = self.traits.gap
         scale = len(slave) * float((size * self.length / self._current()).max())
         total, whole = float(points.weight.sum()), float(self.length.sum())
-        yield max(total - whole, 0.0) / scale
         lattice = Lattice.from_state(self.each.interface, self.each.z)
         if rule in CELLS:
             yield from self._cell_errors(Coverage.along_slave_normals(lattice), scale)
-        elif self._covers_all(lattice):
-            yield abs(total - whole) / scale
+        elif rule is not None or lies_in_shadow(lattice, self.each.interface):
+            missing = abs(total - whole) if self._covers_all(lattice) else 0.0
+            yield max(total - whole, missing) / scale
 
     def _covers_all(self, lattice: Lattice) -> bool:
         """Return whether the weights of the points must add up to the slave's length."""

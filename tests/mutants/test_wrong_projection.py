@@ -23,7 +23,7 @@ WORDS = {
     "area_to": "of the area reported",
     "weighted": "weighted nodes",
     "on_master": "second pass",
-}  # What the names of the mutants call the arrays
+}  # The words for the arrays in the names of mutants.
 
 
 def test_each_array_has_a_mutant() -> None:

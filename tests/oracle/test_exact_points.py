@@ -1,4 +1,4 @@
-"""What points see of the master, exact, against rationals by hand and against the nearest segment by another way."""
+"""The exact view of the master from points, against rationals by hand and against the other search of the nearest."""
 
 from __future__ import annotations
 
