@@ -15,6 +15,7 @@ from contactverif.run.runner import judge_case
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
 OTHERS = 10  # Cases of each other property, which fill the matrix and decide nothing.
+OTHERS_OF_A_LIST = 1  # The same of properties with a finite list: they are many, and those that solve bodies are slow.
 OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
 SEED = 0
 KEY = "kills"  # under which a row of the matrix travels in the report of a test
@@ -54,10 +55,13 @@ def caught_at(question: Property, subject: Subject, examples: int | None) -> int
 def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
     """Return {property id: `caught_at`} of a mutant."""
     subject = Subject(mutant.name, mutant.make)
-    return {
-        question.id: caught_at(question, subject, None if question.id == mutant.caught_by else others)
-        for question in properties()
-    }
+
+    def examples(question: Property) -> int | None:
+        if question.id == mutant.caught_by:
+            return None
+        return OTHERS_OF_A_LIST if isinstance(question.cases(None), tuple) else others
+
+    return {question.id: caught_at(question, subject, examples(question)) for question in properties()}
 
 
 def as_lines(matrix: dict[str, tuple[str, dict[str, int]]]) -> list[str]:

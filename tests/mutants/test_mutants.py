@@ -90,7 +90,9 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> 
     questions = [
         question
         for question in properties()
-        if question.promise(subject.traits) is True and not question.applicable(subject.traits)
+        if question.promise(subject.traits) is True
+        and not question.applicable(subject.traits)
+        and (seed == 0 or not isinstance(question.cases(None), tuple))  # A finite list is the same for all seeds.
     ]
     for question in questions:
         planned += len(cases(question.id, seed, 50))
