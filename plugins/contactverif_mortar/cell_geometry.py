@@ -29,7 +29,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, dot, frame, minus, node
+from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, cross, dot, frame, minus, node
 
 A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes
 D_C, D_XI, D_GAP, D_WEIGHT, OMEGA = range(5)  # The Δ of a point, in this order.
@@ -101,7 +101,7 @@ def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[f
     n = (nu[0] / size, nu[1] / size)
     tau = turn(n)
     length = dot(along, tau)  # negative
-    return dot(d, tau) / length, (along[0] * d[1] - along[1] * d[0]) / length, n
+    return dot(d, tau) / length, cross(along, d) / length, n
 
 
 @compile_kernel

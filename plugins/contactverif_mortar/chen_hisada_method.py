@@ -22,6 +22,7 @@ from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
+    cross,
     dot,
     foot_on_surface,
     frame,
@@ -140,12 +141,12 @@ def _pair_nodes(
     for number in range(n_nodes):
         p = node(x, number)
         m = nearest_segment(PointOnSegment(p, p, -1.0), x, master, order, boxes)
-        x_1 = node(x, master[m, 0])
-        length, t, n = frame(x_1, node(x, master[m, 1]))
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        length, t, _ = frame(x_1, x_2)
         d = minus(p, x_1)
         on_surface = foot_on_surface(dot(d, t), length, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[number] = m
-        active[number] = dot(d, n) <= 0 and on_surface
+        active[number] = cross(d, minus(x_2, x_1)) <= 0 and on_surface
     return nearest, active
 
 
@@ -156,8 +157,8 @@ def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
     for state in range(x.shape[0]):
         for number in range(len(nearest)):
             x_1, x_2 = node(x[state], master[nearest[number], 0]), node(x[state], master[nearest[number], 1])
-            _, _, n = frame(x_1, x_2)
-            gaps[state, number] = dot(minus(node(x[state], number), x_1), n)
+            length, _, _ = frame(x_1, x_2)
+            gaps[state, number] = cross(minus(node(x[state], number), x_1), minus(x_2, x_1)) / length
     return gaps
 
 

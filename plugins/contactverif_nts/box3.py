@@ -32,7 +32,7 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
+from contactverif.geometry.projection import PointOnSegment, Vector, arm, cross, dot, frame, minus, node
 from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
@@ -172,7 +172,8 @@ def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: 
     p, q = PointOnSegment(x_a, x_b, c_p), PointOnSegment(x_a, x_b, c_q)
     l_12, t, normal = frame(x_1, x_2)
     d = arm(x_1, PointOnSegment(x_a, x_b, c))
-    return VirtualSlaveNode(x_a, x_b, p, q, d, c, c_p, c_q, l_12, t, normal, dot(d, normal))
+    g = cross(d, minus(x_2, x_1)) / l_12
+    return VirtualSlaveNode(x_a, x_b, p, q, d, c, c_p, c_q, l_12, t, normal, g)
 
 
 @compile_kernel

@@ -34,9 +34,11 @@ from contactverif.geometry.projection import (
     Tree,
     Vector,
     arm,
+    cross,
     dot,
     foot_on_surface,
     frame,
+    minus,
     nearest_segment,
     node,
 )
@@ -117,12 +119,13 @@ def pair(
     for i in range(len(segment)):
         v = PointOnSegment(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
         m = nearest_segment(v, x, master, order, boxes)
-        x_1 = node(x, master[m, 0])
-        l_12, t, normal = frame(x_1, node(x, master[m, 1]))
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        l_12, t, _ = frame(x_1, x_2)
         d = arm(x_1, v)
+        g = cross(d, minus(x_2, x_1)) / l_12
         on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[i] = m
-        active[i] = is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface
+        active[i] = is_pressed(g, multipliers, i, penalty) and on_surface
     return nearest, active
 
 
@@ -195,10 +198,10 @@ def push(forces: Array, number: int, size: float, direction: Vector) -> None:
 @compile_kernel
 def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
     """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
-    x_1 = node(x, node_1)
-    l_12, t, normal = frame(x_1, node(x, node_2))
+    x_1, x_2 = node(x, node_1), node(x, node_2)
+    l_12, t, normal = frame(x_1, x_2)
     d = arm(x_1, PointOnSegment(node(x, a), node(x, b), c))
-    g = dot(d, normal)
+    g = cross(d, minus(x_2, x_1)) / l_12
     xi = dot(d, t) / l_12
     return Contact(a, b, node_1, node_2, c, l_12, t, normal, g, xi)
 

@@ -140,7 +140,7 @@ class PatchTestPassing:
         t = (x2 - x1) / length[:, None]
         normal = np.column_stack([t[:, 1], -t[:, 0]])
         d = (1 - c[:, None]) / 2 * (x_a - x1) + (1 + c[:, None]) / 2 * (x_b - x1)  # differences first
-        gap = (d * normal).sum(axis=1)
+        gap = (d[:, 0] * (x2 - x1)[:, 1] - d[:, 1] * (x2 - x1)[:, 0]) / length
         pressure = multipliers if len(multipliers) else -self.penalty * gap
         lengths = interface.slave.lengths(x if self.current_area else interface.nodes)
         return ContactPoints(

@@ -103,7 +103,7 @@ class PointContact:
         t = (x2 - x1) / length[:, None]
         normal = np.column_stack([t[:, 1], -t[:, 0]])
         d = (1 - c[:, None]) / 2 * (ends[:, 0] - x1) + (1 + c[:, None]) / 2 * (ends[:, 1] - x1)  # differences first
-        gap = (d * normal).sum(axis=1)
+        gap = (d[:, 0] * (x2 - x1)[:, 1] - d[:, 1] * (x2 - x1)[:, 0]) / length
         measured = interface.nodes if self.area_from == eq6.REFERENCE else x
         lengths = np.append(interface.slave.lengths(measured), 0.0)  # the last one stands for "no segment", −1
         weight = self.weight[pairing["slot"]] * (lengths[pairing["segment"]] + lengths[pairing["other"]])

@@ -31,6 +31,7 @@ from contactverif.geometry.projection import (
     Tree,
     Vector,
     arm,
+    cross,
     dot,
     foot_on_surface,
     frame,
@@ -102,14 +103,15 @@ def pair(
                     m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
 
         partner[i], first[i], last[i] = m, m, m
-        x_1 = node(x, master[m, 0])
-        l_12, t, normal = frame(x_1, node(x, master[m, 1]))
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        l_12, t, _ = frame(x_1, x_2)
         if c_p <= c_q or dot(minus(x_b, x_a), t) >= 0:  # s(P) ≥ s(Q)
             continue
         v, p, q = PointOnSegment(x_a, x_b, c), PointOnSegment(x_a, x_b, c_p), PointOnSegment(x_a, x_b, c_q)
         d = arm(x_1, v)
+        g = cross(d, minus(x_2, x_1)) / l_12
         on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
-        active[i] = is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface
+        active[i] = is_pressed(g, multipliers, i, penalty) and on_surface
         first[i], last[i] = _walk(x, p, q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
             clip_p[i], clip_q[i] = _truncate(x, p, q, first[i], last[i], t, master, neighbours)

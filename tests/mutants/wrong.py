@@ -234,7 +234,7 @@ def _pushes_along_rollers(penalty: float) -> Any:
 
 MUTANTS = (
     line("pulls where the gap is open", UNILATERAL, "eq6",
-         "is_pressed(dot(d, normal), multipliers, i, penalty) and on_surface", "on_surface",
+         "is_pressed(g, multipliers, i, penalty) and on_surface", "on_surface",
          factory="vts_me"),
     line("multiplier that pulls stays active", COMPLEMENTARITY, "eq6",
          "multipliers[i] - penalty * g >= 0", "multipliers[i] - penalty * g >= 0 or multipliers[i] < 0",
@@ -289,7 +289,7 @@ MUTANTS = (
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2",
          "f_v = penalty * pressure * l_ab * (v.c_p - v.c_q) / 2"),
     line("pushes where the gap is open", PATCH, "walk",
-         "is_pressed(dot(d, normal),", "is_pressed(-dot(d, normal),"),
+         "is_pressed(g,", "is_pressed(-g,"),
     line("virtual slave nodes at Gauss points", PATCH, "box3",
          "c = middle_of_part(i, n, unity)", "c = middle_of_part(i, n, unity) * 2 / 3**0.5"),
     line("area of competence ends at the virtual slave node", PATCH, "box3",
@@ -345,11 +345,11 @@ MUTANTS = (
          "l_0, t_0, n_0 = frame(node(reference, node_1), node(reference, node_2)); "
          "v = v._replace(l_12=l_0, t=t_0, normal=n_0, g=dot(v.d, n_0))"),
     line("normal along the axis", OBJECTIVITY, "eq6",
-         "l_12, t, normal = frame(x_1, node(x, node_2))",
-         "l_12, t, normal = frame(x_1, node(x, node_2)); normal = (0 * normal[0], 1.0 + 0 * normal[1])",
+         "l_12, t, normal = frame(x_1, x_2)",
+         "l_12, t, normal = frame(x_1, x_2); normal = (0 * normal[0], 1.0 + 0 * normal[1])",
          factory="vts_me"),
     line("absolute tolerance for a gap", SCALING, "walk",
-         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) - 1e-9,"),
+         "is_pressed(g,", "is_pressed(g - 1e-9,"),
     line("absolute guard against a division by zero", SCALING, "box3",
          "xi = dot(v.d, v.t) / v.l_12", "xi = dot(v.d, v.t) / (v.l_12 + 1e-12)"),
     line("shortest length allowed, absolute", SCALING, "eq6",

@@ -123,9 +123,9 @@ MUTANTS = (
     reports("activity of the neighbour reported", ACTIVITY, lambda points, *_: {"active": np.roll(points.active, 1)}),
     Mutant("activity of the neighbour", ACTIVITY, lambda *, penalty: _neighbour_decides(penalty)),
     line("penetrations below 1e-9 left open", ACTIVITY, "eq6",
-         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) + 1e-9,"),
+         "is_pressed(g,", "is_pressed(g + 1e-9,"),
     line("gaps below 1e-9 closed", ACTIVITY, "eq6",
-         "is_pressed(dot(d, normal),", "is_pressed(dot(d, normal) - 1e-9,"),
+         "is_pressed(g,", "is_pressed(g - 1e-9,"),
     line("segments of the nearest node only", SEGMENT, "eq6",
          "m = nearest_segment(v, x, master, order, boxes)", _BY_NEAREST_NODE),
     # At a vertex of a flat master both segments meet the foot at their ends, and neither counts it as its own.
