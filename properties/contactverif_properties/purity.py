@@ -6,9 +6,10 @@ same, and are the inputs left as they are?
 **Why it matters.** A formulation that remembers its last call works in a test and fails in a program that solves two
 load cases, restarts an increment, or runs in parallel.
 
-**How it is judged.** Two instances answer the same questions in different orders: residual and tangent in turn, at two
-states and on two interfaces in turn, and with two pairings of one state where it has two. The measured numbers count
-entries that differ; the tolerance is 0, since the same operations on the same numbers give the same bits. A batch may
+**How it is judged.** Two instances answer the same questions in different orders: residual, tangent and contact points
+in turn, at two states and on two interfaces in turn, and with two pairings of one state where it has two. The measured
+numbers count entries that differ; the tolerance is 0, since the same operations on the same numbers give the same bits.
+A third instance has another penalty. Its forces differ, and those of the first instance are what they were. A batch may
 round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k is the stiffness, and a segment
 turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|, and k is the larger of ε̂L and the
 change of the residual from one state to the other over the way between them. A pairing that differs, or an interface
@@ -25,7 +26,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.interleaved_calls import Question, count_changes, renumber
@@ -38,6 +39,7 @@ REASON = "The same operations on the same numbers give the same bits."
 REPEATED = Quantity("entries that change in a repeated call", "1", "0", REASON)
 REORDERED = Quantity("entries that change with the order of calls", "1", "0", REASON)
 TANGENT = Quantity("entries of the tangent that change with the order of calls", "1", "0", REASON)
+POINTS = Quantity("entries of the contact points that change with the order of calls", "1", "0", REASON)
 BATCHED = Quantity(
     "difference between batch and loop",
     "1",
@@ -59,9 +61,9 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The entries of the residual that change in a repeated call, the entries of residual and tangent that change with
-        the order of calls, and the difference between a batch and a loop, where the formulation takes batches. The
-        batch holds the state and one so near that its pairing is nearly the same.
+        The entries of the residual that change in a repeated call, the entries of residual, tangent and contact points
+        that change with the order of calls, and the difference between a batch and a loop, where the formulation takes
+        batches. The batch holds the state and one so near that its pairing is nearly the same.
     """
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
@@ -79,7 +81,9 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     broken = []
     if formulation.pair(interface, z) != pairing:
         broken.append("the pairing of a state differs in a repeated call")
-    if any(second.pair(question.interface, question.z) != question.pairing for question in questions[1:3]):
+    if any(
+        second.pair(question.interface, question.z) != question.pairing for question in (*questions[1:3], questions[1])
+    ):
         broken.append("the pairing of a state depends on the state before it")
     if questions[3].pairing == pairing:
         questions = questions[:3]
@@ -87,9 +91,16 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         questions.append(Question(interface, pairing, near))
     changes = count_changes(formulation, second, questions)
 
-    values = {REPEATED.name: changes.repeated, REORDERED.name: changes.residual, TANGENT.name: changes.tangent}
+    values = {
+        REPEATED.name: changes.repeated,
+        REORDERED.name: changes.residual,
+        TANGENT.name: changes.tangent,
+        POINTS.name: changes.contact_points,
+    }
     tolerances = dict.fromkeys(values, 0.0)
     forces = np.array([formulation.residual(interface, pairing, u) for u in (z, near)])
+    if subject.traits.enforcement == "penalty":
+        broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
     if subject.traits.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         values[BATCHED.name] = compare_batch(state, near, forces, batch)
@@ -98,6 +109,18 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
     return Measurement(values, tolerances, broken="; ".join(broken), idle=idle)
+
+
+def _compare_penalties(
+    formulation: CheckedFormulation, other: CheckedFormulation, question: Question, forces: Array
+) -> list[str]:
+    """Return what is wrong, in words, where another instance has another penalty; `forces` are those of the first."""
+    arguments = question.interface, question.pairing, question.z
+    changed = other.residual(*arguments)
+    broken = ["another penalty gives the same forces"] if forces.any() and (changed == forces).all() else []
+    if (formulation.residual(*arguments) != forces).any():
+        broken.append("the forces change when another instance is made with another penalty")
+    return broken
 
 
 def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> float:
@@ -133,7 +156,7 @@ PURITY = Property(
     id="purity",
     family="invariants",
     summary="An answer depends on the question alone: repeated, in another order, interleaved, and in a batch.",
-    quantities=(REPEATED, REORDERED, TANGENT, BATCHED),
+    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED),
     cases=any_cases,
     measure=measure_purity,
     promise=lambda traits: True,

@@ -61,6 +61,37 @@ def _caches_by_positions(*, penalty: float) -> Any:
     return Wrapped(penalty, residual=residual)
 
 
+class _LastPenalty:
+    """A penalty that all instances share, as a module's global variable is."""
+
+    value = 1.0
+
+
+def _shares_its_penalty(*, penalty: float) -> Any:
+    _LastPenalty.value = penalty
+
+    def residual(right: Any, *arguments: Any) -> Any:
+        return right(*arguments) * (_LastPenalty.value / penalty)
+
+    return Wrapped(penalty, residual=residual)
+
+
+_SHARED_ANSWERS: dict[Any, Any] = {}
+
+
+def _shares_its_answers(*, penalty: float) -> Any:
+    """Keep the last residual of any instance, by its positions and pairing, whatever the penalty is."""
+
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        key = z.tobytes(), interface.nodes.tobytes(), *(values.tobytes() for values in pairing.values())
+        if key not in _SHARED_ANSWERS:
+            _SHARED_ANSWERS.clear()
+            _SHARED_ANSWERS[key] = right(interface, pairing, z)
+        return _SHARED_ANSWERS[key]
+
+    return Wrapped(penalty, residual=residual)
+
+
 MUTANTS = (
     Mutant(
         "tangent at the state of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=2)
@@ -78,4 +109,15 @@ MUTANTS = (
     ),
     Mutant("residual of the first interface", PURITY, _keeps_first_interface),
     Mutant("residual kept by its positions alone", PURITY, _caches_by_positions),
+    Mutant(
+        "contact points of the last residual", PURITY, _remembers(memory="residual", user="contact_points", argument=2)
+    ),
+    Mutant("contact points of the last pairing", PURITY, _remembers(memory="pair", user="contact_points", argument=1)),
+    Mutant(
+        "residual on the pairing of the last contact points",
+        PURITY,
+        _remembers(memory="contact_points", user="residual", argument=1),
+    ),
+    Mutant("penalty of the last instance", PURITY, _shares_its_penalty),
+    Mutant("residual kept for any penalty", PURITY, _shares_its_answers),
 )

@@ -10,8 +10,9 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 
 from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.subject import Subject
 from contactverif.run.runner import judge_case
-from contactverif_properties.purity import BATCHED, PURITY, REORDERED, REPEATED, TANGENT, measure_purity
+from contactverif_properties.purity import BATCHED, POINTS, PURITY, REORDERED, REPEATED, TANGENT, measure_purity
 from contactverif_properties.shared.interleaved_calls import renumber
 
 
@@ -22,10 +23,10 @@ class Pure(Handmade):
         return {"up": z[1::2] > 0}
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return z**2 + np.repeat(pairing["up"], 2)
+        return self.penalty * (z**2 + np.repeat(pairing["up"], 2))
 
     def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return np.diag(2 * z)
+        return self.penalty * np.diag(2 * z)
 
 
 def measure(plugin: Any, **traits: Any) -> Measurement:
@@ -40,8 +41,9 @@ def nonzero_quantities(plugin: Any, **traits: Any) -> set[str]:
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_function_is_pure(batched: bool) -> None:
     measurement = measure(Pure, batched=batched)
+    names = [quantity.name for quantity in (REPEATED, REORDERED, TANGENT, POINTS)]
     batch = {BATCHED.name: 0} if batched else {}
-    assert measurement.values == {REPEATED.name: 0, REORDERED.name: 0, TANGENT.name: 0} | batch
+    assert measurement.values == dict.fromkeys(names, 0) | batch
     assert not measurement.broken
     assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
 
@@ -148,6 +150,69 @@ def test_an_answer_kept_by_its_positions_alone_is_told_where_two_pairings_meet()
     assert measure(Keeps).values[REORDERED.name] > 0
 
 
+class Pointed(Pure):
+    """A formulation with one contact point, at the height of the first node."""
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return replace(self.points(c=0.0), gap=z[1:2])
+
+
+def test_contact_points_that_depend_on_the_question_alone_are_pure() -> None:
+    assert nonzero_quantities(Pointed) == set()
+
+
+def test_contact_points_of_the_last_residual_are_told() -> None:
+    class Late(Pointed):
+        last: Any = None
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.last = z
+            return super().residual(interface, pairing, z)
+
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().contact_points(interface, pairing, z if self.last is None else self.last)
+
+    assert nonzero_quantities(Late) == {POINTS.name}
+
+
+def test_contact_points_that_change_the_next_residual_are_told() -> None:
+    class Trace(Pointed):
+        after = 0.0
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z + self.after)
+
+        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.after = 2.0**-30
+            return super().contact_points(interface, pairing, z)
+
+    assert nonzero_quantities(Trace) == {REPEATED.name, REORDERED.name}
+
+
+def test_forces_without_the_penalty_are_told() -> None:
+    class Rigid(Pure):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return z
+
+    assert measure(Rigid).broken == "another penalty gives the same forces"
+    assert not measure(Handmade).broken, "no force is no answer to a penalty"
+
+
+def test_a_penalty_that_instances_share_is_told() -> None:
+    shared = {"penalty": 1.0}
+
+    class Shares(Pure):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return shared["penalty"] * z
+
+    def make(*, penalty: float) -> Any:
+        shared["penalty"] = penalty
+        return Shares()
+
+    broken = measure_purity(case(seed=3), Subject("shares", make)).broken
+    assert broken == "the forces change when another instance is made with another penalty"
+
+
 def test_the_other_interface_has_the_same_positions_under_other_numbers() -> None:
     state = case()
     other, z = renumber(state, subject(Pure).for_case(state))
@@ -200,7 +265,7 @@ def test_a_batch_that_takes_one_state_for_both_fails_where_one_just_touches() ->
 def test_a_batch_may_sum_in_another_order() -> None:
     class Roundoff(Pure):
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return z if z.ndim == 1 else z * (1 + 2.0**-52)
+            return self.penalty * (z if z.ndim == 1 else z * (1 + 2.0**-52))
 
     assert nonzero_quantities(Roundoff, batched=True) == {BATCHED.name}
     assert judge_case(PURITY, case(), subject(Roundoff, batched=True)).verdict is Verdict.PASS

@@ -1,12 +1,12 @@
-"""Calls of residual and tangent in turn, for states, pairings and interfaces in turn, by two instances in two orders.
+"""Calls of residual, tangent and contact points in turn, for states, pairings and interfaces in turn.
 
-A formulation that remembers something of an earlier call answers differently in the two orders.
+Two instances are asked, in two orders. A formulation that remembers something of an earlier call answers differently.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -17,11 +17,17 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import CheckedFormulation
 
 # The questions are two states of one interface, 0 and 1, and a state of another interface, 2. The first and the last
-# call before a question, of either method, on its interface or on any, differ between the orders for at least one
-# question. So a memory of such a call shows. The first order ends with its first question again.
+# call before a question, of any method, on its interface or on any, differ between the orders for at least one
+# question. So a memory of such a call shows. The first order ends with its first question again, after contact points.
 _ORDERS = (
-    (("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1), ("residual", 0)),
-    (("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1), ("residual", 0)),
+    (
+        *(("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1)),
+        *(("contact_points", 0), ("contact_points", 1), ("residual", 0)),
+    ),
+    (
+        *(("contact_points", 1), ("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1)),
+        *(("residual", 0), ("contact_points", 0)),
+    ),
 )
 # Two pairings of one state, 3 and 4: a memory that looks at the positions alone shows.
 _ORDERS_OF_PAIRINGS = (
@@ -32,7 +38,7 @@ _ORDERS_OF_PAIRINGS = (
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The arguments of a residual or a tangent.
+    """The arguments of a residual, a tangent or contact points.
 
     Attributes
     ----------
@@ -57,13 +63,14 @@ class Changes:
     ----------
     repeated : float
         Entries of the residual that change when an instance is asked the same again.
-    residual, tangent : float
+    residual, tangent, contact_points : float
         Entries that change with the order of the questions.
     """
 
     repeated: float
     residual: float
     tangent: float
+    contact_points: float
 
 
 def count_changes(first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]) -> Changes:
@@ -85,11 +92,11 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     repeated = 0.0
     for call in calls:
         answer = _ask(first, call[0], questions[call[1]])
-        repeated += float((answer != answers.setdefault(call, answer)).sum())
-    changed = {"residual": 0.0, "tangent": 0.0}
+        repeated += _count_different(answer, answers.setdefault(call, answer))
+    changed = {"residual": 0.0, "tangent": 0.0, "contact_points": 0.0}
     for call in others:
-        changed[call[0]] += float((_ask(second, call[0], questions[call[1]]) != answers[call]).sum())
-    return Changes(repeated, changed["residual"], changed["tangent"])
+        changed[call[0]] += _count_different(_ask(second, call[0], questions[call[1]]), answers[call])
+    return Changes(repeated, **changed)
 
 
 def _provides(formulation: CheckedFormulation, method: str) -> bool:
@@ -97,9 +104,19 @@ def _provides(formulation: CheckedFormulation, method: str) -> bool:
 
 
 def _ask(formulation: CheckedFormulation, method: str, question: Question) -> Array:
-    """Return the residual (n,) or the tangent (n, n) that the formulation answers."""
-    call = formulation.residual if method == "residual" else formulation.tangent
-    return dense(call(question.interface, question.pairing, question.z))
+    """Return the residual (n,), the tangent (n, n), or all arrays of the contact points in one (n_entries,)."""
+    arguments = question.interface, question.pairing, question.z
+    if method == "contact_points":
+        points = formulation.contact_points(*arguments)
+        return np.concatenate([np.ravel(getattr(points, entry.name)).astype(np.float64) for entry in fields(points)])
+    return dense(getattr(formulation, method)(*arguments))
+
+
+def _count_different(answer: Array, other: Array) -> float:
+    """Return how many entries differ; all of them where the shapes do. NaN agrees with NaN."""
+    if answer.shape != other.shape:
+        return float(max(answer.size, other.size))
+    return float(((answer != other) & ~(np.isnan(answer) & np.isnan(other))).sum())
 
 
 def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, FloatArray]:
