@@ -1,7 +1,7 @@
 """Ask whether very stiff springs between very unequal bodies spoil the stress.
 
-**Question.** The penalty is 1e4 or 1e10 E/h, and E of the master is 1e-6, 1 or 1e6 times that of the slave. Is the
-stress of a uniform pressure still as exact as the condition of the matrix allows?
+**Question.** The penalty is 1e4 or 1e10 E/h, E that of the softer body, and E of the master is 1e-6, 1 or 1e6 times
+that of the slave. Is the stress of a uniform pressure still as exact as the condition of the matrix allows?
 
 **Why it matters.** Users raise the penalty until the penetration is small, and press rubber on steel. A tangent that
 subtracts large numbers, or a pressure that is computed from a gap near roundoff, then gives noise in place of stress.

@@ -63,6 +63,11 @@ def test_all_named_cases_run_whatever_the_number_of_examples() -> None:
     assert (row.planned, row.judged, row.verdict) == (14, 14, Verdict.PASS)
 
 
+def test_who_does_not_see_a_segment_on_edge_is_not_accused() -> None:
+    (row,) = run([load_subject("vts-ppt-balanced")], [load_property("hard.steep-slave")], seed=0).rows
+    assert row.verdict is Verdict.PASS, row.reason
+
+
 @pytest.mark.parametrize("property_id", HARD)
 def test_a_hard_case_asks_nothing_of_a_given_interface(property_id: str) -> None:
     question = load_property(property_id)
