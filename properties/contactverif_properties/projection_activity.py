@@ -9,11 +9,11 @@ every flat patch.
 **How it is judged.** The exact gap of the point to its reported segment decides. The number of wrong decisions must be
 0. A weighted node is judged by the weighted gap that it reports.
 
-**Undecided.** A point is left out where formulations may decide either way: a gap of roundoff, 4u(L + |P − A|); a foot
-past a free end by up to one segment, since each formulation has its own tolerance τ; an idle point whose slave segment
-does not face the master, or that has no weight; a penetration of more than two lengths of both segments. Details say
-how many points were decided and how many were left out. Multipliers have their own decision, λ − c g ≥ 0, and pressures
-that are interpolated between nodes have the nodes' decision, which is not reported; both are not asked.
+**Undecided.** A point is left out where formulations may decide either way: a gap of roundoff, 4u(L + |P − A| + D); a
+foot past a free end by up to one segment, since each formulation has its own tolerance τ; an idle point whose slave
+segment does not face the master, or that has no weight; a penetration of more than two lengths of both segments.
+Details say how many points were decided and how many were left out. Multipliers have their own decision, λ − c g ≥ 0,
+and pressures that are interpolated between nodes have the nodes' decision, which is not reported; both are not asked.
 """
 
 from __future__ import annotations

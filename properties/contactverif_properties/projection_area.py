@@ -6,14 +6,15 @@ of the areas where the weights say?
 **Why it matters.** The weight is the stiffness of a point. A length that is counted twice, or not at all, is a contact
 that is too stiff or too soft in one place. A sum over the whole interface hides it where two errors cancel.
 
-**How it is judged.** A weight is a number ≥ 0. Where ends are reported, the weight is the length between them, in the
-configuration of the trait `area` (without the trait, in either); the point lies between them, and areas of one segment
-do not overlap: 16u of the interface's diameter. The sum of the weights is held against an exact length, 64u of the
-diameter for each segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up
-to the slave's length; unless the trait `covers_overhang` is False, they need to only where the whole slave faces one
-master chain in all its normals. Points that look along the slave's normal need to where all of the slave sees the
-master. Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
-slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
+**How it is judged.** All points are reported, active or not. A weight is a number ≥ 0. Where ends are reported of a
+point inside its segment, in either order, the weight is the length between them, in the configuration of the trait
+`area` (without the trait, in either); the point lies between them, and areas of one segment do not overlap: 16u of the
+interface's diameter. The sum of the weights is held against an exact length, 64u of the diameter for each segment.
+Cells cover what the slave sees along its normal, segment by segment. Closest points add up to the slave's length;
+unless the trait `covers_overhang` is False, they need to only where the whole slave faces one master chain in all its
+normals. Points that look along the slave's normal need to where all of the slave sees the master. Elsewhere the sum is
+at most the slave's length; without a rule in the trait `gap`, that is asked only where the slave faces one master chain
+as above, since cells of averaged normals overlap where a master folds back.
 
 **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is deeper
 than two lengths, is not measured. A nodal penalty has no areas and is not asked.
@@ -22,7 +23,7 @@ than two lengths, is not measured. A nodal penalty has no areas and is not asked
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -105,7 +106,10 @@ class _Areas:
     def errors(self) -> dict[str, float]:
         """Return the errors of weights, ends and sums by name."""
         points = self.each.points
-        whole = points.select(np.isfinite(points.area_from) & np.isfinite(points.area_to) & name_places(points))
+        ends = np.stack([points.area_from, points.area_to])
+        within = np.abs(points.c) < 1  # A node may stand for parts of two segments, and its ends for one of them.
+        given = np.isfinite(ends).all(axis=0) & name_places(points) & within
+        whole = replace(points, area_from=ends.min(axis=0), area_to=ends.max(axis=0)).select(given)
         size = self._size_of_segments()
         low, high, on = whole.area_from, whole.area_to, whole.slave_segment
         stretch = self.length[on] / self._current()[on]
@@ -121,7 +125,7 @@ class _Areas:
         return self.each.interface.slave.lengths(self.each.positions)
 
     def _size_of_segments(self) -> FloatArray:
-        """Return for each slave segment the length of which rounding is a share: the interface's diameter, and X."""
+        """Return for each slave segment the length of which rounding is a share: the diameter and `distant`."""
         diameter = float(np.hypot(*np.ptp(self.each.positions, axis=0)))
         return np.full(len(self.length), diameter + self.distant)
 

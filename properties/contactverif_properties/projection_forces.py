@@ -13,8 +13,8 @@ computed misleads them, and no other question sees it: the forces are right.
   the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
 - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
   Foot and gap along the slave's normal are quotients by the cosine between the surfaces, which is allowed for.
-- Pressure = −ε̂ × gap at active points, for a linear penalty: a nodal one, or one whose traits state the configuration
-  of areas, except where pressures are interpolated between nodes.
+- Pressure = −ε̂ × gap at active points, for a penalty whose traits state the configuration of areas (and with it that
+  it is linear), except where pressures are interpolated between nodes.
 
 Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X and the lengths that they are
 formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the diameter D where the
@@ -35,7 +35,7 @@ from contactverif.contract.subject import Subject
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_places import PROJECTED_KINDS, Reported, largest, name_places, projected_cases
 from contactverif_properties.shared.passes import Pass
-from contactverif_properties.shared.roundoff import ratio, segment_tolerance, sum_slave_forces
+from contactverif_properties.shared.roundoff import sum_slave_forces
 
 STRAIGHT = 2.0**-26  # Normals of a straight slave, whose nodes are rounded far away, differ by less than this.
 
@@ -68,13 +68,11 @@ def measure_account(case: Case, subject: Subject) -> Measurement:
     """
     reported = Reported.from_case(case, subject)
     points, state = reported.points, reported.state
-    distance = reported.distant or state.diameter
+    distance = reported.distant
     values = {UNIT.name: _normal_error(points)}
     tolerances = {UNIT.name: 8 * UNIT_ROUNDOFF}
     if (difference := _force_difference(reported)) is not None:
-        size = sum_slave_forces(state, reported.forces)
-        values[FORCES.name] = ratio(float(np.abs(difference).max()), size)
-        tolerance = segment_tolerance(state, reported.forces.reshape(-1), distance)
+        values[FORCES.name], tolerance = _compare_forces(reported, difference)
         tolerances[FORCES.name] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
     if subject.traits.gap is not None:
         values[FOOT.name] = max((_foot_error(each) for each in reported.passes), default=0.0)
@@ -86,6 +84,20 @@ def measure_account(case: Case, subject: Subject) -> Measurement:
         values[LAW.name] = largest(errors)
         tolerances[LAW.name] = 8 * UNIT_ROUNDOFF
     return Measurement(values, tolerances, broken=_breach(points), idle=not points.active.any())
+
+
+def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, float]:
+    """Return a difference of forces over Σ|R|, and its tolerance.
+
+    A gap of roundoff may give a pressure in one place and none in the other. So Σ|R| counts for no less than a
+    penetration of u D gives.
+    """
+    state = reported.state
+    stiffness = state.penalty * state.slave_length  # Force per length of penetration.
+    size = max(sum_slave_forces(state, reported.forces), UNIT_ROUNDOFF * reported.distant * stiffness)
+    reach = min(size / stiffness, state.shortest_segment)
+    tolerance = UNIT_ROUNDOFF * (8 * reported.distant / reach + 4 * state.n_segments)
+    return float(np.abs(difference).max()) / size, tolerance
 
 
 def _breach(points: ContactPoints) -> str:
@@ -171,7 +183,7 @@ def _has_linear_law(traits: Traits) -> bool:
     """Return whether a pressure is −ε̂ × the gap that is reported beside it."""
     if traits.enforcement != "penalty" or traits.gap in (None, "cells and nodes"):
         return False
-    return traits.penalty == "nodal" or (traits.penalty == "distributed" and traits.area is not None)
+    return traits.penalty == "distributed" and traits.area is not None
 
 
 PROJECTION_FORCES = Property(

@@ -8,14 +8,14 @@ for each power of ten of the distance from the origin. A foot that is clipped to
 past its end. No patch test on a small mesh near the origin sees either.
 
 **How it is judged.** The point is formed in rationals from the stored nodes and c, never from the reported position.
-Gap and ξ may differ by 4u(L + |P − A|) from the exact ones: L are the lengths of both segments, P is the point and A
-the first node of the master segment; ξ is multiplied by its segment's length. So a gap that small may have either
-sign. The normal is compared as a vector, 8u. The position is rounded where it is, 4uX. Along the slave's normal the
-first tolerance is over the cosine of the angle between the segments. X is added to it where the traits do not promise
-`translation_stable`: points that are formed first are rounded there.
+Gap and ξ may differ by 4u(L + |P − A| + D) from the exact ones: L are the lengths of both segments, P is the point, A
+the first node of the master segment, and D the diameter of the interface; ξ is multiplied by its segment's length. So a
+gap that small may have either sign. The normal is compared as a vector, 8u. The position is rounded where it is, 4uX.
+Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the place of
+D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
 
-**Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted node
-is a mean, and is not judged here.
+**Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted node is
+a mean, and is not judged here.
 """
 
 from __future__ import annotations

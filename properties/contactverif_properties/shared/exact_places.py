@@ -38,7 +38,8 @@ CELLS = ("cells", "cells and nodes")
 
 LOCAL_REASON = (
     "A gap is a difference of the lengths L of both segments and |P − A|, each rounded a few times; along the slave's "
-    "normal over the cosine. X is added where the traits do not promise `translation_stable`."
+    "normal over the cosine. A kernel that centres its coordinates rounds them at D; X takes the place of D where the "
+    "traits do not promise `translation_stable`."
 )
 
 
@@ -82,8 +83,11 @@ class Reported:
 
     @property
     def distant(self) -> float:
-        """The coordinate X at which a point may be rounded, a length: 0 where the traits promise that none is."""
-        return 0.0 if self.traits.translation_stable else self.state.largest_coordinate
+        """The length at which a point may be rounded: X, or the diameter D where the traits promise no dependence on X.
+
+        A kernel that subtracts the centroid first keeps the promise, and rounds points at D.
+        """
+        return self.state.diameter if self.traits.translation_stable else self.state.largest_coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +107,8 @@ class Places:
     view : View
         What they see of the reported master segment, by the rule of the formulation.
     scale : FloatArray, shape (n_points,)
-        The length of which rounding is a share: L + |P − A|, plus X where a point may be rounded, over the cosine;
-        infinite where the rule sees nothing of the segment.
+        The length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over the
+        cosine; infinite where the rule sees nothing of the segment.
     facing : BoolArray, shape (n_points,)
         True where the slave segment and the master segment run against each other.
     """
@@ -119,7 +123,7 @@ class Places:
 
     @classmethod
     def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
-        """Return the places of a pass; `rule` is the trait `gap`, `distant` the X at which points may be rounded."""
+        """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
         points = each.points.select(name_places(each.points) & (each.points.master_segment >= 0))
         lattice = Lattice.from_state(each.interface, each.z)
         exact = ExactPoints.at(lattice, points.slave_segment, points.c)
