@@ -88,8 +88,8 @@ def applies(name: str, property_id: str) -> bool:
         return False
     if property_id in NEEDS_SOLUTION and name in NOT_UNIQUE:
         return False
-    if property_id == STIFFNESS and name in WITH_MULTIPLIERS:  # They have no springs.
-        return False
+    if property_id == STIFFNESS and (name in WITH_MULTIPLIERS or TANGENT in FAILS[name]):
+        return False  # It has no springs, or no exact tangent to solve with.
     if name in WITHOUT_PROJECTION.get(property_id, ()):
         return False
     if property_id == LOCAL and name in WITHOUT_EXACT_FORCES:

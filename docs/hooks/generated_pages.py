@@ -19,7 +19,7 @@ from formulation_page import formulation_page
 from mkdocs.structure.files import File, Files
 from paper_pages import paper_figures, paper_page
 from property_pages import property_index, property_page
-from repository_pages import repository_pages
+from repository_pages import repository_pages, repository_pictures
 
 from contactverif import Property, load_properties
 
@@ -67,7 +67,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made, and the pictures that they show."""
     for path, text in pages().items():
         files.append(File.generated(config, path, content=text))
-    for path, source in paper_figures(ROOT).items():
+    for path, source in (paper_figures(ROOT) | repository_pictures(ROOT)).items():
         files.append(File.generated(config, path, abs_src_path=str(source)))
     return files
 

@@ -9,6 +9,7 @@ from pathlib import Path
 # {file in the repository: page in the site}
 PAGES = {
     "reports/README.md": "reference/report.md",
+    "reports/stability/README.md": "reference/stability.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "DECISIONS.md": "project/decisions.md",
     "CHANGELOG.md": "project/changelog.md",
@@ -49,6 +50,15 @@ def relink(text: str, path: str) -> str:
         return f"[{words}]({posixpath.relpath(page, here)}{'#' + anchor if anchor else ''})"
 
     return _LINK.sub(replace, text)
+
+
+def repository_pictures(root: Path) -> dict[str, Path]:
+    """Return {path in the site: file} of the pictures that stand beside these Markdown files."""
+    return {
+        posixpath.join(posixpath.dirname(page), picture.name): picture
+        for path, page in PAGES.items()
+        for picture in sorted((root / path).parent.glob("*.svg"))
+    }
 
 
 def repository_pages(root: Path) -> dict[str, str]:

@@ -116,7 +116,8 @@ def test_a_formulation_that_is_a_residual_alone_is_judged(name: str) -> None:
     subject = Subject(name, partial(without_pair, load(name)._make))
     sweep, stiffness = run([subject], [STABILITY_SWEEP, STABILITY_STIFFNESS], examples=1).rows
     assert sweep.verdict is Verdict.PASS, sweep.reason
-    assert stiffness.verdict is Verdict.NOT_PROVIDED
+    assert stiffness.verdict is Verdict.NOT_APPLICABLE
+    assert not stiffness.unexpected
 
 
 def test_the_numbers_of_a_state_belong_together() -> None:
@@ -131,7 +132,7 @@ def test_a_penalty_costs_its_digits_and_no_more() -> None:
     soft, stiff = (
         measure(STABILITY_STIFFNESS, state_named(f"stiffness-1e{n}"), load("vts-ppt")).details for n in (2, 10)
     )
-    assert stiff[CONDITION] / soft[CONDITION] == pytest.approx(1e8, rel=1)
+    assert 1e7 < stiff[CONDITION] / soft[CONDITION] < 1e9
     assert stiff[ERROR] > 1e6 * soft[ERROR] > 0
 
 
@@ -146,4 +147,4 @@ def test_a_scene_rests_at_the_pressure_that_it_is_loaded_by() -> None:
 def test_multipliers_have_no_stiffness_to_sweep() -> None:
     (row,) = run([load("mortar-lm")], [STABILITY_STIFFNESS], examples=1).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
-    assert row.reason == "the enforcement is by a multiplier, not by springs"
+    assert row.reason == "the enforcement is by a multiplier, not by springs of a stated stiffness"

@@ -63,8 +63,7 @@ def draw_stability(panels: Sequence[SweepPanel], target: Path) -> None:
     MisuseError
         If the file cannot be written.
     """
-    with matplotlib.rc_context(_STYLE):
-        save(make_stability_figure(panels), target)
+    save(make_stability_figure(panels), target)
 
 
 def make_stability_figure(panels: Sequence[SweepPanel]) -> Figure:
@@ -75,6 +74,11 @@ def make_stability_figure(panels: Sequence[SweepPanel]) -> Figure:
     panels : Sequence[SweepPanel]
         The formulations, at least one.
     """
+    with matplotlib.rc_context(_STYLE):
+        return _make_figure(panels)
+
+
+def _make_figure(panels: Sequence[SweepPanel]) -> Figure:
     n_columns = min(_COLUMNS, len(panels))
     n_rows = ceil((len(panels) + (len(panels) > n_columns)) / n_columns)
     width, height = _LARGE_PANEL if len(panels) <= _FEW else _PANEL
@@ -114,8 +118,9 @@ def _draw_panel(axes: Axes, panel: SweepPanel) -> None:
         errors = [min(max(point.error, _LOW), _HIGH / 2) if point.error > 0 else _ZERO for point in points]
         axes.plot(at, errors, **_pen(sweep), zorder=3)
     colour = "#B03A00" if panel.above else "0.25"
-    axes.set_title(panel.formulation, loc="left", fontweight="bold", pad=10)
-    notes = [axes.text(0.0, 1.02, _verdict(panel), transform=axes.transAxes, fontsize=_SMALL_TEXT, color=colour)]
+    axes.set_title(panel.formulation, loc="left", fontweight="bold", pad=11)
+    at = {"xycoords": "axes fraction", "textcoords": "offset points", "xytext": (0, 2.5)}
+    notes: list[Any] = [axes.annotate(_verdict(panel), (0, 1), fontsize=_SMALL_TEXT, color=colour, **at)]
     if panel.above:  # The lower right corner is free: so exact a force at so large a κ would be a coincidence.
         name = f"worst:\n{panel.above[0].name}"
         place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
