@@ -16,8 +16,8 @@ Multipliers that are pressures are all ε̂ |g|, and only the distribution of th
 this if it promises `translation_stable` and one of these. Ratios of lengths stay below 5: a kernel that moves the
 origin to a node rounds at the diameter, which is right, but costs digits on much shorter segments.
 
-**Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
-give the same gap.
+**Undecided.** A failing case is undecided where a slave point faces a master node to within 64 u D. Both partners give
+the same gap there, but a search that asks for 0 ≤ ξ ≤ 1 may lose the point between them.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ from contactverif_properties.shared.conditioning import (
     forces_quantity,
     measure_conditioning,
 )
+from contactverif_properties.shared.kinks import explain_by_rounded_decision
 from contactverif_properties.shared.roundoff import ratio
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration
 
@@ -80,7 +81,9 @@ def measure_local(case: Case, subject: Subject) -> Measurement:
         values[FORCES.name] = conditioning.count_roundings(forces - _in_long_double(far, formulation, pairing))
     if knows_total(subject.traits) and not knows_forces(subject.traits):
         values[TOTAL.name] = _count_total(near, forces, conditioning)
-    return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS))
+    failed = max(values.values()) > MOST_ROUNDINGS
+    undecided = explain_by_rounded_decision(near, formulation, pairing) if failed else ""
+    return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS), undecided)
 
 
 def exact_forces(case: Case) -> list[Fraction]:

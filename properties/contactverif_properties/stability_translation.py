@@ -21,8 +21,6 @@ where a decision hangs on less than 64 u D: there a right search may decide othe
 
 from __future__ import annotations
 
-import numpy as np
-
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property
@@ -37,8 +35,7 @@ from contactverif_properties.shared.conditioning import (
     measure_conditioning,
     tangent_quantity,
 )
-from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.shared.kinks import explain_by_rounded_decision
 
 FORCES = forces_quantity("change of the forces in roundings")
 TANGENT = tangent_quantity("change of the tangent in roundings")
@@ -78,8 +75,7 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
         values[SEARCH.name] = conditioning.count_roundings(change)
     undecided = ""
     if excusable and max(values.values()) > MOST_ROUNDINGS:
-        reach = COORDINATE_ROUNDING * near.diameter
-        undecided = explain_by_kink(near, formulation, pairing, reach, {"forces": float(np.abs(change).max())})
+        undecided = explain_by_rounded_decision(near, formulation, pairing)
     idle = not forces[: near.interface.n_unknowns].any()
     return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS), undecided, idle=idle)
 

@@ -21,6 +21,7 @@ from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
 from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.passes import split_passes
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
 N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.
@@ -131,6 +132,25 @@ def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tupl
     if "tangent" not in formulation.provides:
         return forces, np.zeros(1)
     return forces, dense(formulation.tangent(case.interface, pairing, z))
+
+
+def explain_by_rounded_decision(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> str:
+    """Return why rounding the positions relative to one another may turn a decision around, or an empty string.
+
+    Each coordinate may move by 64 u D, whatever its distance from the origin. How much the forces change is not asked:
+    where errors are counted in roundings, that would excuse a hundred of them.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin.
+    formulation : CheckedFormulation
+        The formulation; its contact points are used if it provides them.
+    pairing : Pairing | None
+        The pairing of the state.
+    """
+    direction = random_directions(case.seed, 1, case.z.size)[0]
+    return find_kink(case, formulation, pairing, COORDINATE_ROUNDING * case.diameter, direction)
 
 
 def find_kink(
