@@ -23,7 +23,7 @@ class PointSprings:
     places, weights : tuple[float, ...]
         The places on a segment from 0 to 1, and the share of its length that each stands for.
     last : bool
-        Of equally near segments take the last one, not the first.
+        Take the last of equally near segments, not the first.
     tau : float
         How far past a free end a point still counts, in lengths of the segment.
     stated : bool

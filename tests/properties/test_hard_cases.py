@@ -136,8 +136,8 @@ def test_the_detail_shows_the_jump_where_a_node_passes_the_tolerance_of_a_free_e
         ).details["share of the upper bound"]
         for share in (0.0099, 0.0101)
     ]
-    lost = (0.75 + 0.0101) / 2 / (3.0 + 0.0101)
-    assert shares == pytest.approx([1.0, 1 - lost], abs=1e-12)
+    loss = (0.75 + 0.0101) / 2 / (3.0 + 0.0101)
+    assert shares == pytest.approx([1.0, 1 - loss], abs=1e-12)
 
 
 def test_a_force_on_a_slave_beside_the_master_is_said_in_words() -> None:
