@@ -133,15 +133,15 @@ def _distance_to_box(origin: Vector, p: Vector, box: FloatArray) -> float:
     """Return the squared distance of origin + p to a box, a little less than exact, so that roundoff loses no tie."""
     dx = max((box[0] - origin[0]) - p[0], 0.0, p[0] - (box[2] - origin[0]))
     dy = max((box[1] - origin[1]) - p[1], 0.0, p[1] - (box[3] - origin[1]))
-    return float((dx * dx + dy * dy) * (1 - 16 * UNIT_ROUNDOFF))
+    return float((dx * dx + dy * dy) * (1 - 64 * UNIT_ROUNDOFF))
 
 
 @compile_kernel
 def distance_to_segment(origin: Vector, p: Vector, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     """Return the squared distance to the closed segment 1 2, and the length by which the foot lies past its end.
 
-    Where the foot lies at or past an end, the distance is that to the end node itself, so that the two segments at a
-    vertex tie exactly.
+    All is measured from the nearer end of the segment. Where the foot lies at or past it, the distance is that to the
+    end node itself, so that the two segments at a vertex tie exactly.
 
     Parameters
     ----------
@@ -153,11 +153,12 @@ def distance_to_segment(origin: Vector, p: Vector, x_1: Vector, x_2: Vector) -> 
     length, t, n = frame(x_1, x_2)
     d = minus(p, minus(x_1, origin))
     s = dot(d, t)
-    if s <= 0:
-        return dot(d, d), -s
-    if s >= length:
+    past = -s
+    if 2 * s > length:
         d = minus(p, minus(x_2, origin))
-        return dot(d, d), s - length
+        past = dot(d, t)
+    if past >= 0:
+        return dot(d, d), past
     g = dot(d, n)
     return g * g, 0.0
 
@@ -216,8 +217,14 @@ def nearest_segment(v: PointOnSegment, x: FloatArray, segments: IntArray, order:
 
 @compile_kernel
 def _is_nearer(distance: float, past: float, segment: int, best_distance: float, best_past: float, best: int) -> bool:
-    """Return whether a segment comes before the best one so far, by distance, then by `past`, then by number."""
-    if distance != best_distance:
+    """Return whether a segment comes before the best one so far, by distance, then by `past`, then by number.
+
+    Where the foot of one lies past a node, distances that differ by some roundings are equal: both are functions of the
+    vector from the node to the point, and roundoff must not choose between the two segments at the node.
+    """
+    past_a_node = past > 0.0 or best_past > 0.0
+    roundoff = 16 * UNIT_ROUNDOFF * distance if past_a_node else 0.0
+    if abs(distance - best_distance) > roundoff:
         return distance < best_distance
     return past < best_past or (past == best_past and segment < best)
 

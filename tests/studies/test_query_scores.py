@@ -70,7 +70,7 @@ def test_exact_answers_have_no_error_but_their_own_rounding() -> None:
 def test_a_stable_search_is_wrong_only_where_neighbouring_doubles_decide(search: str) -> None:
     answers = answer_all(QUERIES, plain_search) if search == "plain" else search_built_in(QUERIES)
     scores = score_answers(QUERIES, EXACT, answers)
-    assert {score.kind for score in scores.kinds if score.wrong} <= BY_ROUNDOFF
+    assert {score.kind for score in scores.kinds if score.wrong} <= (BY_ROUNDOFF if search == "plain" else {"near-tie"})
     assert scores.total.worst_xi <= 4
     assert scores.total.worst_distance <= 4
 
