@@ -69,7 +69,9 @@ NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # With redundant mu
 # for pressures nor an area.
 WITHOUT_EXACT_FORCES = ("nts", "nts-lm", "vts-me-lm", "two-pass/nts", "two-pass/nts-ar", "two-pass/nts-lm")
 NEEDS_MULTIPLIERS = frozenset({RANK, COMPLEMENTARITY})
-NEEDS_SOLUTION = frozenset({"newton.order", "newton.history", "hard.zero-load", COMPLEMENTARITY})
+NEEDS_SOLUTION = frozenset(
+    {"newton.order", "newton.history", "newton.units", "newton.attainable", "hard.zero-load", COMPLEMENTARITY}
+)
 # Nodal springs have no area. Averaged normals are no stated rule, and decisions of multipliers and of nodes are others.
 WITHOUT_RULE = "mortar:normals=averaged"
 WITHOUT_PROJECTION: Mapping[str, tuple[str, ...]] = {

@@ -142,7 +142,8 @@ def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
 def _evaluate_shapes(body: Body) -> tuple[FloatArray, FloatArray]:
     """Return gradients of the shape functions, in the body's axes, and weights × areas at the Gauss points."""
     reference, weights = _reference_cell(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
-    corners = (body.nodes @ body.frame)[body.cells]  # (n_cells, n_corners, 2)
+    # Differences of nodes first: a cell far from the origin has the same stiffness to the last bit.
+    corners = (body.nodes[body.cells] - body.nodes[body.cells[:, :1]]) @ body.frame  # (n_cells, n_corners, 2)
     jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
     (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # Written out, so that another unit of length changes no bit.
     areas = (a * d - b * c) * weights

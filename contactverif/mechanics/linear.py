@@ -33,8 +33,8 @@ class Step:
     change : FloatArray | None, shape (n,)
         The step; None if the matrix has no inverse in floats.
     condition : float
-        An estimate of 1/cond of the matrix, rows and columns of multipliers scaled. It is 0 if the matrix has no
-        inverse, even if multipliers are not unique and there is a step all the same.
+        An estimate of 1/cond of the matrix in single precision, rows and columns of multipliers scaled. It is 0 if the
+        matrix has no inverse, even if multipliers are not unique and there is a step all the same.
     deficiency : int
         The number of multipliers that are not unique.
     """
@@ -142,8 +142,12 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
 
 
 def _factorise(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
-    """Return the solution, None if there is none, and an estimate of 1/cond."""
-    return (_solve_dense if isinstance(matrix, np.ndarray) else _solve_sparse)(matrix, right)
+    """Return the solution, None if there is none, and an estimate of 1/cond in single precision.
+
+    The last digits of LAPACK's estimate depend on where its workspace lies in memory, and so change from run to run.
+    """
+    step, condition = (_solve_dense if isinstance(matrix, np.ndarray) else _solve_sparse)(matrix, right)
+    return step, float(np.float32(condition))
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:

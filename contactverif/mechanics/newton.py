@@ -304,7 +304,8 @@ class System:
         shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
         steps = np.full(z.size, shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3))
         if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
-            steps[n_positions:] = max(np.abs(multipliers).max(), abs(self.scene.stiffness).max(initial=1.0))
+            size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
+            steps[n_positions:] = size or 1.0
         shifts = np.diag(steps)
         states = np.concatenate([z + shifts, z - shifts])
         forces = self.formulation.residual(self.scene.interface, pairing, states)

@@ -24,11 +24,10 @@ import numpy as np
 
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.applicability import refuse_unstated_penalty
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
@@ -83,13 +82,6 @@ def measure_scaling(case: Case, subject: Subject) -> Measurement:
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
     undecided = explain_by_kink(case, formulation, pairing, rounding, failures) if failures else ""
     return Measurement(values, dict.fromkeys(values, tolerance), undecided, idle=not forces.any())
-
-
-def refuse_unstated_penalty(traits: Traits) -> str:
-    """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
-    if traits.penalty is None:
-        return "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
-    return refuse_barrier(traits)
 
 
 SCALING = Property(

@@ -96,3 +96,15 @@ def test_a_nearly_singular_matrix_is_told_also_where_its_null_vector_is_orthogon
     matrix = np.eye(4) - (1 - 1e-14) * np.outer(vector, vector)
     step = linear.solve_step(sparse.csr_array(matrix), vector, 4)
     assert step.condition < 1e-13
+
+
+@pytest.mark.parametrize("n", [50, 287, 400])
+def test_a_condition_is_the_same_wherever_its_workspace_lies(n: int) -> None:
+    random = np.random.default_rng(0)
+    matrix = random.standard_normal((n, n)) + np.sqrt(n) * np.eye(n)
+    right, blockers, conditions = np.ones(n), [], set()
+    for _ in range(20):
+        blockers.append(np.zeros(random.integers(1, 5000)))  # It moves what is allocated next.
+        conditions.add(linear.solve_step(matrix.copy(), right, n).condition)
+    assert len(conditions) == 1
+    assert all(condition == np.float32(condition) for condition in conditions)

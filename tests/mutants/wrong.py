@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import wrong_hard
+import wrong_newton
 import wrong_projection
 import wrong_purity
 import wrong_stability
@@ -389,6 +390,7 @@ MUTANTS = (
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
     *wrong_hard.MUTANTS,
+    *wrong_newton.MUTANTS,
     *wrong_projection.MUTANTS,
     *wrong_purity.MUTANTS,
     *wrong_stability.MUTANTS,

@@ -29,3 +29,10 @@ def refuse_dependent_multipliers(traits: Traits) -> str:
     if traits.independent_multipliers is False:
         return "the multipliers are not independent, so there need be no solution, nor one alone"
     return refuse_barrier(traits)
+
+
+def refuse_unstated_penalty(traits: Traits) -> str:
+    """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
+    if traits.penalty is None:
+        return "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
+    return refuse_barrier(traits)

@@ -1,0 +1,278 @@
+"""Ask what residual and what accuracy Newton's method attains far from the origin.
+
+**Question.** A scene is solved, moved by an exact way of 2^0 to 2^20 segments, and solved again from its own solution.
+At which residual does Newton's method come to rest, how far from the solution, and how much of that is the fault of the
+formulation?
+
+**Why it matters.** The unknowns are displacements, but a formulation gets positions, and these are stored to u times
+the distance X from the origin. So a residual cannot fall below roundoff of the stored positions, and no tolerance
+tighter than that ever ends the iterations. A formulation that rounds points at the same distance adds its own
+errors to that.
+
+**How it is judged.** First, the residual of the moved scene is compared with that of the same stored positions moved
+back, which rounds nothing unless the way is shorter than the scene. A formulation that is stable under translations
+differs by at most 16 roundings of the positions relative to one another (ω). Secondly, the residual at which three more
+steps come to rest counts over its roundoff, 8u (|K| X + |S| |q| + |g| + |R|). K is a difference quotient of the contact
+forces, S the stiffness and g the load of the bodies. Thirdly, the distance from the solution counts over what a
+residual of that size makes of it, max |J⁻¹| 8u (…), with J = S + K. The largest number of all ways is judged, and those
+of each way are kept as details.
+
+**Undecided.** Where Newton's method finds no solution, where the matrix has no inverse there, and where the solution is
+so near a kink that roundoff of the stored positions decides the pairing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import frexp, ldexp
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.changed_scenes import move, snap
+from contactverif.mechanics.linear import scale_factors
+from contactverif.mechanics.newton import ROUNDOFF_FACTOR, System
+from contactverif.mechanics.scene import scene_of
+from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.conditioning import (
+    MOST_ROUNDINGS,
+    Conditioning,
+    difference_quotient,
+    forces_quantity,
+    measure_conditioning,
+)
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
+
+DIGITS = 32  # Coordinates are multiples of 2^-32 segments, so that the longest way rounds none.
+OFFSETS = (0, 5, 10, 15, 20)  # The ways: 2 to these powers, in segments.
+N_STEPS = 3  # From the solution near the origin, with the matrix there, a step leaves what roundoff does.
+
+ADDED = forces_quantity("roundings that the formulation adds")
+RESIDUAL = Quantity(
+    "attained residual",
+    "1",
+    "1 (times its roundoff)",
+    "A stored position is rounded to uX twice, and the bodies' forces to u(|S| |q| + |g|); 8 roundings allow for it.",
+)
+ERROR = Quantity(
+    "attained error of the solution",
+    "1",
+    "1 (times what that residual makes of it)",
+    "A residual r moves the solution by J⁻¹ r.",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """The solution of the scene near the origin, and what roundoff may do to it.
+
+    Attributes
+    ----------
+    system : System
+        The scene with its formulation.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns.
+    pairing : Pairing | None
+        The pairing.
+    matrix : FloatArray, shape (n_free + n_multipliers, n_free + n_multipliers)
+        The derivative J of the residual there, by differences.
+    units : FloatArray, shape (n_free + n_multipliers,)
+        The unit of each unknown that corresponds to a unit of length.
+    inverse : FloatArray, shape (n_free + n_multipliers, n_free + n_multipliers)
+        |J⁻¹|, entry by entry.
+    contact : FloatArray, shape (n_free + n_multipliers,)
+        The change of the residual by a move of all nodes by a unit of length, Σ |K|.
+    terms : FloatArray, shape (n_free + n_multipliers,)
+        The sizes of the other terms of the residual, |S| |q| + |g| + |R| and those of multipliers.
+    conditioning : Conditioning
+        What roundings of the positions relative to one another may change in the contact forces.
+    """
+
+    system: System
+    u: FloatArray
+    pairing: Pairing | None
+    matrix: FloatArray
+    units: FloatArray
+    inverse: FloatArray
+    contact: FloatArray
+    terms: FloatArray
+    conditioning: Conditioning
+
+    def roundoff(self, largest: float) -> FloatArray:
+        """Return the roundoff (n_free + n_multipliers,) of the residual where the largest coordinate is `largest`."""
+        return ROUNDOFF_FACTOR * UNIT_ROUNDOFF * (self.contact * largest + self.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Attained:
+    """The residual and the accuracy that Newton's method attains in one place.
+
+    Attributes
+    ----------
+    added : float
+        ω, the roundings that the formulation adds.
+    residual : float
+        The attained residual over its roundoff.
+    error : float
+        The distance from the solution over what that roundoff makes of it.
+    length : float
+        That distance, a length.
+    undecided : str
+        The reason why residual and error decide nothing; empty if they do.
+    """
+
+    added: float
+    residual: float
+    error: float
+    length: float
+    undecided: str
+
+
+def measure_attainable(case: Case, subject: Subject) -> Measurement:
+    """Solve a scene near the origin and far from it, and compare.
+
+    Parameters
+    ----------
+    case : Case
+        A random scene.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        The largest of all ways: the roundings that the formulation adds, and residual and error over their roundoff.
+        Details: these numbers for each way, the error also over the shortest segment.
+    """
+    segment = ldexp(0.5, frexp(case.shortest_segment)[1])  # The power of two below the shortest segment.
+    scene = snap(scene_of(case), segment * 2.0**-DIGITS)
+    system = System(scene, subject.for_case(case))
+    trace = find_solution(system)
+    details = solution_details(trace)
+    if not trace.converged:
+        return Measurement({}, {}, details=details, undecided=f"Newton found no solution: {trace.end.label}")
+    solution = examine(system, case, trace.u[-1])
+    if solution is None:
+        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+    places = {power: settle(solution, case, segment * 2.0**power) for power in OFFSETS}
+    for power, attained in places.items():
+        details |= {
+            f"{ADDED.name} at 2^{power}": attained.added,
+            f"{RESIDUAL.name} at 2^{power}": attained.residual,
+            f"{ERROR.name} at 2^{power}": attained.error,
+            f"error over the shortest segment at 2^{power}": attained.length / case.shortest_segment,
+        }
+    decided = [attained for attained in places.values() if not attained.undecided]
+    values = {ADDED.name: max(attained.added for attained in places.values())}
+    tolerances = {ADDED.name: MOST_ROUNDINGS}
+    if decided:
+        values[RESIDUAL.name] = max(attained.residual for attained in decided)
+        values[ERROR.name] = max(attained.error for attained in decided)
+        tolerances |= {RESIDUAL.name: 1.0, ERROR.name: 1.0}
+    return Measurement(values, tolerances, details=details, idle=is_untouched(system, trace))
+
+
+def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
+    """Return the solution u with what roundoff may do to it, None if the matrix has no inverse there.
+
+    Parameters
+    ----------
+    system : System
+        The scene near the origin, with its formulation.
+    case : Case
+        The case of the scene.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns.
+    """
+    scene, n_free, z = system.scene, system.scene.n_free, system.state(u)
+    pairing = system.pair(u)
+    state = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)
+    forces = system.formulation.residual(scene.interface, pairing, z)
+    to_unknowns = dense(system.transformation).T  # (n_free + n_multipliers, n_unknowns + n_multipliers)
+    rows = to_unknowns @ difference_quotient(state, system.formulation, pairing)
+    matrix = dense(system.stiffness) + rows @ to_unknowns.T
+    condition = system.step(matrix, np.zeros(system.size)).condition
+    if condition <= system.size * UNIT_ROUNDOFF:
+        return None
+    # Supported nodes count too: where an axis is inclined, rounding moves a node off its support.
+    contact = np.abs(rows[:, : scene.interface.n_unknowns]).sum(axis=1)
+    terms = np.abs(rows[:, scene.interface.n_unknowns :]) @ np.abs(state.multipliers) + np.abs(to_unknowns) @ abs(
+        forces
+    )
+    terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + np.abs(scene.load)
+    return Solution(
+        system=system,
+        u=u,
+        pairing=pairing,
+        matrix=matrix,
+        units=scale_factors(matrix, n_free)[1],
+        inverse=np.abs(linalg.inv(matrix)),
+        contact=contact,
+        terms=terms,
+        conditioning=measure_conditioning(state, system.formulation, pairing, forces),
+    )
+
+
+def settle(solution: Solution, case: Case, way: float) -> Attained:
+    """Let Newton's method come to rest in another place, from the solution near the origin.
+
+    Parameters
+    ----------
+    solution : Solution
+        The solution near the origin.
+    case : Case
+        The case of the scene, for its seed.
+    way : float
+        The move along both axes, a length.
+    """
+    near, n = solution.system, solution.system.scene.interface.n_unknowns
+    far = replace(near, scene=move(near.scene, way, way))
+    u, added, settled = solution.u, 0.0, []
+    for _ in range(1 + N_STEPS):
+        pairing, z = far.pair(u), far.state(u)
+        back = np.concatenate([z[:n] - way, z[n:]])
+        forces = far.formulation.residual(far.scene.interface, pairing, z)
+        same = near.formulation.residual(near.scene.interface, pairing, back)
+        added = max(added, solution.conditioning.count_roundings(forces - same))
+        residual = far.residual(u, pairing)
+        largest = float(np.abs(z[:n]).max())
+        settled.append((over(np.abs(residual), solution.roundoff(largest)), u, largest, pairing))
+        change = near.step(solution.matrix, -residual).change
+        assert change is not None  # The matrix has an inverse.
+        u = u + change
+    attained, u, largest, pairing = min(settled[1:], key=lambda rest: rest[0])
+    allowed = float((solution.inverse @ solution.roundoff(largest) / solution.units).max())
+    length = float(np.abs((u - solution.u) / solution.units).max())
+    undecided = ""
+    if pairing != solution.pairing or pairing is None:
+        state = replace(case, interface=near.scene.interface, z=near.state(u), n_multipliers=near.n_multipliers)
+        (direction,) = random_directions(case.seed, 1, state.z.size)
+        undecided = find_kink(state, near.formulation, near.pair(u), COORDINATE_ROUNDING * largest, direction)
+    return Attained(added, attained, ratio(length, allowed), length, undecided)
+
+
+def over(sizes: FloatArray, floor: FloatArray) -> float:
+    """Return the largest ratio of two arrays (n,), entry by entry; 0/0 counts as 0."""
+    return max((ratio(float(size), float(least)) for size, least in zip(sizes, floor, strict=True)), default=0.0)
+
+
+NEWTON_ATTAINABLE = Property(
+    id="newton.attainable",
+    family="newton",
+    summary="Far from the origin, residual and accuracy are limited by the stored positions alone.",
+    quantities=(ADDED, RESIDUAL, ERROR),
+    cases=solid_cases,
+    measure=measure_attainable,
+    promise=lambda traits: traits.translation_stable,
+    applicable=refuse_dependent_multipliers,
+    bodies=True,
+)

@@ -1,0 +1,199 @@
+"""Ask whether Newton's method takes the same steps in other units.
+
+**Question.** A scene is solved. At each iterate the same step is taken with all lengths multiplied by 2^k and all
+moduli by 4^j, penalty and loads with them. Are pairing and next iterate the same?
+
+**Why it matters.** A problem in millimetres and megapascals is the one in metres and pascals. A small number that a
+tangent or a decision on contact adds, to be safe from zero, has a unit: it is small in one system of units and decides
+in another. It shows only in solving, as slow convergence or as another active set.
+
+**How it is judged.** k and j are random, up to ±60 and ±30. Powers of two scale the four operations and square roots
+exactly, so a formulation that uses nothing else gives the next iterate to the last bit. A power or an angle is rounded
+anew. Then the difference of the two next iterates counts over what roundoff does to a step Δu,
+max(1e3 u (|u| + |Δu|)/cond, 30 uX), with 30 (uX/ℓ)^(2/3) |Δu|/cond more where the tangent is a difference quotient. The
+tolerance is 1. A pairing that differs, and a matrix that has an inverse in other units alone, fail in words.
+
+**Undecided.** Where the state of the first pairing that differs lies at a kink.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from zlib import crc32
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import Subject
+from contactverif.mechanics import linear
+from contactverif.mechanics.changed_scenes import change_units
+from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.newton_solution import is_untouched, length_units, solution_details
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
+
+LARGEST_LENGTH, LARGEST_MODULUS = 60, 30  # The largest exponents of 2 and of 4.
+STEP_ROUNDINGS = 1e3  # A linear system is solved to so many roundoffs over its reciprocal condition.
+POSITION_ROUNDINGS = 30.0  # A position, and a difference quotient, are rounded to so many roundoffs.
+
+STEPS = Quantity(
+    "difference of a step in other units",
+    "1",
+    "1 (times what roundoff does)",
+    "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew, and the "
+    "matrix passes that on by its condition.",
+)
+
+
+def measure_units(case: Case, subject: Subject) -> Measurement:
+    """Solve a scene, and take each step again in other units.
+
+    Parameters
+    ----------
+    case : Case
+        A random scene.
+    subject : Subject
+        A formulation whose trait `penalty` says which unit the penalty has.
+
+    Returns
+    -------
+    Measurement
+        The largest difference of two next iterates over what roundoff does. Details: how the solution ended, the
+        exponents of the units, and the number of steps that are the same to the last bit.
+    """
+    # Strategies repeat seeds from case to case, so the units hang on the state too.
+    scene, random = scene_of(case), np.random.default_rng([case.seed, crc32(case.z.tobytes())])
+    k = int(random.integers(-LARGEST_LENGTH, LARGEST_LENGTH + 1))
+    j = int(random.integers(-LARGEST_MODULUS, LARGEST_MODULUS + 1))
+    length, modulus, penalty = 2.0**k, 4.0**j, subject.penalty(case)
+    distributed = subject.traits.penalty == "distributed"
+    system = System(scene, subject.with_penalty(penalty))
+    rescaled = subject.with_penalty(penalty * modulus / (length if distributed else 1.0))
+    other = System(change_units(scene, length, modulus), rescaled)
+    factors = np.full(system.size, length)
+    factors[scene.n_free :] = modulus * (1.0 if distributed else length)
+
+    trace = solve(scene, system.formulation)
+    units = Units(system, other, factors)
+    differences, broken, undecided = [], "", ""
+    for number in range(len(trace.u)):
+        broken = units.compare_decisions(trace, number)
+        if broken:
+            undecided = explain_pairing(system, case, trace.u[number])
+            break
+        if number + 1 < len(trace.u):
+            differences.append(units.compare_step(case, trace, number))
+    details = solution_details(trace) | {"exponent of lengths": float(k), "exponent of moduli": 2.0 * j}
+    return Measurement(
+        {STEPS.name: max(differences, default=0.0)},
+        {STEPS.name: 1.0},
+        undecided=undecided,
+        broken=broken,
+        details=details | {"steps that agree to the last bit": float(differences.count(0.0))},
+        idle=is_untouched(system, trace),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """A scene in two systems of units.
+
+    Attributes
+    ----------
+    system, other : System
+        The scene in its own units and in others, with the formulation.
+    factors : FloatArray, shape (n_free + n_multipliers,)
+        The unit of each unknown in the other units.
+    """
+
+    system: System
+    other: System
+    factors: FloatArray
+
+    def step(self, u: FloatArray) -> linear.Step:
+        """Return the Newton step in the other units from the unknowns u (n,) in those of the scene."""
+        pairing = self.other.pair(u * self.factors)
+        matrix, floor = self.other.matrix(u * self.factors, pairing)
+        return self.other.step(matrix, -self.other.residual(u * self.factors, pairing), floor)
+
+    def compare_decisions(self, trace: Trace, number: int) -> str:
+        """Return in words what differs in the other units at the iterate `number`, or an empty string."""
+        u, last = trace.u[number], number + 1 == len(trace.u)
+        if self.system.pair(u) != self.other.pair(u * self.factors):
+            return f"at iterate {number} the pairing is another one in other units"
+        if last and trace.end is End.SINGULAR:
+            step = self.step(u)
+            if step.change is not None and step.condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size:
+                return f"at iterate {number} the matrix has an inverse in other units alone"
+        return ""
+
+    def compare_step(self, case: Case, trace: Trace, number: int) -> float:
+        """Return the difference of the step from the iterate `number` over what roundoff does to it."""
+        u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
+        change = self.step(u).change
+        if change is None:
+            return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size else 0.0
+        difference = (u * self.factors + change) / self.factors - after
+        return measure_step(self.system, case, trace, number, difference) if difference.any() else 0.0
+
+
+def measure_step(system: System, case: Case, trace: Trace, number: int, difference: FloatArray) -> float:
+    """Return the difference of a next iterate over what roundoff does to the step.
+
+    Parameters
+    ----------
+    system : System
+        The scene with its formulation.
+    case : Case
+        The case of the scene.
+    trace : Trace
+        The solution.
+    number : int
+        The number of the iterate from which the step is taken.
+    difference : FloatArray, shape (n_free + n_multipliers,)
+        The difference of the two next iterates.
+    """
+    u, units = trace.u[number], length_units(system, trace.u[number], system.pair(trace.u[number]))
+    step = float(np.abs((trace.u[number + 1] - u) / units).max())
+    size = float(np.abs(u / units).max() + np.abs(system.scene.imposed_displacements).max()) + step
+    largest = float(np.abs(system.state(u)[: system.scene.interface.n_unknowns]).max())
+    solved_to = STEP_ROUNDINGS * UNIT_ROUNDOFF * size
+    quotient = 0.0
+    if "tangent" not in system.formulation.provides:
+        quotient = POSITION_ROUNDINGS * (UNIT_ROUNDOFF * largest / case.shortest_segment) ** (2 / 3) * step
+    condition = float(trace.conditions[number])
+    roundoff = max(ratio(solved_to, condition), POSITION_ROUNDINGS * UNIT_ROUNDOFF * largest)
+    return ratio(float(np.abs(difference / units).max()), roundoff + ratio(quotient, condition))
+
+
+def explain_pairing(system: System, case: Case, u: FloatArray) -> str:
+    """Return why another pairing at the unknowns u (n,) may be the fault of a kink, or an empty string."""
+    state = replace(case, z=system.state(u), n_multipliers=system.n_multipliers)
+    reach = COORDINATE_ROUNDING * state.largest_coordinate
+    (direction,) = random_directions(case.seed, 1, state.z.size)
+    return find_kink(state, system.formulation, system.pair(u), reach, direction)
+
+
+def refuse(traits: Traits) -> str:
+    """Return why the question makes no sense for a formulation, or an empty string."""
+    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
+
+
+NEWTON_UNITS = Property(
+    id="newton.units",
+    family="newton",
+    summary="Newton's method takes the same steps in other units of length and force.",
+    quantities=(STEPS,),
+    cases=solid_cases,
+    measure=measure_units,
+    promise=lambda traits: True,
+    applicable=refuse,
+    bodies=True,
+)

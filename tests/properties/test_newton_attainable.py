@@ -1,0 +1,87 @@
+"""The property `newton.attainable`: what stored positions allow is attained, and what a formulation adds is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from subjects import Changed, load_subject
+
+import contactverif_nts
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.changed_scenes import snap
+from contactverif.mechanics.newton import System
+from contactverif.mechanics.scene import scene_of
+from contactverif.run.runner import judge_case
+from contactverif.scenes.catalogue import load_scene_case
+from contactverif_properties.newton_attainable import (
+    ADDED,
+    ERROR,
+    NEWTON_ATTAINABLE,
+    OFFSETS,
+    RESIDUAL,
+    examine,
+    measure_attainable,
+    settle,
+)
+
+# Virtual slave nodes lie off master nodes, and nothing of the scene is a multiple of the way.
+SCENE = "c-prime:penalty=1e4"
+
+
+def make_far_rounding(*, penalty: float) -> Any:
+    """VTS-ME that subtracts the first node's position only after it was rounded a second time, far from the origin."""
+    inner = contactverif_nts.vts_me(penalty=penalty)
+
+    def residual(interface: Any, pairing: Any, z: Any) -> Any:
+        return inner.residual(interface, pairing, (z / 3) * 3)
+
+    return Changed(inner, residual=residual, traits=replace(inner.traits, translation_stable=True))
+
+
+@pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-me"])
+def test_differences_first_attain_what_stored_positions_allow(name: str) -> None:
+    measurement = measure_attainable(load_scene_case(SCENE), load_subject(name))
+    assert measurement.values[ADDED.name] <= 1.0
+    assert 0 < measurement.values[RESIDUAL.name] <= 1.0
+    assert 0 < measurement.values[ERROR.name] <= 1.0
+
+
+def test_the_error_of_the_solution_grows_with_the_way() -> None:
+    details = measure_attainable(load_scene_case(SCENE), load_subject("nts")).details
+    errors = [details[f"error over the shortest segment at 2^{power}"] for power in OFFSETS]
+    assert errors[-1] > 1e3 * errors[0]
+    assert errors[-1] < 1e-8
+
+
+def test_a_position_that_is_rounded_far_from_the_origin_is_told() -> None:
+    outcome = judge_case(NEWTON_ATTAINABLE, load_scene_case(SCENE), Subject("far", make_far_rounding))
+    assert outcome.verdict is Verdict.FAIL
+    assert ADDED.name in outcome.reason
+
+
+def test_who_promises_nothing_breaks_nothing() -> None:
+    assert NEWTON_ATTAINABLE.promise(replace(load_subject("nts").traits, translation_stable=None)) is None
+    assert NEWTON_ATTAINABLE.promise(replace(load_subject("nts").traits, translation_stable=True)) is True
+
+
+def test_a_matrix_without_inverse_is_undecided() -> None:
+    case = load_scene_case(SCENE)
+    system = System(scene_of(case), load_subject("nts").for_case(case))
+    slave, master = system.scene.condensed_bodies
+    apart = np.concatenate([slave.unknowns % 2, -(master.unknowns % 2)]).astype(np.float64)
+    assert examine(system, case, apart) is None  # The slave hangs free, above the master.
+
+
+def test_the_roundoff_grows_with_the_distance_alone() -> None:
+    case = load_scene_case(SCENE)
+    system = System(snap(scene_of(case), 2.0**-20), load_subject("nts").for_case(case))
+    solution = examine(system, case, system.scene.start)
+    assert solution is not None
+    assert (solution.roundoff(0.0) == 2.0**-50 * solution.terms).all()
+    added = solution.roundoff(2.0**30) - solution.roundoff(2.0**29)
+    assert added == pytest.approx(2.0**29 * 2.0**-50 * solution.contact)
+    assert settle(solution, case, 2.0**20).added <= 1.0
