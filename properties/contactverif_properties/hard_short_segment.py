@@ -10,7 +10,8 @@ absolute number, finds out there.
 as in `patch.flat.solve`, whose tolerances have the term 5e-15/r for the ratio r = 4e-6 of the shortest to the longest
 segment. The promise is `passes_flat_patch`.
 
-**Undecided.** Never.
+**Undecided.** A scene that fails is undecided for multipliers that are not independent: Newton's method may release one
+that is redundant on the tiny segment, and others carry its force.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Traits
@@ -16,7 +18,13 @@ PATCH_QUANTITIES = (*FLAT_QUANTITIES, *QUANTITIES, MULTIPLIERS)
 
 def measure_patch(case: Case, subject: Subject) -> Measurement:
     """Return the errors of a flat state (`measure_flat`), or of a solved scene (`measure_once`)."""
-    return measure_once(case, subject) if has_bodies(case) else measure_flat(case, subject)
+    if not has_bodies(case):
+        return measure_flat(case, subject)
+    measurement, traits = measure_once(case, subject), subject.traits
+    if traits.passes_flat_patch and traits.independent_multipliers is False:
+        # Newton's method may release a redundant multiplier, and others carry its force: another solution.
+        return replace(measurement, undecided="the multipliers are not independent, so the forces are not unique")
+    return measurement
 
 
 def promise_patch(traits: Traits) -> bool | None:
