@@ -11,9 +11,10 @@ forces are wrong by 10⁻⁴, and Newton's method stops at that.
 roundings (ω): how many times more it is than rounding all positions relative to their centroid, to 53 bits, would make
 it. A kernel that takes differences of nodes first gives 0, or a few where it centres its coordinates. The tolerance is
 16, at any distance and any gap. A kernel that rounds points far away has 10⁵ and more at 2^20. The tangent may differ
-by 16 u max|K| D/ℓ, since a rounding turns a segment by u D/ℓ. The state's own pairing at the far place must give these
-forces too. Without a promise (trait `translation_stable`), a failure is shown and breaks nothing: kernels that form
-points first are common, and right near the origin.
+by 16 u D max(max|K|/ℓ, max|dK/dx|): a rounding turns a segment by u D/ℓ, and changes the stiffness of a law that is not
+linear. The state's own pairing at the far place must give these forces too. Without a promise (trait
+`translation_stable`), a failure is shown and breaks nothing: kernels that form points first are common, and right near
+the origin.
 
 **Undecided.** Never, if the plugin has a pairing. Without one, or with the far state's own pairing, a case is undecided
 where a decision hangs on less than 64 u D: there a right search may decide otherwise.
@@ -33,6 +34,7 @@ from contactverif_properties.shared.conditioning import (
     count_tangent_roundings,
     forces_quantity,
     measure_conditioning,
+    measure_tangent_slope,
     tangent_quantity,
 )
 from contactverif_properties.shared.kinks import explain_by_rounded_decision
@@ -56,7 +58,7 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
     -------
     Measurement
         ω of the forces on the pairing of the state at the origin, and on the pairing of the far state; the change of
-        the tangent in units of u max|K| D/ℓ. All are dimensionless.
+        the tangent in units of u D max(max|K|/ℓ, max|dK/dx|). All are dimensionless.
     """
     formulation, near = prepare_state(case, subject)
     far = move_state(near, case.parameters["shift"])
@@ -67,7 +69,8 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
     values = {FORCES.name: conditioning.count_roundings(change)}
     if "tangent" in formulation.provides:
         there, here = (dense(formulation.tangent(at.interface, pairing, at.z)) for at in (far, near))
-        values[TANGENT.name] = count_tangent_roundings(near, here, there)
+        slope = measure_tangent_slope(near, formulation, pairing, here)
+        values[TANGENT.name] = count_tangent_roundings(near, here, there, slope)
     excusable = pairing is None  # A plugin without a pairing decides anew in each residual.
     if pairing is not None:
         excusable = max(values.values()) <= MOST_ROUNDINGS  # The frozen pairing decides the same in both places.

@@ -26,16 +26,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Quantity
 from contactverif.contract.subject import CheckedFormulation
+from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.roundoff import ratio
 
 MOST_ROUNDINGS = 16.0  # The tolerance of ω; right kernels in other ways of writing reach 3.
+TANGENT_STEP = 2.0**-20  # The motion of the nodes over the shortest segment that shows how a tangent changes.
+N_TANGENT_DIRECTIONS = 2  # The random directions of that motion.
 FORCES_REASON = "Rounding the positions relative to one another changes forces as much; no formulation can do better."
-TANGENT_REASON = "Rounding the ends of a segment relative to one another turns the segment by uD/ℓ."
+TANGENT_REASON = (
+    "Rounding the positions relative to one another by uD turns a segment by uD/ℓ, and changes the stiffness of a law "
+    "that is not linear by uD max|dK/dx|."
+)
 
 
 def forces_quantity(name: str) -> Quantity:
@@ -44,8 +50,8 @@ def forces_quantity(name: str) -> Quantity:
 
 
 def tangent_quantity(name: str) -> Quantity:
-    """Return a quantity for an error of the tangent in units of u max|K| D/ℓ."""
-    return Quantity(name, "1", "16 (times u max|K| D/ℓ)", TANGENT_REASON)
+    """Return a quantity for an error of the tangent in units of u D max(max|K|/ℓ, max|dK/dx|)."""
+    return Quantity(name, "1", "16 (times u D max(max|K|/ℓ, max|dK/dx|))", TANGENT_REASON)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,8 +179,8 @@ def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pa
     return columns.T
 
 
-def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray) -> float:
-    """Return how much two tangents differ, in units of u max|K| D/ℓ.
+def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray, slope: float = 0.0) -> float:
+    """Return how much two tangents differ, in units of u D times what a motion by a unit of length changes in them.
 
     Parameters
     ----------
@@ -182,9 +188,37 @@ def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray) 
         The state near the origin.
     tangent, other : FloatArray, shape (n, n)
         The tangent there, and the one to compare.
+    slope : float
+        The change of an entry of the tangent over the way of the nodes, from `measure_tangent_slope`. At least
+        max|K|/ℓ counts, since a segment turns.
     """
-    turn = case.diameter / case.shortest_segment
-    return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * float(np.abs(tangent).max()) * turn)
+    slope = max(slope, float(np.abs(tangent).max()) / case.shortest_segment)
+    return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * slope * case.diameter)
+
+
+def measure_tangent_slope(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, tangent: FloatArray
+) -> float:
+    """Return the largest change of an entry of the tangent over a small motion of the nodes, over its length.
+
+    The tangent of a law that is not linear is small at a small gap, and its change is not: that of a pressure ε̂ g² is
+    2 ε̂ g, which a rounding of the gap changes by 2 ε̂ u D.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin.
+    formulation : CheckedFormulation
+        The formulation, which has a tangent.
+    pairing : Pairing | None
+        The pairing of that state.
+    tangent : FloatArray, shape (n, n)
+        The tangent there.
+    """
+    step = TANGENT_STEP * case.shortest_segment
+    moves = step * random_directions(case.seed, N_TANGENT_DIRECTIONS, case.z.size)
+    tangents = (dense(formulation.tangent(case.interface, pairing, case.z + move)) for move in moves)
+    return max(float(np.abs(moved - tangent).max()) for moved in tangents) / step
 
 
 def _distances(case: Case) -> FloatArray:
