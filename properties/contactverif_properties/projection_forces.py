@@ -9,6 +9,7 @@ computed misleads them, and no other question sees it: the forces are right.
 **How it is judged.** These identities hold for right formulations whether they pass the patch test or not:
 
 - A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0. An idle point carries nothing.
+- A nodal force has the weight 1. A weighted node lies at a node, not inside a segment.
 - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
   the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
 - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
@@ -83,7 +84,7 @@ def measure_account(case: Case, subject: Subject) -> Measurement:
         errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
         values[LAW.name] = largest(errors)
         tolerances[LAW.name] = 8 * UNIT_ROUNDOFF
-    return Measurement(values, tolerances, broken=_breach(points), idle=not points.active.any())
+    return Measurement(values, tolerances, broken=_breach(points, subject.traits), idle=not points.active.any())
 
 
 def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, float]:
@@ -100,8 +101,12 @@ def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, 
     return float(np.abs(difference).max()) / size, tolerance
 
 
-def _breach(points: ContactPoints) -> str:
-    """Return how a pressure breaks the contract, or an empty string."""
+def _breach(points: ContactPoints, traits: Traits) -> str:
+    """Return how the points break the contract, or an empty string."""
+    if (points.weighted & (np.abs(points.c) < 1)).any():
+        return "a weighted node lies inside a segment"
+    if traits.penalty == "nodal" and (points.weight[points.active] != 1).any():
+        return "a nodal force has a weight other than 1"
     if not (points.pressure[points.active] >= 0).all():
         return "a pressure at an active point is negative or NaN"
     if np.nan_to_num(points.pressure[~points.active]).any():

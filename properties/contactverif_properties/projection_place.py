@@ -28,7 +28,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
-from contactverif.oracle.exact_points import positions
+from contactverif.oracle.exact_points import ExactPoints, Lattice, positions
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_places import (
     LOCAL_REASON,
@@ -36,9 +36,11 @@ from contactverif_properties.shared.exact_places import (
     Places,
     Reported,
     largest,
+    name_places,
     projected_cases,
     refuse_without_rule,
 )
+from contactverif_properties.shared.passes import Pass
 
 GAP = Quantity("error of the gap", "1", "4u", LOCAL_REASON)
 XI = Quantity("error of ξ", "1", "4u", LOCAL_REASON)
@@ -64,16 +66,16 @@ def measure_places(case: Case, subject: Subject) -> Measurement:
         dimensionless.
     """
     reported = Reported.from_case(case, subject)
-    values = dict.fromkeys(_ROUNDINGS, 0.0)
+    values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:
         places = Places.from_pass(each, subject.traits.gap, reported.distant)
-        for name, errors in _errors(places, reported.state.largest_coordinate):
+        for name, errors in (*_errors(places), (POSITION.name, _position_errors(each, far))):
             values[name] = float(np.maximum(values[name], largest(errors)))
     tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
     return Measurement(values, tolerances, idle=not reported.points.active.any())
 
 
-def _errors(places: Places, far: float) -> Iterator[tuple[str, FloatArray]]:
+def _errors(places: Places) -> Iterator[tuple[str, FloatArray]]:
     """Yield the name of each quantity with its errors, NaN only where an active point has NaN."""
     points, view = places.reported, places.view
     facing = np.isfinite(places.scale)
@@ -83,8 +85,15 @@ def _errors(places: Places, far: float) -> Iterator[tuple[str, FloatArray]]:
     yield XI.name, _size(view.xi.errors(points.xi) * length, points.active)[facing]
     turns = view.normal.errors(points.normal)
     yield NORMAL.name, _size(np.hypot(turns[:, 0], turns[:, 1]), points.active)[facing]
-    shifts = positions(places.lattice, places.exact).errors(points.position) / far
-    yield POSITION.name, _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
+
+
+def _position_errors(each: Pass, far: float) -> FloatArray:
+    """Return the errors of positions over X, of all points that name a place, whether they see a master or not."""
+    points = each.points.select(name_places(each.points))
+    lattice = Lattice.from_state(each.interface, each.z)
+    exact = ExactPoints.at(lattice, points.slave_segment, points.c)
+    shifts = positions(lattice, exact).errors(points.position) / far
+    return _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
 
 
 def _size(errors: FloatArray, active: BoolArray) -> FloatArray:

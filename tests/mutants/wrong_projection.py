@@ -101,7 +101,25 @@ _BY_NEAREST_NODE = (
     "distance_to_segment(v.a, arm(v.a, v), node(x, master[k, 0]), node(x, master[k, 1])))"
 )
 
+
+def _beside_no_master(points: Any, interface: Any, x: Any) -> Any:
+    """Return positions moved by the gap, of points that name no master segment."""
+    place = points.position - np.nan_to_num(points.gap)[:, None] * np.nan_to_num(points.normal)
+    return {"position": place, "master_segment": np.full_like(points.master_segment, -1)}
+
+
+def _two_for_half(points: Any, interface: Any, x: Any) -> Any:
+    return {"pressure": 2 * points.pressure, "weight": points.weight / 2}
+
+
+def _points_as_weighted_nodes(points: Any, interface: Any, x: Any) -> Any:
+    return {"weighted": ~points.weighted}
+
+
 MUTANTS = (
+    reports("position of the foot, of nodes without a master segment", PLACE, _beside_no_master, MORTAR),
+    reports("nodal forces doubled over half of a weight", FORCES, _two_for_half, contactverif_nts.nts),
+    reports("points called weighted nodes", FORCES, _points_as_weighted_nodes, STS),
     reports("slave segment of the neighbour reported", PLACE, _previous_slave_segment),
     reports("place on the slave reported from its other end", PLACE, lambda points, *_: {"c": -points.c}),
     reports("another master segment reported", SEGMENT, _other_master_segment),
