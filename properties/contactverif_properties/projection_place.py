@@ -10,9 +10,9 @@ past its end. No patch test on a small mesh near the origin sees either.
 **How it is judged.** The point is formed in rationals from the stored nodes and c, never from the reported position.
 Gap and ξ may differ by 4u(L + |P − A| + D) from the exact ones: L are the lengths of both segments, P is the point, A
 the first node of the master segment, and D the diameter of the interface; ξ is multiplied by its segment's length. So a
-gap that small may have either sign. The normal is compared as a vector, 8u. The position is rounded where it is, 4uX.
-Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the place of
-D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
+gap that small may have either sign. The normal is compared as a vector, 8u (1 + D/ℓ). The position is rounded where it
+is, 4uX. Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the
+place of D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
 
 **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted node is
 a mean, and is not judged here.
@@ -44,7 +44,12 @@ from contactverif_properties.shared.passes import Pass
 
 GAP = Quantity("error of the gap", "1", "4u", LOCAL_REASON)
 XI = Quantity("error of ξ", "1", "4u", LOCAL_REASON)
-NORMAL = Quantity("error of the normal", "1", "8u", "A difference, a root, a division and a turn are rounded.")
+NORMAL = Quantity(
+    "error of the normal",
+    "1",
+    "8u (1 + D/ℓ)",
+    "A difference, a root and a division are rounded, and ends at uD turn a segment.",
+)
 POSITION = Quantity("error of the position", "1", "4u", "Two products and their sum are rounded, relative to X.")
 _ROUNDINGS = {GAP.name: 4, XI.name: 4, NORMAL.name: 8, POSITION.name: 4}
 
@@ -69,13 +74,13 @@ def measure_places(case: Case, subject: Subject) -> Measurement:
     values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:
         places = Places.from_pass(each, subject.traits.gap, reported.distant)
-        for name, errors in (*_errors(places), (POSITION.name, _position_errors(each, far))):
+        for name, errors in (*_errors(places, reported.distant), (POSITION.name, _position_errors(each, far))):
             values[name] = float(np.maximum(values[name], largest(errors)))
     tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
     return Measurement(values, tolerances, idle=not reported.points.active.any())
 
 
-def _errors(places: Places) -> Iterator[tuple[str, FloatArray]]:
+def _errors(places: Places, distant: float) -> Iterator[tuple[str, FloatArray]]:
     """Yield the name of each quantity with its errors, NaN only where an active point has NaN."""
     points, view = places.reported, places.view
     facing = np.isfinite(places.scale)
@@ -83,8 +88,9 @@ def _errors(places: Places) -> Iterator[tuple[str, FloatArray]]:
     yield GAP.name, _size(view.gap.errors(points.gap) / places.scale, points.active)[counted]
     length = view.master_length / places.scale
     yield XI.name, _size(view.xi.errors(points.xi) * length, points.active)[facing]
+    carrier = np.minimum(view.master_length, view.slave_length)  # Rounding the ends of a segment turns it.
     turns = view.normal.errors(points.normal)
-    yield NORMAL.name, _size(np.hypot(turns[:, 0], turns[:, 1]), points.active)[facing]
+    yield NORMAL.name, _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + distant / carrier), points.active)[facing]
 
 
 def _position_errors(each: Pass, far: float) -> FloatArray:
