@@ -20,6 +20,7 @@ _YES_OR_NO = (  # (trait, statement where it is true, statement where it is fals
     ("conserves_force", "conserves force", "does not conserve force"),
     ("conserves_moment", "conserves moment", "does not conserve moment"),
     ("symmetric", "symmetric", "unsymmetric"),
+    ("translation_stable", "stable under translation", "not stable under translation"),
 )
 
 
@@ -71,5 +72,6 @@ def _further_statements(traits: Traits) -> list[str]:
         yes if getattr(traits, name) else no for name, yes, no in _YES_OR_NO if getattr(traits, name) is not None
     ]
     statements += [f"{word} {value}" for word, value in (("area", traits.area), ("penalty", traits.penalty)) if value]
+    statements += [f"gap by {traits.gap}"] if traits.gap else []
     statements += [f"{traits.continuity} when sliding"] if traits.continuity else []
     return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(traits.witnesses.items())]

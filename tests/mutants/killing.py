@@ -14,8 +14,9 @@ from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
-OTHERS = 10  # Cases of each other property, which fill the matrix and decide nothing.
-OTHERS_OF_A_LIST = 1  # The same of properties with a finite list: they are many, and those that solve bodies are slow.
+OTHERS = 8  # Cases of each other property, which fill the matrix and decide nothing.
+OTHERS_OF_A_LIST = 1  # The same of properties with a finite list, which are many.
+OTHERS_SOLVED = 1  # The same of properties that solve bodies, which are slow.
 OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
 SEED = 0
 KEY = "kills"  # under which a row of the matrix travels in the report of a test
@@ -59,7 +60,9 @@ def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
     def examples(question: Property) -> int | None:
         if question.id == mutant.caught_by:
             return None
-        return OTHERS_OF_A_LIST if isinstance(question.cases(None), tuple) else others
+        if isinstance(question.cases(None), tuple):
+            return OTHERS_OF_A_LIST
+        return OTHERS_SOLVED if question.bodies and others == OTHERS else others
 
     return {question.id: caught_at(question, subject, examples(question)) for question in properties()}
 
