@@ -134,7 +134,7 @@ class PropertyInfo:
         The numbers that are measured and judged.
     needs : frozenset[str]
         The parts of the contract without which the property cannot be checked, {"pair", "tangent",
-        "contact_points"}.
+        "contact_points"}. Who leaves out a tangent that the traits promise breaks a promise; other parts are optional.
     series : Mapping[str, str]
         {name: unit} of the numbers by iterate that a measurement may hold.
     kinds : tuple[str, ...]

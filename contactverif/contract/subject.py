@@ -21,6 +21,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
+STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
 
 class Subject:

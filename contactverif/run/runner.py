@@ -25,7 +25,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
-from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.subject import OPTIONAL_PARTS, STATED_PARTS, Subject
 from contactverif.run.driver import SHRINK_CALLS, CaseSource, PlannedCases, draw_cases, shrink
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
@@ -237,7 +237,9 @@ def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
     if reason := question.applicable(subject.traits):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
-        return replace(row, verdict=Verdict.NOT_PROVIDED, reason=f"{', '.join(sorted(missing))}: not provided")
+        promise = row.promise if missing & STATED_PARTS else None
+        reason = f"{', '.join(sorted(missing))}: not provided"
+        return replace(row, verdict=Verdict.NOT_PROVIDED, promise=promise, reason=reason)
     source = plan.source(question)
     if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")

@@ -400,6 +400,12 @@ def test_a_promise_about_a_missing_part_is_broken() -> None:
     assert row.unexpected == "promised to pass, but a part that it needs is not provided"
 
 
+def test_a_missing_part_that_no_trait_speaks_of_breaks_no_promise() -> None:
+    row = one_row(subject(passes_flat_patch=True), replace(ZERO, needs=frozenset({"contact_points"})))
+    assert (row.verdict, row.reason) == (Verdict.NOT_PROVIDED, "contact_points: not provided")
+    assert (row.promise, row.unexpected) == (None, "")
+
+
 def test_the_given_interface_reaches_the_strategy() -> None:
     interface = a_case(4).interface
     question = replace(ZERO, cases=lambda argument: sizes(3) if argument is interface else None)
