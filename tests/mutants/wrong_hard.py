@@ -70,8 +70,8 @@ def _is_between_two_segments(interface: Any, x: Any, points: Any) -> Any:
         return np.zeros(len(distances), bool)
     near = distances[rows, order[:, 1]] - distances[rows, order[:, 0]] < 1e-5 * lengths.min()
     tangents = along / lengths[:, None]
-    one, other = tangents[order[:, 0]], tangents[order[:, 1]]
-    turned = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) > 1e-3
+    first, second = tangents[order[:, 0]], tangents[order[:, 1]]
+    turned = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3
     return near & turned
 
 

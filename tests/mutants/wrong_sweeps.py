@@ -29,7 +29,7 @@ def _adds_large_numbers(penalty: float) -> Any:
 
 
 MUTANTS = (
-    Mutant("differences in single precision", SWEEP,
+    Mutant("differences in single precision, of named states", SWEEP,
            lambda *, penalty: _keeps_differences_in_single_precision(penalty)),
     Mutant("stiff springs that lose digits", STIFFNESS, lambda *, penalty: _adds_large_numbers(penalty)),
 )  # fmt: skip
