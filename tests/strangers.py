@@ -93,6 +93,20 @@ class PointsFirst:
         return forces.reshape(-1)
 
 
+class TurnedFrame(PointsFirst):
+    """The same from one node in a frame along the first slave segment, and the normals turned back."""
+
+    traits = replace(PointsFirst.traits, translation_stable=True)
+    places = np.array([-0.5, 0.5])
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> ContactPoints:
+        x = z.reshape(-1, 2)
+        along = _unit(x[1] - x[0])
+        frame = np.array([along, [-along[1], along[0]]])
+        points = super().contact_points(interface, pairing, ((x - x[0]) @ frame.T).reshape(-1))
+        return replace(points, position=self._points(interface, z)[3], normal=points.normal @ frame)
+
+
 class SlaveNormalAtGaussPoints(PointsFirst):
     """Springs at two Gauss points of each slave segment, along its normal; a point that sees nothing is not reported.
 
@@ -165,6 +179,7 @@ class NearbyOnly(PointsFirst):
 
 STRANGERS = {
     "points first, no tolerance, the last of ties": PointsFirst,
+    "points in a frame along the first segment": TurnedFrame,
     "two Gauss points along the slave's normal": SlaveNormalAtGaussPoints,
     "points that look no farther than a segment": NearbyOnly,
 }

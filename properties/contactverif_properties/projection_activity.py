@@ -112,15 +112,15 @@ def _without_place(points: ContactPoints) -> BoolArray:
 def _decide(places: Places, rule: str | None) -> tuple[BoolArray, BoolArray]:
     """Return at which points (n_points,) every right formulation decides alike, and whether it decides for contact."""
     points, view = places.reported, places.view
-    rounding = 4 * UNIT_ROUNDOFF * places.scale
+    rounding, foot_rounding = 4 * UNIT_ROUNDOFF * places.gap_scale, 4 * UNIT_ROUNDOFF * places.foot_scale
     gap, xi, length = view.gap.floats(), view.xi.floats(), view.master_length
     past = np.stack([-xi, xi - 1], axis=1) * length[:, None]  # Past the first end, and past the second.
     certain = (np.abs(gap) > rounding) & (np.abs(gap) <= DEEP * (length + view.slave_length)) & ~points.weighted
     if rule != CLOSEST:
-        return certain & (past < -rounding[:, None]).all(axis=1), gap < 0
+        return certain & (past < -foot_rounding[:, None]).all(axis=1), gap < 0
     free = places.interface.master.neighbours[points.master_segment] < 0
     beyond = free & (past >= length[:, None])
-    near_end = free & ~beyond & (past > -rounding[:, None])
+    near_end = free & ~beyond & (past > -foot_rounding[:, None])
     usable = points.active | (places.facing & (points.weight != 0))
     return certain & usable & ~near_end.any(axis=1), (gap < 0) & ~beyond.any(axis=1)
 

@@ -69,11 +69,10 @@ def measure_areas(case: Case, subject: Subject) -> Measurement:
     Measurement
         The largest difference of a weight from the length of its area, the largest length by which an area leaves its
         segment, its point or overlaps another, both over the lengths that it is formed from; the error of a sum over
-        the same. All are dimensionless. Broken: a weight is negative or NaN.
+        the same. All are dimensionless. Broken: a weight is negative or NaN, or idle points are left out.
     """
     reported = Reported.from_case(case, subject)
     values = dict.fromkeys((WEIGHT.name, ENDS.name, SUM.name), 0.0)
-    broken = "" if (reported.points.weight >= 0).all() else "a weight is negative or NaN"
     one_pass = not reported.points.on_master.any()
     for each in reported.passes:
         lengths = _lengths(each, subject.traits)
@@ -81,7 +80,22 @@ def measure_areas(case: Case, subject: Subject) -> Measurement:
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
     tolerances = {WEIGHT.name: 16 * UNIT_ROUNDOFF, ENDS.name: 16 * UNIT_ROUNDOFF, SUM.name: 64 * UNIT_ROUNDOFF}
-    return Measurement(values, tolerances, broken=broken, idle=not reported.points.active.any())
+    fits = values[SUM.name] <= tolerances[SUM.name]
+    return Measurement(values, tolerances, broken=_breach(reported, fits=fits), idle=not reported.points.active.any())
+
+
+def _breach(reported: Reported, *, fits: bool) -> str:
+    """Return how the points break the contract, or an empty string; `fits` says that weights have the right sums.
+
+    Idle points are left out if no point is idle, and lengths are missing.
+    """
+    points = reported.points
+    if not (points.weight >= 0).all():
+        return "a weight is negative or NaN"
+    length = sum(float(_lengths(each, reported.traits)[0].sum()) for each in reported.passes)
+    if not fits and points.active.all() and float(points.weight.sum()) < length:
+        return "every reported point is active, and a length is missing: report all contact points, active or not"
+    return ""
 
 
 def _lengths(each: Pass, traits: Traits) -> list[FloatArray]:

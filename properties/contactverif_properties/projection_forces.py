@@ -13,13 +13,14 @@ computed misleads them, and no other question sees it: the forces are right.
 - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
   the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
 - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
-  Foot and gap along the slave's normal are quotients by the cosine between the surfaces, which is allowed for.
+  Foot and gap along the slave's normal are quotients by the cosine between the surfaces, and rounding the ends of a
+  segment turns its normal by uD/ℓ, both of which is allowed for.
 - Pressure = −ε̂ × gap at active points, for a penalty whose traits state the configuration of areas (and with it that
   it is linear), except where pressures are interpolated between nodes.
 
-Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X and the lengths that they are
-formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the diameter D where the
-traits do not promise `translation_stable`.
+Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X, |gap| D/ℓ and the lengths that they
+are formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the diameter D where
+the traits do not promise `translation_stable`.
 
 **Undecided.** Never. What does not hold for a formulation by its traits is not measured.
 """
@@ -34,7 +35,14 @@ from contactverif.contract.formulation import ContactPoints, Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.exact_places import PROJECTED_KINDS, Reported, largest, name_places, projected_cases
+from contactverif_properties.shared.exact_places import (
+    CLOSEST,
+    PROJECTED_KINDS,
+    Reported,
+    largest,
+    name_places,
+    projected_cases,
+)
 from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.roundoff import sum_slave_forces
 
@@ -47,7 +55,12 @@ FORCES = Quantity(
     "u(8D/min(g, ℓ) + 4N) + Δn",
     "Both are sums of N rounded gaps and normals; a straight slave is rounded too.",
 )
-FOOT = Quantity("position − foot against gap × normal", "1", "16u", "Each vector is a sum of rounded products.")
+FOOT = Quantity(
+    "position − foot against gap × normal",
+    "1",
+    "16u",
+    "Each vector is a sum of rounded products, and a segment whose ends are rounded turns by uD/ℓ.",
+)
 LAW = Quantity("pressure against −ε̂ × gap", "1", "8u", "The gap may be formed anew for the pressure.")
 
 
@@ -76,7 +89,7 @@ def measure_account(case: Case, subject: Subject) -> Measurement:
         values[FORCES.name], tolerance = _compare_forces(reported, difference)
         tolerances[FORCES.name] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
     if subject.traits.gap is not None:
-        values[FOOT.name] = max((_foot_error(each) for each in reported.passes), default=0.0)
+        values[FOOT.name] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
         tolerances[FOOT.name] = 16 * UNIT_ROUNDOFF
     if _has_linear_law(subject.traits):
         penalty = 1.0 if state.n_multipliers else subject.penalty(state)
@@ -167,11 +180,12 @@ def _thinness(reported: Reported) -> float:
     return thinness
 
 
-def _foot_error(each: Pass) -> float:
+def _foot_error(each: Pass, reported: Reported) -> float:
     """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from.
 
     A foot along the slave's normal is a quotient by the cosine of the angle between the surfaces, and so is its gap. So
-    the lengths are over that cosine.
+    the lengths are over that cosine. A kernel that rounds nodes at D turns the segment whose normal it takes by uD/ℓ,
+    which moves the end of gap × normal by |gap| uD/ℓ, and ξ past an end by |ξ| uD/ℓ.
     """
     named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
     points = each.points.select(named & np.isfinite(each.points.gap))
@@ -179,8 +193,13 @@ def _foot_error(each: Pass) -> float:
     arm, along = points.position - first, second - first
     errors = arm - points.xi[:, None] * along - points.gap[:, None] * points.normal
     far = np.abs(each.positions).max()
-    size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * np.hypot(along[:, 0], along[:, 1])
-    cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / np.hypot(*along.T)
+    length = np.hypot(along[:, 0], along[:, 1])
+    carrier = each.interface.slave.lengths(each.positions)[points.slave_segment]
+    if reported.traits.gap == CLOSEST:
+        carrier = length
+    size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * length
+    size += reported.distant * (np.abs(points.gap) / carrier + np.abs(points.xi))
+    cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / length
     return largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)
 
 

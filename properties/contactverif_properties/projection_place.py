@@ -9,10 +9,12 @@ past its end. No patch test on a small mesh near the origin sees either.
 
 **How it is judged.** The point is formed in rationals from the stored nodes and c, never from the reported position.
 Gap and ξ may differ by 4u(L + |P − A| + D) from the exact ones: L are the lengths of both segments, P is the point, A
-the first node of the master segment, and D the diameter of the interface; ξ is multiplied by its segment's length. So a
-gap that small may have either sign. The normal is compared as a vector, 8u (1 + D/ℓ). The position is rounded where it
-is, 4uX. Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the
-place of D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
+the first node of the master segment, and D the diameter of the interface. So a gap that small may have either sign. ξ
+is multiplied by its segment's length; |gap| D/ℓ is added for it, since a segment of length ℓ whose ends are rounded
+turns, and a foot moves by the angle times the gap. Past an end of the segment by ξ', D (1 + ξ') takes the place of D.
+The normal is compared as a vector, 8u (1 + D/ℓ). The position is rounded where it is, 4uX. Along the slave's normal the
+first tolerance is over the cosine of the angle between the segments. X takes the place of D where the traits do not
+promise `translation_stable`: points that are formed first are rounded there.
 
 **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted node is
 a mean, and is not judged here.
@@ -31,6 +33,7 @@ from contactverif.contract.subject import Subject
 from contactverif.oracle.exact_points import ExactPoints, Lattice, positions
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_places import (
+    FOOT_REASON,
     LOCAL_REASON,
     PROJECTED_KINDS,
     Places,
@@ -43,7 +46,7 @@ from contactverif_properties.shared.exact_places import (
 from contactverif_properties.shared.passes import Pass
 
 GAP = Quantity("error of the gap", "1", "4u", LOCAL_REASON)
-XI = Quantity("error of ξ", "1", "4u", LOCAL_REASON)
+XI = Quantity("error of ξ", "1", "4u", FOOT_REASON)
 NORMAL = Quantity(
     "error of the normal",
     "1",
@@ -85,8 +88,8 @@ def _errors(places: Places, distant: float) -> Iterator[tuple[str, FloatArray]]:
     points, view = places.reported, places.view
     facing = np.isfinite(places.scale)
     counted = facing & ~points.weighted
-    yield GAP.name, _size(view.gap.errors(points.gap) / places.scale, points.active)[counted]
-    length = view.master_length / places.scale
+    yield GAP.name, _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[counted]
+    length = view.master_length / places.foot_scale
     yield XI.name, _size(view.xi.errors(points.xi) * length, points.active)[facing]
     carrier = np.minimum(view.master_length, view.slave_length)  # Rounding the ends of a segment turns it.
     turns = view.normal.errors(points.normal)

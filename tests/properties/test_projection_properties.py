@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strangers import STRANGERS, PointsFirst
+from strangers import STRANGERS, PointsFirst, TurnedFrame
 from subjects import Changed, load_property, load_subject
 
 from contactverif.contract.case import Case
@@ -139,6 +139,46 @@ def test_far_away_only_who_promises_it_must_keep_the_digits_of_a_gap() -> None:
     assert outcome_of("projection.place", far, Subject("modest", Modest)).verdict is Verdict.PASS
     assert outcome_of("projection.place", far, Subject("boaster", Boaster)).verdict is Verdict.FAIL
     assert outcome_of("projection.place", case, Subject("boaster", Boaster)).verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize(
+    ("property_id", "slave", "master"),
+    [
+        (  # The gap is 14 times the length of the master's first segment: its rounded ends turn it, and move the foot.
+            "projection.place",
+            [[3.4006461747170564, -16.374975630612603], [3.4146088016442424, -8.374987815306302], [24 / 7, -0.375]],
+            [[5, -0.125], [4, 0], [0, 0]],
+        ),
+        (  # The foot is 6000 lengths past the end of the segment opposite.
+            "projection.forces",
+            [[64, 0], [0, 0]],
+            [[6.975446428571428e-05, -0.0019975142045454545], [0.007882254464285714, -0.0019975142045454545]],
+        ),
+    ],
+)
+def test_a_kernel_that_turns_coordinates_may_turn_a_segment_by_the_rounding_of_its_ends(
+    property_id: str, slave: list[list[float]], master: list[list[float]]
+) -> None:
+    interface = Interface.from_chains(np.array(slave, float), np.array(master, float))
+    case = Case(interface, interface.nodes.reshape(-1), 1.0)
+    outcome = outcome_of(property_id, case, Subject("turned", TurnedFrame))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+def test_who_reports_only_active_points_is_told_so_in_words() -> None:
+    class OnlyActive(PointsFirst):
+        def contact_points(self, *state: Any) -> ContactPoints:
+            points = super().contact_points(*state)
+            return points.select(points.active)
+
+    case, reason = over_a_vertex(0.0, place=1.0), "every reported point is active, and a length is missing"
+    for heights in ([-0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]):
+        positions = case.positions.copy()
+        positions[:2, 1] = heights
+        outcome = outcome_of(
+            "projection.area", replace(case, z=positions.reshape(-1)), Subject("only-active", OnlyActive)
+        )
+        assert (reason in outcome.reason) == (max(heights) > 0), outcome.reason
 
 
 def test_points_of_a_second_pass_are_judged_with_roles_exchanged() -> None:

@@ -41,6 +41,7 @@ LOCAL_REASON = (
     "normal over the cosine. A kernel that centres its coordinates rounds them at D; X takes the place of D where the "
     "traits do not promise `translation_stable`."
 )
+FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ, which moves a foot by |gap| uD/ℓ."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,6 +110,11 @@ class Places:
     scale : FloatArray, shape (n_points,)
         The length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over the
         cosine; infinite where the rule sees nothing of the segment.
+    gap_scale : FloatArray, shape (n_points,)
+        The same for the gap. Past an end of the master segment by ξ', its ends are extrapolated: D ξ' is added.
+    foot_scale : FloatArray, shape (n_points,)
+        The same for the foot. Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which
+        moves the foot by |gap| uD/ℓ. So |gap| D/ℓ is added too.
     facing : BoolArray, shape (n_points,)
         True where the slave segment and the master segment run against each other.
     """
@@ -119,6 +125,8 @@ class Places:
     exact: ExactPoints
     view: View
     scale: FloatArray
+    gap_scale: FloatArray
+    foot_scale: FloatArray
     facing: BoolArray
 
     @classmethod
@@ -130,9 +138,14 @@ class Places:
         look = closest_view if rule == CLOSEST else slave_normal_view
         view = look(lattice, exact, points.master_segment)
         with np.errstate(divide="ignore"):
-            scale = np.where(view.cosine > 0, (view.lengths + distant) / np.abs(view.cosine), np.inf)
+            over, xi = np.where(view.cosine > 0, 1 / np.abs(view.cosine), np.inf), view.xi.floats()
+        carrier = view.master_length if rule == CLOSEST else view.slave_length
+        size = view.lengths + distant
+        gap_size = size + distant * np.maximum(0, np.maximum(-xi, xi - 1))
+        foot_size = gap_size + distant * np.abs(view.gap.floats()) / carrier
+        scales = (size * over, gap_size * over, foot_size * over)
         facing = run_against(lattice, exact, points.master_segment)
-        return cls(each.interface, lattice, points, exact, view, scale, facing)
+        return cls(each.interface, lattice, points, exact, view, *scales, facing)
 
 
 def name_places(points: ContactPoints) -> BoolArray:
