@@ -94,7 +94,7 @@ class PointsFirst:
 
 
 class TurnedFrame(PointsFirst):
-    """The same from one node in a frame along the first slave segment, and the normals turned back."""
+    """Springs at two points of each slave segment, computed in a frame along the first one, and turned back."""
 
     traits = replace(PointsFirst.traits, translation_stable=True)
     places = np.array([-0.5, 0.5])
