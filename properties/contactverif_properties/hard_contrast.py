@@ -1,6 +1,6 @@
 """Ask whether the choice of the slave matters where stiffness and mesh differ much.
 
-**Question.** A block with 16 segments lies on one with 3. Either is the slave, and either is softer by 1e6, or they are
+**Question.** A block with 8 segments lies on one with 2. Either is the slave, and either is softer by 1e6, or they are
 equally stiff. Is the stress of a uniform pressure exact at 10 E/h and at 1e5 E/h?
 
 **Why it matters.** Manuals tell users to take the softer or the finer body as the slave, and warn of locking otherwise.

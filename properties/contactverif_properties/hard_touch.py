@@ -1,7 +1,7 @@
 """Ask whether surfaces that just touch give neither a force nor nonsense.
 
-**Question.** Flat surfaces touch at 1020 angles: the gap is exactly 0, or 1e-16 open or closed. Is the force no more
-than roundoff makes it, and is the tangent that of a spring across the surface, or of none?
+**Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. Is the force no
+more than roundoff makes it, and is the tangent that of a spring across the surface, or of none?
 
 **Why it matters.** A normal that is computed as the difference of point and foot over their distance is 0/0 in touch,
 and has any direction at 1e-16. The force is tiny then, and the tangent is as wrong as can be: Newton's method slides
@@ -9,9 +9,12 @@ the bodies.
 
 **How it is judged.** The first number is the largest nodal force over ε̂ h, a length, in units of the largest
 coordinate X, h the longest slave segment: at most 4 (8u + |g|/X), since a gap is rounded to 8uX, and springs act in two
-passes at most. With an exact tangent, the slave is moved along its surface: no gap changes, so the derivative of a
-force is at most that of rounded directions, 64 u X/ℓ + 4|g|/ℓ, over ε̂ h. Moved across its surface, it meets between no
-resistance (open) and that of all springs, 4 ε̂ L. All multipliers are 0 here.
+passes at most. With an exact tangent, the slave is moved across its surface. It meets between no resistance (open) and
+that of all springs, 4 ε̂ L. Near the origin, where the gap is ±1e-16, it is also moved along its surface, with the
+slave d = 64 u X deeper. No gap changes, so the derivative of a force is at most that of rounded directions,
+64 u X/ℓ + 4(|g| + d)/ℓ, over ε̂ h. At a gap of 0 there is no derivative: the columns of a complex step take the side of
+their own rounding there, each for itself. At d every gap has its sign in spite of its rounding of 8 u X, while a normal
+that is a difference over a distance still turns by u X/d = 1/64. All multipliers are 0 here.
 
 **Undecided.** Never: contact may be active or not, and the numbers allow for both.
 """
@@ -28,12 +31,15 @@ from contactverif.contract.subject import Subject
 from contactverif.scenes.touching_states import touching_states
 from contactverif_properties.shared.finite_lists import unless_given
 
-_TWO_PASSES = "Springs act in two passes at most, on n + 1 nodes for n segments."
+_DEPTH = 64.0  # The depth over u X. It is eight times what a gap is rounded to, so that each has its sign.
 FORCE = Quantity(
     "force in touch", "1", "4 (8u + |g|/X)", "A gap is rounded to 8uX, and springs act in two passes at most."
 )
 SLIDING = Quantity(
-    "stiffness along the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "Rounding the ends of a segment turns its normal by uX/ℓ."
+    "stiffness along the surface",
+    "1",
+    "64 u X/ℓ + 4(|g| + d)/ℓ",
+    "Rounding the ends of a segment turns its normal by uX/ℓ. d = 64 u X is the depth of the state.",
 )
 PRESSING = Quantity(
     "stiffness across the surface", "1", "4", "Springs act in two passes at most, on n + 1 nodes for n segments."
@@ -54,9 +60,9 @@ def measure_touch(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        All dimensionless. The largest nodal force over ε̂ h X. With an exact tangent K also the largest entry of K t
-        over ε̂ h, t a motion of the slave along its surfaces, and n·K n over ε̂ L, n a motion across them, and its
-        negative.
+        All dimensionless. The largest nodal force over ε̂ h X. With an exact tangent K also n·K n over ε̂ L, n a motion
+        of the slave across its surfaces, and its negative. Where the gap is not exactly 0, also the largest entry of
+        K t over ε̂ h, 64 u X deeper, t a motion along the surfaces.
     """
     formulation, interface = subject.for_case(case), case.interface
     state = case.with_multipliers(np.zeros(formulation.n_multipliers(interface)))
@@ -71,13 +77,16 @@ def measure_touch(case: Case, subject: Subject) -> Measurement:
         tangent = dense(formulation.tangent(interface, pairing, state.z))[:n, :n]
         along, across = _motions(case)
         resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
-        values |= {
-            SLIDING.name: float(np.abs(tangent @ along).max()) / (case.penalty * longest),
-            PRESSING.name: resistance,
-            PULLING.name: -resistance,
-        }
+        values |= {PRESSING.name: resistance, PULLING.name: -resistance}
         roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
-        tolerances |= {SLIDING.name: roundoff, PRESSING.name: 4.0, PULLING.name: roundoff}
+        tolerances |= {PRESSING.name: 4.0, PULLING.name: roundoff}
+        if gap:
+            depth = _DEPTH * UNIT_ROUNDOFF * size
+            z = state.z.copy()
+            z[:n] -= depth * across
+            tangent = dense(formulation.tangent(interface, formulation.pair(interface, z), z))[:n, :n]
+            values[SLIDING.name] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
+            tolerances[SLIDING.name] = roundoff + 4 * depth / case.shortest_segment
     return Measurement(values, tolerances)
 
 

@@ -187,7 +187,7 @@ def test_a_normal_over_a_distance_of_zero_is_no_number() -> None:
             return super().residual(interface, pairing, z) * (distance / distance)
 
     naive = Subject("naive", lambda *, penalty: Naive(penalty, places=(0.0, 1.0)))
-    assert judge_named("hard.touch", "gap 0, 0.0° to 6.7°", naive).breach
+    assert judge_named("hard.touch", "gap 0, 0.00° to 1.08°", naive).breach
 
 
 def test_without_a_load_a_law_that_is_not_linear_is_not_accused() -> None:

@@ -72,7 +72,7 @@ def test_names_are_different_in_all_lists() -> None:
     assert len(set(names)) == len(names)
 
 
-def test_surfaces_touch_exactly_at_1020_angles() -> None:
+def test_surfaces_touch_exactly_at_1000_angles() -> None:
     angles = set()
     for case in touching_states():
         if case.parameter("shift") != 0:
@@ -81,7 +81,20 @@ def test_surfaces_touch_exactly_at_1020_angles() -> None:
             assert project_point(case.interface, case.z, segment, -1.0).signed_squared_gap == 0
             assert project_point(case.interface, case.z, segment, 0.5).signed_squared_gap == 0
         angles |= {tuple(direction) for direction in case.parameters["directions"].tolist()}
-    assert len(angles) == 1020
+    assert len(angles) == 1000
+
+
+def test_no_surface_in_touch_is_above_or_below_another_pair() -> None:
+    """Along a slave segment the masters of other pairs lie before its first node or past its second one."""
+    for case in touching_states():
+        x = case.positions
+        for first, second in case.interface.slave.segments:
+            along = x[second] - x[first]
+            direction = case.parameters["directions"][first]
+            for segment in case.interface.master.segments:
+                places = (x[segment] - x[first]) @ along / (along @ along)
+                own = (case.parameters["directions"][segment[0]] == direction).all()
+                assert own or places.max() < 0 or places.min() > 1
 
 
 @pytest.mark.parametrize("shift", [1e-16, -1e-16])
