@@ -66,22 +66,29 @@ def test_every_formulation_is_in_the_table() -> None:
     assert set(standalone_names()) <= set(FAILS)
 
 
-@pytest.mark.parametrize(
-    "property_id", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in property_ids()]
-)
-@pytest.mark.parametrize("name", FAILS)
-def test_what_it_does_and_that_it_promised_so(name: str, property_id: str) -> None:
+@pytest.mark.parametrize("property_id", property_ids())
+def test_what_formulations_do_and_that_they_promised_so(property_id: str) -> None:
+    """One test judges all formulations, so that the cases of a property are drawn and judged once."""
+    complaints = {name: _complaint(name, property_id) for name in FAILS}
+    assert not {name: complaint for name, complaint in complaints.items() if complaint}
+
+
+def _complaint(name: str, property_id: str) -> str:
+    """Return what differs from theory in a row, or an empty string."""
     row, verdict = row_of(name, property_id), expected_verdict(name, property_id)
-    assert row.verdict is verdict, row.reason
-    assert not row.unexpected
-    if verdict is not Verdict.NOT_APPLICABLE:
-        if property_id.startswith("hard."):  # Finite lists; who fails there states nothing about them.
-            assert row.promise in (None, verdict is Verdict.PASS)
-            assert row.planned == len(load_property(property_id).cases(None))
-        else:
-            assert row.promise is (verdict is Verdict.PASS)
-            assert row.planned == 100
-        assert row.judged >= 0.9 * row.planned
+    if row.verdict is not verdict:
+        return f"{row.verdict} in place of {verdict}: {row.reason}"
+    if row.unexpected or verdict is Verdict.NOT_APPLICABLE:
+        return row.unexpected
+    named = load_property(property_id).cases(None)
+    planned = len(named) if isinstance(named, tuple) else 100
+    # Who fails a hard case states nothing about it.
+    promises = (None, verdict is Verdict.PASS) if property_id.startswith("hard.") else (verdict is Verdict.PASS,)
+    if row.promise not in promises:
+        return f"the promise is {row.promise}"
+    if row.planned != planned or row.judged < 0.9 * planned:
+        return f"{row.judged} of {row.planned} judged, of {planned}"
+    return ""
 
 
 def test_the_table_in_the_readme_is_what_is_expected() -> None:
@@ -230,6 +237,7 @@ def test_what_promises_nothing_is_never_accused() -> None:
         FORCE,
         MOMENT,
         DEAD_ZONE,
+        "hard.dead-zone",
     } | INEXACT
     assert result.promises_kept
 
@@ -268,7 +276,15 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
     judged = {row.property_id: row.verdict for row in result.rows}
     assert {judged.pop(name) for name in (*PATCHES, "unilateral")} == {Verdict.FAIL}
     assert {judged.pop(name) for name in (RESULTANT, RANK, COMPLEMENTARITY)} == {Verdict.NOT_APPLICABLE}
-    assert set(judged.values()) == {Verdict.NOT_JUDGED}
+    # Some hard cases ask that nothing happens, and so does this formulation.
+    quiet = {"hard.free-end", "hard.steep-slave", "hard.touch", "hard.zero-load"}
+    assert {name for name, verdict in judged.items() if verdict is Verdict.PASS} == quiet
+    assert {name for name in judged if name.startswith("hard.") and judged[name] is Verdict.NOT_JUDGED} == {
+        "hard.concave-corner",
+        "hard.convex-kink",
+    }
+    others = {verdict for name, verdict in judged.items() if not name.startswith(("hard.", "projection."))}
+    assert others == {Verdict.NOT_JUDGED, Verdict.NOT_APPLICABLE}
 
 
 @pytest.mark.parametrize("seed", [0, 1])
