@@ -63,7 +63,7 @@ def measure_local(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        ω of the forces, or of the total force, dimensionless.
+        The number of roundings ω of the forces, or of the total force, dimensionless.
     """
     formulation = subject.for_case(case)
     count = formulation.n_multipliers(case.interface)

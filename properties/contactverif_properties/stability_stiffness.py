@@ -96,7 +96,7 @@ def measure_stiffness(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        ω, dimensionless, with the details of `stability.sweep`.
+        The number of roundings ω, dimensionless, with the details of `stability.sweep`.
     """
     scene, motion = scene_of(case), ExactMotion.from_case(case)
     u = exact_unknowns(scene, pressure_of(case, case.penalty), case.penalty)

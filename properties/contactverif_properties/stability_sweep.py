@@ -71,8 +71,8 @@ def measure_sweep(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        ω, dimensionless. Details: the relative error and the condition number of the worst row, and the largest error
-        of a force over the largest force.
+        The number of roundings ω, dimensionless. Details: the relative error and the condition number of the worst row,
+        and the largest error of a force over the largest force.
     """
     formulation, case = prepare_state(case, subject)
     n = case.interface.n_unknowns

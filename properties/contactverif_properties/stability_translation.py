@@ -57,7 +57,7 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        ω of the forces on the pairing of the state at the origin, and on the pairing of the far state; the change of
+        Numbers ω of the forces on the pairing of the state at the origin, and on that of the far state; the change of
         the tangent in units of u D max(max|K|/ℓ, max|dK/dx|). All are dimensionless.
     """
     formulation, near = prepare_state(case, subject)

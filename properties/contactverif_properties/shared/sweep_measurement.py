@@ -32,8 +32,8 @@ def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error
     Returns
     -------
     Measurement
-        ω against 16. Details: error and condition number of the row with that ω, and the largest error of a force over
-        the largest force.
+        The number of roundings ω against 16. Details: error and condition number of the row with that ω, the largest
+        error of a force over the largest force.
     """
     worst = conditioning.worst_row(error)
     n = 2 * (len(error) - len(conditioning.reach))

@@ -114,13 +114,13 @@ def _draw_panel(axes: Axes, panel: SweepPanel) -> None:
     axes.axhline(_LOW / 1.8, color="0.8", linewidth=0.5)
     for sweep in SWEEPS:
         points = [point for point in panel.points if point.sweep == sweep]
-        at = [min(point.condition, _CONDITIONS[1]) for point in points]
+        conditions_of_points = [min(point.condition, _CONDITIONS[1]) for point in points]
         errors = [min(max(point.error, _LOW), _HIGH / 2) if point.error > 0 else _ZERO for point in points]
-        axes.plot(at, errors, **_pen(sweep), zorder=3)
+        axes.plot(conditions_of_points, errors, **_pen(sweep), zorder=3)
     colour = "#B03A00" if panel.above else "0.25"
     axes.set_title(panel.formulation, loc="left", fontweight="bold", pad=11)
-    at = {"xycoords": "axes fraction", "textcoords": "offset points", "xytext": (0, 2.5)}
-    notes: list[Any] = [axes.annotate(_verdict(panel), (0, 1), fontsize=_SMALL_TEXT, color=colour, **at)]
+    above: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "xytext": (0, 2.5)}
+    notes: list[Any] = [axes.annotate(_verdict(panel), (0, 1), fontsize=_SMALL_TEXT, color=colour, **above)]
     if panel.above:  # The lower right corner is free: so exact a force at so large a κ would be a coincidence.
         name = f"worst:\n{panel.above[0].name}"
         place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
