@@ -18,7 +18,7 @@ import contactverif
 from contactverif.cli.app import app
 from contactverif.run.registry import formulation_names, property_ids
 
-QUICK = ("--examples", "5")  # The pages ask for a hundred.
+QUICK = ("--examples", "10")  # The pages ask for a hundred.
 TUTORIAL = DOCS / "tutorial"
 QUOTING = [page for page in pages() if any(quote.kind == "output" and not quote.foreign for quote in quotes(page))]
 VERDICT = re.compile(
