@@ -8,7 +8,8 @@ A page marks a quotation by a comment before the block:
     <!-- source: FILE CLASS -->            a class of it
 
 An output is cut into pieces, each of which begins with a line that is not indented. A piece is kept if its first line
-matches one of the patterns; `all` keeps everything. One line with "…" stands for pieces that are left out.
+matches one of the patterns; `all` keeps everything. One line with "…" stands for pieces that are left out, and for rows
+of a piece that match a pattern after "not ".
 
 Rules for the next editor: nobody writes a quotation by hand, and a page runs its commands in order, in one folder.
 """
@@ -220,14 +221,30 @@ def excerpt(output: str, patterns: str) -> str:
     lines = [line.rstrip() for line in output.splitlines()]
     if patterns == "all":
         return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n") + "\n"
-    tests = [re.compile(pattern.strip()) for pattern in patterns.split(" | ")]
+    words = [pattern.strip() for pattern in patterns.split(" | ")]
+    tests = [re.compile(word) for word in words if not word.startswith("not ")]
+    rows = [re.compile(word.removeprefix("not ")) for word in words if word.startswith("not ")]
     excerpt_lines: list[str] = []
     for piece in _pieces(lines):
         if any(test.search(piece[0]) for test in tests):
-            excerpt_lines += piece
+            excerpt_lines += _without_rows(piece, rows)
         elif excerpt_lines and excerpt_lines[-1] != "…":
             excerpt_lines.append("…")
     return re.sub(r"\n{3,}", "\n\n", "\n".join(excerpt_lines)).strip("\n…") + "\n"
+
+
+def _without_rows(piece: list[str], rows: Sequence[re.Pattern[str]]) -> list[str]:
+    """Return a piece without the rows that match, and without the remarks below them; "…" stands for them."""
+    left: list[str] = []
+    dropped = False
+    for line in piece:
+        is_remark = line.startswith(" " * 6)
+        dropped = dropped if is_remark else any(row.search(line) for row in rows)
+        if not dropped:
+            left.append(line)
+        elif left[-1] != "  …":
+            left.append("  …")
+    return left
 
 
 def _pieces(lines: Sequence[str]) -> list[list[str]]:
