@@ -63,8 +63,8 @@ FOLLOWS = {
 WITHOUT_AREA = ("nts", "nts-lm", "two-pass/nts", "two-pass/nts-ar", "two-pass/nts-lm")
 WITH_MULTIPLIERS = ("nts-lm", "vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm", "mortar-lm", "mortar-dual-lm")
 NOT_UNIQUE = ("vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm")  # With redundant multipliers Newton has no limit.
-# A compiled kernel takes no long double, so nothing exact is known of formulations that promise neither the patch test
-# for pressures nor an area.
+# These state neither an area nor pressures that pass the patch test, and a compiled kernel takes no long double. So no
+# exact force of theirs is known.
 WITHOUT_EXACT_FORCES = ("nts", "nts-lm", "vts-me-lm", "two-pass/nts", "two-pass/nts-ar", "two-pass/nts-lm")
 NEEDS_MULTIPLIERS = frozenset({RANK, COMPLEMENTARITY})
 NEEDS_SOLUTION = frozenset(
