@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from contactverif.scenes.blocks import two_blocks
     from contactverif.scenes.catalogue import load_scene
     from contactverif.scenes.named_states import named_case
+    from contactverif.scenes.shrink_fit import ShrinkFit, shrink_fit
 
 __version__ = "0.1.0"
 
@@ -55,6 +56,7 @@ _HOMES = {
     "scenes.blocks": ("two_blocks",),
     "scenes.catalogue": ("load_scene",),
     "scenes.named_states": ("named_case",),
+    "scenes.shrink_fit": ("ShrinkFit", "shrink_fit"),
 }
 _NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
@@ -81,6 +83,7 @@ __all__ = [
     "Row",
     "Run",
     "Scene",
+    "ShrinkFit",
     "Subject",
     "Surface",
     "Trace",
@@ -95,6 +98,7 @@ __all__ = [
     "named_case",
     "read_interface",
     "rigid_surface",
+    "shrink_fit",
     "solve",
     "two_blocks",
     "verify",

@@ -15,7 +15,16 @@ from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.run.registry import Wrapper
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
+    ("passes_normal_patch", "passes with node on node", "fails with node on node"),
+    ("passes_single_patch", "passes with nodes on midpoints", "fails with nodes on midpoints"),
     ("covers_overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
+    ("converges", "converges", "does not converge"),
+    ("inf_sup", "satisfies inf-sup", "does not satisfy inf-sup"),
+    ("locks", "locks", "does not lock"),
+    ("integrates_linear_gap", "integrates a linear gap", "does not integrate a linear gap"),
+    ("local", "local", "not local"),
+    ("unbiased", "unbiased", "biased"),
+    ("nodes_push", "nodes push", "nodes may pull"),
     ("independent_multipliers", "independent multipliers", "dependent multipliers"),
     ("conserves_force", "conserves force", "does not conserve force"),
     ("conserves_moment", "conserves moment", "does not conserve moment"),
@@ -73,5 +82,7 @@ def _further_statements(traits: Traits) -> list[str]:
     ]
     statements += [f"{word} {value}" for word, value in (("area", traits.area), ("penalty", traits.penalty)) if value]
     statements += [f"gap by {traits.gap}"] if traits.gap else []
+    statements += [f"force along {traits.force_along}"] if traits.force_along else []
     statements += [f"{traits.continuity} when sliding"] if traits.continuity else []
+    statements += [f"forces stated on {', '.join(traits.published_forces)}"] if traits.published_forces else []
     return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(traits.witnesses.items())]

@@ -15,15 +15,17 @@ from rich.text import Text
 
 from contactverif.cli.console import PLAIN_STYLE, STYLES
 from contactverif.cli.coverage_tables import coverage_text
+from contactverif.contract.case_counts import whole_percent
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import Result, Row, Run
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 
 _PROMISES = {True: "passes", False: "fails", None: "–"}
-_COLUMNS = ("property", "promise", "result", "judged", "closest", "tolerance")
+_COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
 _RIGHT_ALIGNED = _COLUMNS[3:]
 _LEGEND = {
     "promise": "what the formulation states about itself: it passes, it fails, or – nothing",
     "judged": "cases that could be decided, of those planned",
+    "touch": "share of the judged cases in which something was in contact",
     "closest": "of all measured numbers the one nearest to its tolerance, or furthest beyond it",
 }
 _MEANINGS = {  # The results that are explained below the table where they occur in it.
@@ -32,7 +34,7 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.BROKEN_PROMISE: "the formulation does not do what it states",
     Result.CRASHED: "the plugin raised an exception",
     Result.UNDECIDED: "roundoff or a kink leaves open whether it passes; the reason stands beside it",
-    Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided, or nothing was in contact",
+    Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided, or too few were in contact",
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
     Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
 }
@@ -57,6 +59,9 @@ class RunTable:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
         width = options.max_width
+        for name in self.run.opposite_signs:
+            yield _fold(f"{name}: {OPPOSITE_SIGN}", width, style="bold red", indent=0)
+            yield Text("")
         yield Text(headline(self.run.provenance))
         yield from _lines(self.run.rows, width)
         for plugin in self.run.not_loaded:
@@ -77,12 +82,13 @@ def headline(provenance: Mapping[str, str]) -> str:
 
 def summary(run: Run) -> Text:
     """Say in the last line whether every promise is kept, and if not what is wrong."""
-    return conclusion(run.rows, [item.formulation for item in run.not_loaded])
+    signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
+    return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
 
 
-def conclusion(rows: Sequence[Row], not_loaded: Sequence[str]) -> Text:
-    """Sum up rows and plugins that did not load."""
-    sentences = []
+def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequence[str] = ()) -> Text:
+    """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
+    sentences = list(accusations)
     for result, (singular, plural) in _COUNTED.items():
         names = [_name(row) for row in rows if row.result is result and row.unexpected]
         names += not_loaded if result is Result.NOT_LOADED else []
@@ -106,15 +112,17 @@ def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
         return
     entries = [_entries(row) for row in rows]
     widths = [max(map(len, column)) for column in zip(_COLUMNS, *entries, strict=True)]
+    # Where the columns are too many for the terminal, they stand closer together.
+    space = " " * (2 if sum(widths) + 2 * len(widths) <= max_width else 1)
     yield Text("")
-    yield Text("  " + _align(_COLUMNS, widths), style="bold")
-    start_of_result = 2 + widths[0] + 2 + widths[1] + 2
+    yield Text(space + _align(_COLUMNS, widths, space), style="bold")
+    start_of_result = widths[0] + widths[1] + 3 * len(space)
     previous = None
     for row, cells in zip(rows, entries, strict=True):
         if row.formulation != previous:
             yield Text(row.formulation, style="bold")
         previous = row.formulation
-        line = "  " + _align(cells, widths)
+        line = space + _align(cells, widths, space)
         remark = _remark(row)
         options = ("; ".join(text for text in (remark, _quantity(row)) if text), remark)
         behind = next((text for text in options if len(line) + 2 + len(text) <= max_width), "")
@@ -133,9 +141,15 @@ def _entries(row: Row) -> tuple[str, ...]:
         _PROMISES[row.promise],
         str(row.result),
         f"{row.judged}/{row.planned}" if row.planned else "–",
-        f"{number.value:.2g}" if number is not None else "",
-        f"{number.sign} {number.tolerance:.2g}" if number is not None else "",
+        whole_percent(row.contact_share) if row.contact_share is not None else "",
+        _short(number.value) if number is not None else "",
+        f"{number.sign} {_short(number.tolerance)}" if number is not None else "",
     )
+
+
+def _short(number: float) -> str:
+    """Return two digits of a number, without zeros in its exponent: they make a column too wide for 80."""
+    return f"{number:.2g}".replace("e-0", "e-").replace("e+0", "e+")
 
 
 def _quantity(row: Row) -> str:
@@ -155,6 +169,7 @@ def _remark(row: Row) -> str:
         f"fails in: {_list(row.failing_names)}" if row.failing_names else "",
         f"{row.undecided} undecided" if row.undecided else "",
         f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
+        row.suspicion,
     ]
     return "; ".join(part for part in parts if part)
 
@@ -165,17 +180,17 @@ def _list(names: Sequence[str]) -> str:
     return "; ".join(names[:_MOST_NAMES]) + more
 
 
-def _align(cells: Sequence[str], widths: Sequence[int]) -> str:
-    return "  ".join(
+def _align(cells: Sequence[str], widths: Sequence[int], space: str) -> str:
+    return space.join(
         cell.rjust(width) if name in _RIGHT_ALIGNED else cell.ljust(width)
         for name, cell, width in zip(_COLUMNS, cells, widths, strict=True)
     )
 
 
-def _fold(words: str, width: int, style: str = "") -> Text:
+def _fold(words: str, width: int, style: str = "", indent: int = 6) -> Text:
     """Return words of any length, indented, to stand below a line."""
-    lines = textwrap.wrap(words, max(width - 6, 20))
-    return Text("\n".join("      " + line for line in lines), style=style, no_wrap=True, overflow="ignore")
+    lines = textwrap.wrap(words, max(width - indent, 20))
+    return Text("\n".join(" " * indent + line for line in lines), style=style, no_wrap=True, overflow="ignore")
 
 
 def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:

@@ -57,6 +57,11 @@ class CaseCounts:
         return self.share(self.undecided)
 
     @property
+    def contact_share(self) -> float:
+        """The share of judged cases in which something was in contact, 0 to 1; 0 if none was judged."""
+        return (self.judged - self.idle) / self.judged if self.judged else 0.0
+
+    @property
     def idle_share(self) -> float:
         """The share of idle cases, 0 to 1."""
         return self.share(self.idle)
@@ -108,6 +113,11 @@ def percent(share: float) -> str:
     if share in (0.0, 1.0):
         return f"{share:.0%}".replace("%", " %")
     return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
+
+
+def whole_percent(share: float) -> str:
+    """Return a share in whole percent, in four characters at most; only 1 looks like 100 %, and only 0 like 0."""
+    return f"{share:.0%}" if share in (0.0, 1.0) else f"{min(max(round(100 * share), 1), 99)}%"
 
 
 def _counts(verdict: Verdict, number: int, *, idle: bool) -> CaseCounts:

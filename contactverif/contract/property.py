@@ -20,6 +20,11 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Traits
 from contactverif.contract.subject import Subject
 
+LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says little.
+# With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the
+# share is below 3/2300 with a probability of 95 %.
+NONE_UNDECIDED = 3 / 2300
+
 
 class Verdict(IntEnum):
     """The verdict on a case, or on a property over all of its cases. A report stores the numbers."""
@@ -106,7 +111,10 @@ class Measurement:
     series : Mapping[str, FloatArray]
         Numbers by iterate, {name: (n_iterates,)}; only those that the property declares.
     idle : bool
-        Nothing was in contact, so that a pass says little; a property whose every case is idle is not judged.
+        Nothing was in contact, so that a pass says little; a property with too many idle cases is not judged
+        (`PropertyInfo.least_contact`).
+    place : str
+        The place of the worst number in words, such as a row and a column of the tangent; empty where there is none.
     """
 
     values: Mapping[str, float]
@@ -116,6 +124,7 @@ class Measurement:
     details: Mapping[str, float] = field(default_factory=dict)
     series: Mapping[str, FloatArray] = field(default_factory=dict)
     idle: bool = False
+    place: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,6 +149,17 @@ class PropertyInfo:
     kinds : tuple[str, ...]
         The kinds of situation (`Case.kind`) that the strategy makes, in the order of tables. A run counts the cases of
         each, and shows a kind of which there was no case too.
+    least_contact : float
+        The least share of judged cases in which something must be in contact, 0 to 1; with less the property is not
+        judged. It is 0 where contact is not the question.
+    usual_undecided : float
+        The share of undecided cases of right formulations, 0 to 1, as it was measured. A formulation with more than
+        twice that, and more than chance allows, is reported: what is undecided may hide what is wrong.
+
+    Raises
+    ------
+    MisuseError
+        If one of the shares is not between 0 and 1.
     """
 
     id: str
@@ -149,6 +169,13 @@ class PropertyInfo:
     needs: frozenset[str] = field(default=frozenset(), kw_only=True)
     series: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     kinds: tuple[str, ...] = field(default=(), kw_only=True)
+    least_contact: float = field(default=LEAST_CONTACT, kw_only=True)
+    usual_undecided: float = field(default=NONE_UNDECIDED, kw_only=True)
+
+    def __post_init__(self) -> None:
+        for name in ("least_contact", "usual_undecided"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise MisuseError(f"{self.id}: {name}", f"{getattr(self, name)}", "a share from 0 to 1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,6 +222,8 @@ class Property(PropertyInfo):
             needs=self.needs,
             series=dict(self.series),
             kinds=self.kinds,
+            least_contact=self.least_contact,
+            usual_undecided=self.usual_undecided,
         )
 
 
@@ -293,7 +322,7 @@ def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
     if measurement.undecided and (failures or not numbers):
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
-        return Verdict.FAIL, "; ".join(failures)
+        return Verdict.FAIL, "; ".join([*failures, *([measurement.place] if measurement.place else [])])
     for number in reversed(numbers):
         if not isfinite(number.tolerance):  # The judge's fault, not the formulation's: neither pass nor accusation.
             return Verdict.UNDECIDED, f"the tolerance of {number.quantity.name} is {number.tolerance}"

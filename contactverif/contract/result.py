@@ -14,13 +14,18 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, key_of, total
+from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, key_of, percent, total
+from contactverif.contract.chance import exceeds
 from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
+OPPOSITE_SIGN = (
+    "your forces have the opposite sign: contact must push the slave along the master's outward normal; "
+    "see docs/concepts/signs.md"
+)
 
 
 class Result(StrEnum):
@@ -191,6 +196,24 @@ class Row:
         """The number of judged random cases in which nothing was in contact."""
         return self.tally.counts.idle
 
+    @property
+    def contact_share(self) -> float | None:
+        """The share of judged random cases in which something was in contact, 0 to 1; None if none was judged."""
+        counts = self.tally.counts
+        return counts.contact_share if counts.judged else None
+
+    @property
+    def suspicion(self) -> str:
+        """The remark that more cases are undecided than those of right formulations; empty if they are not.
+
+        More than twice the usual share counts, and only if a binomial distribution makes that no chance.
+        """
+        counts, usual = self.tally.counts, self.info.usual_undecided
+        if not exceeds(counts.undecided, counts.cases, min(2 * usual, 1.0)):
+            return ""
+        share = f"{percent(counts.undecided_share)} of the cases are undecided"
+        return f"{share}, of right formulations {percent(usual)}: what is undecided may hide what is wrong"
+
     def names_of(self, *verdicts: Verdict) -> tuple[str, ...]:
         """Return the names of the cases with one of these verdicts, where cases have names, in their order."""
         if not any(self.tally.verdicts.get(verdict, 0) for verdict in verdicts):
@@ -284,12 +307,15 @@ class Run:
         {formulation: {part of the contract: provided}}.
     provenance : Mapping[str, str]
         Where the run comes from: versions, seed, profile, command, ….
+    opposite_signs : tuple[str, ...]
+        The formulations whose forces have the opposite sign, as `OPPOSITE_SIGN` says. Each makes the run fail.
     """
 
     rows: tuple[Row, ...]
     not_loaded: tuple[NotLoaded, ...] = ()
     provided: Mapping[str, Mapping[str, bool]] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
+    opposite_signs: tuple[str, ...] = ()
 
     @property
     def formulations(self) -> tuple[str, ...]:
@@ -313,8 +339,8 @@ class Run:
 
     @property
     def promises_kept(self) -> bool:
-        """Return whether every promise is kept, every property was judged, and every plugin loaded."""
-        return bool(self.rows) and not self.not_loaded and not self.unexpected
+        """Return whether every promise is kept, every property judged, every plugin loaded, and every sign right."""
+        return bool(self.rows) and not (self.not_loaded or self.unexpected or self.opposite_signs)
 
     def count(self, *results: Result) -> int:
         """Return the number of rows with one of these results."""

@@ -194,6 +194,8 @@ class System:
         The share of loads and imposed displacements.
     use_tangent : bool
         False differentiates the residual on the frozen pairing, even if the formulation has a tangent.
+    difference_step : float | None
+        The step of differences in positions, a length; None for the one that suits smooth residuals.
     seconds : dict[str, float]
         The time spent in "pair", "residual", "tangent" and "solve" so far.
     n_multipliers : int
@@ -208,6 +210,7 @@ class System:
     formulation: CheckedFormulation
     factor: float = 1.0
     use_tangent: bool = True
+    difference_step: float | None = None
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED_PARTS, 0.0))
     n_multipliers: int = field(init=False)
     transformation: Any = field(init=False)
@@ -251,6 +254,17 @@ class System:
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
         self.seconds["residual"] += perf_counter() - start
         return residual
+
+    def is_balanced(self, residual: FloatArray, u: FloatArray, pairing: Pairing | None, tolerance: float) -> bool:
+        """Return whether a residual (n,) is at most `tolerance` of the largest contact force; False with multipliers.
+
+        Without any contact force nothing is balanced.
+        """
+        if self.n_multipliers or tolerance == 0:
+            return False
+        contact = self.transformation.T @ self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        largest = float(np.abs(contact).max(initial=0.0))
+        return bool(largest > 0 and np.abs(residual).max(initial=0.0) <= tolerance * largest)
 
     def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
         """Return the derivative of the residual, and the part of the residual that roundoff alone may cause.
@@ -302,7 +316,8 @@ class System:
         n_positions = self.scene.interface.n_unknowns
         positions, multipliers = z[:n_positions], z[n_positions:]
         shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
-        steps = np.full(z.size, shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3))
+        smooth = shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3)
+        steps = np.full(z.size, smooth if self.difference_step is None else self.difference_step)
         if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
             size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
             steps[n_positions:] = size or 1.0
@@ -324,6 +339,8 @@ def solve(
     load_steps: int = 1,
     iterations: int = MAX_ITERATIONS,
     use_tangent: bool = True,
+    tolerance: float = 0.0,
+    difference_step: float | None = None,
 ) -> Trace:
     """Solve a scene by Newton's method with full steps.
 
@@ -343,6 +360,12 @@ def solve(
     use_tangent : bool
         True uses the tangent of the formulation, if it has one. False differentiates its residual on the frozen
         pairing.
+    tolerance : float
+        From the second iterate on, forces out of balance by no more than this share of the largest contact force count
+        as converged. By default only roundoff does. It saves the last matrix, whose floors are then those before, and
+        does not apply to multipliers.
+    difference_step : float | None
+        The step of differences in positions, a length; None for the one that suits smooth residuals.
 
     Returns
     -------
@@ -363,7 +386,7 @@ def solve(
     for name, number in (("load_steps", load_steps), ("iterations", iterations)):
         if number < 1:
             raise MisuseError(name, f"{number}", "at least 1")
-    system, record = System(scene, formulation, use_tangent=use_tangent), _Record()
+    system, record = System(scene, formulation, use_tangent=use_tangent, difference_step=difference_step), _Record()
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
         behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""
@@ -374,21 +397,27 @@ def solve(
     end = End.CONVERGED
     for number in range(1, load_steps + 1):
         system.factor = number / load_steps
-        end, u = _load_step(system, record, u, iterations)
+        end, u = _load_step(system, record, u, iterations, tolerance)
         if end is not End.CONVERGED:
             break
     return record.trace(scene, end, system.seconds)
 
 
-def _load_step(system: System, record: _Record, u: FloatArray, iterations: int) -> tuple[End, FloatArray]:
+def _load_step(
+    system: System, record: _Record, u: FloatArray, iterations: int, tolerance: float
+) -> tuple[End, FloatArray]:
     """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
     first, before, n_free = len(record.u), None, system.scene.n_free
+    floor = np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
         if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= DIVERGENCE_FACTOR * size):
             return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
         residual = system.residual(u, pairing)
+        if iteration and system.is_balanced(residual, u, pairing, tolerance):
+            record.add(u, system.factor, residual, floor, 1.0, _count_changes(pairing, before))
+            return End.CONVERGED, u
         matrix, floor = system.matrix(u, pairing)
         comparable = linear.scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
         record.add(u, system.factor, residual, floor, comparable, _count_changes(pairing, before))

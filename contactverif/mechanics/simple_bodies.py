@@ -152,7 +152,7 @@ def block(
         load[near, 1] -= towards_contact * pressure * scale * outside
     return Body(
         nodes=placing.place(nodes),
-        cells=_quadrilaterals(number),
+        cells=grid_cells(number),
         contact=np.column_stack([walk[:-1], walk[1:]]),
         young=rectangle.young,
         poisson=rectangle.poisson,
@@ -219,7 +219,7 @@ def _grid_lines(argument: str, values: ArrayLike) -> FloatArray:
     return coordinates
 
 
-def _quadrilaterals(number: IntArray) -> IntArray:
+def grid_cells(number: IntArray) -> IntArray:
     """Return the cells (n_cells, 4) between nodes that are numbered as the array (n_rows, n_columns) says."""
     return np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 

@@ -8,6 +8,8 @@ from contactverif.oracle.consistent import uniform_pressure_weights, uniform_pre
 from contactverif.oracle.exact_nearest import Nearest, NearSegment, nearest_segments
 from contactverif.oracle.exact_projection import Projection, project_point, projection_cases
 from contactverif.oracle.kink_distance import default_points, kink_margin
+from contactverif.oracle.mesh_classes import is_of_class
+from contactverif.oracle.nodal_springs import nodal_spring_weights
 from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 
 __all__ = [
@@ -15,10 +17,12 @@ __all__ = [
     "Nearest",
     "Projection",
     "default_points",
+    "is_of_class",
     "is_of_kind",
     "kind_of",
     "kink_margin",
     "nearest_segments",
+    "nodal_spring_weights",
     "project_point",
     "projection_cases",
     "uniform_pressure_weights",

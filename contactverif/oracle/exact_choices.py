@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.oracle.exact_distance import Reach, nearest_of, reach
 from contactverif.oracle.exact_points import (
     ExactPoints,
     Integers,
@@ -43,24 +44,27 @@ def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
         The number of segments at the least distance, exactly.
     """
     point, candidate = _near_pairs(lattice, points, segments)
-    above, below = _squared_distances(lattice, points.select(point), candidate)
-    squares = dict(
-        zip(zip(point.tolist(), candidate.tolist(), strict=True), zip(above, below, strict=True), strict=True)
-    )
+    nodes, master = [tuple(node) for node in lattice.nodes.tolist()], lattice.master.tolist()
+    places, weights = [tuple(place) for place in points.place.tolist()], points.weight.tolist()
+    reaches: list[dict[int, Reach]] = [{} for _ in places]
+    for number, segment in zip(point.tolist(), candidate.tolist(), strict=True):
+        first, second = master[segment]
+        reaches[number][segment] = reach(segment, nodes[first], nodes[second], places[number], weights[number])
     excess, ties = np.empty(len(segments)), np.empty(len(segments), dtype=np.int64)
-    ends = np.append(np.flatnonzero(np.diff(point, prepend=-1)), len(point))
-    for number, (start, stop) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
-        least = start
-        for other in range(start + 1, stop):
-            if above[other] * below[least] < above[least] * below[other]:
-                least = other
-        a, b = squares[number, int(segments[number])]
-        c, d = above[least], below[least]
-        weight = points.weight[number] * lattice.scale  # The squares still carry W².
-        total = np.sqrt(a / (b * weight**2)) + np.sqrt(c / (d * weight**2))
-        excess[number] = (a * d - c * b) / (b * d * weight**2) / total if a * d > c * b else 0.0
-        ties[number] = sum(above[other] * d == c * below[other] for other in range(start, stop))
+    for number, (choice, others) in enumerate(zip(segments.tolist(), reaches, strict=True)):
+        near = nearest_of(others.values())
+        excess[number] = _farther(others[choice], near[0], weights[number] * lattice.scale)
+        ties[number] = len(near)
     return excess, ties
+
+
+def _farther(choice: Reach, nearest: Reach, unit: int) -> float:
+    """Return how much farther one segment is than another, a length ≥ 0; squared distances still carry unit²."""
+    a, b, c, d = choice.above, choice.squared, nearest.above, nearest.squared
+    if a * d <= c * b:
+        return 0.0
+    total = np.sqrt(a / (b * unit**2)) + np.sqrt(c / (d * unit**2))
+    return float((a * d - c * b) / (b * d * unit**2) / total)
 
 
 def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tuple[IntArray, IntArray]:
@@ -77,20 +81,6 @@ def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tupl
     near[np.arange(len(choice)), choice] = True
     point, candidate = np.nonzero(near)
     return point, candidate
-
-
-def _squared_distances(lattice: Lattice, points: ExactPoints, segments: IntArray) -> tuple[list[int], list[int]]:
-    """Return the squared distances to closed segments, × W² × scale², as numerators and denominators."""
-    first, second = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))
-    along = second - first
-    from_first, from_second = (points.place - points.weight[:, None] * end for end in (first, second))
-    squared = (along**2).sum(axis=1)
-    foot = (from_first * along).sum(axis=1)
-    cross = from_first[:, 0] * along[:, 1] - from_first[:, 1] * along[:, 0]
-    to_first, to_second = ((arm**2).sum(axis=1) * squared for arm in (from_first, from_second))
-    inside = (foot > 0) & (foot < points.weight * squared)
-    above: Integers = np.where(inside, cross**2, np.where(foot <= 0, to_first, to_second))
-    return above.tolist(), squared.tolist()
 
 
 def seen_excess(

@@ -14,9 +14,9 @@ from fractions import Fraction
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.oracle.exact_distance import Reach, nearest_of, reach
 from contactverif.oracle.rationals import integers
 
-_Point = tuple[int, int]
 # The distance below has an error of at most 16 u (L + |P − A|); this leaves room for whoever writes it otherwise.
 _DOUBT = 64 * UNIT_ROUNDOFF
 
@@ -96,23 +96,27 @@ def nearest_segments(nodes: FloatArray, segments: IntArray, point: tuple[float, 
         The squared distance, and the segments at this distance.
     """
     candidates = _candidates(nodes, segments, np.array(point))
-    values, scale = integers(np.concatenate([point, nodes[segments[candidates]].reshape(-1)]))
-    p, ends = (values[0], values[1]), values[2:]
-    measured = []
-    for place, number in enumerate(candidates.tolist()):
-        ax, ay, bx, by = ends[4 * place : 4 * place + 4]
-        measured.append(_measure(number, segments[number].tolist(), p, ((ax, ay), (bx, by)), scale))
-    best = min(distance for distance, _ in measured)
-    near = [segment for distance, segment in measured if distance == best]
-    return Nearest(best, tuple(sorted(near, key=lambda item: (item.squared_overshoot, item.segment))))
+    ends = segments[candidates]
+    (x, y, *values), scale = integers(np.concatenate([point, nodes[ends].reshape(-1)]))
+    numbers = iter(values)
+    corners = zip(numbers, numbers, numbers, numbers, strict=True)  # The coordinates of both nodes of each candidate.
+    near = nearest_of(
+        [
+            reach(segment, (ax, ay), (bx, by), (x, y))
+            for segment, (ax, ay, bx, by) in zip(candidates.tolist(), corners, strict=True)
+        ]
+    )
+    area = scale * scale
+    distance = Fraction(near[0].above, near[0].squared * area)
+    return Nearest(distance, tuple([_describe(each, segments[each.segment].tolist(), area) for each in near]))
 
 
 def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> IntArray:
     """Return the segments that may be nearest (n_candidates,): no other can, whatever floats round."""
     first, second = nodes[segments[:, 0]], nodes[segments[:, 1]]
     along, towards = second - first, point - first
-    squared = (along * along).sum(axis=1)
-    share = np.clip((towards * along).sum(axis=1) / squared, 0, 1)
+    squared = np.vecdot(along, along)
+    share = np.minimum(np.maximum(np.vecdot(towards, along) / squared, 0), 1)
     off = towards - share[:, None] * along
     distance = np.hypot(off[:, 0], off[:, 1])
     doubt = _DOUBT * (np.hypot(towards[:, 0], towards[:, 1]) + np.sqrt(squared))
@@ -120,25 +124,12 @@ def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> Int
     return candidates
 
 
-def _measure(
-    number: int, nodes: list[int], p: _Point, ends: tuple[_Point, _Point], scale: int
-) -> tuple[Fraction, NearSegment]:
-    """Return the squared distance of a point from a segment, and the rest of what is said of the segment."""
-    (ax, ay), (bx, by) = ends
-    dx, dy, rx, ry = bx - ax, by - ay, p[0] - ax, p[1] - ay
-    squared, along, across = dx * dx + dy * dy, rx * dx + ry * dy, rx * dy - ry * dx
-    area = scale * scale
-    if 0 < along < squared:
-        distance, past, foot = Fraction(across * across, squared * area), 0, ("segment", number)
-    elif along <= 0:
-        distance, past, foot = Fraction(rx * rx + ry * ry, area), -along, ("node", nodes[0])
-    else:
-        far = (p[0] - bx, p[1] - by)
-        distance, past, foot = Fraction(far[0] ** 2 + far[1] ** 2, area), along - squared, ("node", nodes[1])
-    return distance, NearSegment(
-        segment=number,
-        xi=Fraction(along, squared),
-        squared_overshoot=Fraction(past * past, squared * area),
-        signed_squared_gap=Fraction(across * abs(across), squared * area),
-        foot=foot,
+def _describe(near: Reach, nodes: list[int], area: int) -> NearSegment:
+    """Return what is said of a segment at the smallest distance; `area` is the square of the lattice's scale."""
+    return NearSegment(
+        segment=near.segment,
+        xi=Fraction(near.along, near.squared),
+        squared_overshoot=Fraction(near.past * near.past, near.squared * area),
+        signed_squared_gap=Fraction(near.across * abs(near.across), near.squared * area),
+        foot=("segment", near.segment) if near.end < 0 else ("node", nodes[near.end]),
     )

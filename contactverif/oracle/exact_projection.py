@@ -16,9 +16,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
+from contactverif.oracle.exact_distance import Point, cross, dot, nearest_of, reach, squared_overshoot, subtract
 from contactverif.oracle.rationals import integers
-
-_Point = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,59 +92,34 @@ class _Exact:
         self.master = interface.master.segments.tolist()
         self.neighbours = interface.master.neighbours.tolist()
 
-    def point(self, segment: int, c: Fraction) -> _Point:
+    def point(self, segment: int, c: Fraction) -> Point:
         """Return the point at c of a slave segment."""
         (ax, ay), (bx, by) = (self.nodes[node] for node in self.slave[segment])
         towards = int((1 + c) / 2 * self.fineness)
         away = self.fineness - towards
         return (away * ax + towards * bx) // self.fineness, (away * ay + towards * by) // self.fineness
 
-    def ends(self, segment: int) -> tuple[_Point, _Point]:
+    def ends(self, segment: int) -> tuple[Point, Point]:
         """Return the end points of a master segment."""
         return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
 
-    def direction(self, segment: int) -> _Point:
+    def direction(self, segment: int) -> Point:
         """Return the vector from the first to the second node of a master segment."""
-        return _subtract(*self.ends(segment))
+        return subtract(*self.ends(segment))
 
-    def nearest(self, point: _Point) -> Projection:
+    def nearest(self, point: Point) -> Projection:
         """Return the projection of a point."""
-        ranked = []
-        for segment in range(len(self.master)):
-            first, second = self.ends(segment)
-            along = self.direction(segment)
-            squared = _dot(along, along)
-            foot = _dot(_subtract(first, point), along)
-            if 0 < foot < squared:
-                distance = Fraction(_cross(along, _subtract(first, point)) ** 2, squared)
-                ranked.append((distance, Fraction(0), segment))
-            else:
-                past, end = (-foot, first) if foot <= 0 else (foot - squared, second)
-                distance = Fraction(_dot(_subtract(end, point), _subtract(end, point)))
-                ranked.append((distance, Fraction(past * past, squared), segment))
-        best, overshoot, segment = min(ranked)
-        along, from_first = self.direction(segment), _subtract(self.ends(segment)[0], point)
-        gap = -_cross(along, from_first)  # The gap, times the length of the segment.
+        near = nearest_of(reach(segment, *self.ends(segment), point) for segment in range(len(self.master)))
+        best, area = near[0], self.scale**2
+        overshoot = squared_overshoot(best)
         return Projection(
-            segment=segment,
-            xi=Fraction(_dot(from_first, along), _dot(along, along)),
-            squared_distance=best / self.scale**2,
-            signed_squared_gap=Fraction(gap * abs(gap), _dot(along, along)) / self.scale**2,
-            tied=tuple(index for distance, _, index in ranked if distance == best),
-            undecided=tuple(index for distance, past, index in ranked if (distance, past) == (best, overshoot)),
+            segment=best.segment,
+            xi=Fraction(best.along, best.squared),
+            squared_distance=Fraction(best.above, best.squared * area),
+            signed_squared_gap=Fraction(best.across * abs(best.across), best.squared * area),
+            tied=tuple(sorted(other.segment for other in near)),
+            undecided=tuple(other.segment for other in near if squared_overshoot(other) == overshoot),
         )
-
-
-def _subtract(a: _Point, b: _Point) -> _Point:
-    return b[0] - a[0], b[1] - a[1]
-
-
-def _dot(a: _Point, b: _Point) -> int:
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def _cross(a: _Point, b: _Point) -> int:
-    return a[0] * b[1] - a[1] * b[0]
 
 
 def projection_cases(interface: Interface, z: FloatArray, n: int = 2) -> Counter[str]:
@@ -184,8 +158,8 @@ def _cases_at(exact: _Exact, slave_segment: int, c: Fraction, half: Fraction) ->
     """Yield the cases of one area of competence, from c − half to c + half."""
     home = exact.nearest(exact.point(slave_segment, c))
     along = exact.direction(home.segment)
-    low = _dot(exact.point(slave_segment, c + half), along)  # P, nearer the slave segment's second node.
-    high = _dot(exact.point(slave_segment, c - half), along)  # Q
+    low = dot(exact.point(slave_segment, c + half), along)  # P, nearer the slave segment's second node.
+    high = dot(exact.point(slave_segment, c - half), along)  # Q
     if low >= high:
         yield "turned away"
         return
@@ -209,7 +183,7 @@ def _walk(exact: _Exact, home: int, side: int, end: int, covered: list[int]) -> 
     """
     sign, along, segment = 2 * side - 1, exact.direction(home), home
     while True:
-        node = sign * _dot(exact.nodes[exact.master[segment][side]], along)
+        node = sign * dot(exact.nodes[exact.master[segment][side]], along)
         if end == node:
             yield "node exactly hit"
         if end <= node:
@@ -218,10 +192,10 @@ def _walk(exact: _Exact, home: int, side: int, end: int, covered: list[int]) -> 
         if following < 0 or following in covered:
             yield "beyond an end"
             return
-        if _dot(exact.direction(following), along) <= 0:
+        if dot(exact.direction(following), along) <= 0:
             yield "edge-on"
             return
-        turn = sign * _cross(exact.direction(segment), exact.direction(following))
+        turn = sign * cross(exact.direction(segment), exact.direction(following))
         if turn:
             yield "convex vertex" if turn > 0 else "concave vertex"
         covered.append(following)

@@ -192,6 +192,8 @@ def _area_margin(line: _Line, home: IntArray, low: FloatArray, high: FloatArray)
     roundoff = 64 * UNIT_ROUNDOFF * np.abs(line.first).max()
     turned: BoolArray = _dots(high - low, tangent) <= 0
     least = float(_margin(high - low, tangent, inverse).min(initial=np.inf))
+    for end, nodes in ((high, line.first), (low, line.second)):  # Does the whole area lie past an end of the segment?
+        least = min(least, float(_margin(end - nodes[home], tangent, inverse).min(initial=np.inf)))
     for side, sign, end, nodes in ((0, -1, low, line.first), (1, 1, high, line.second)):
         going, segment = np.flatnonzero(~turned), home[~turned]
         while len(going):

@@ -132,6 +132,14 @@ class _Probe:
             chain.append(following)
         return chain
 
+    def slave_chain(self) -> set[int]:
+        """Return the nodes of the slave's chain that carries the point."""
+        nodes, size = set(self.carrier), 0
+        while len(nodes) > size:
+            size = len(nodes)
+            nodes.update(node for ends in self.slave if nodes.intersection(ends) for node in ends)
+        return nodes
+
     def turn(self) -> tuple[Fraction, Fraction] | None:
         """Return cross and dot product of the two nearest segments, in chain order; None if they share no node."""
         if len(self.feet) < 2:
@@ -175,8 +183,8 @@ def _at_node(probe: _Probe, *, free: bool) -> bool:
 
 
 def _coincident(probe: _Probe) -> bool:
-    """Return whether the foot of every slave node is a master node, and the point is a slave node."""
-    slave_nodes = {node for ends in probe.slave for node in ends}
+    """Return whether the foot of every node of the slave's chain is a master node, and the point is a slave node."""
+    slave_nodes = probe.slave_chain()
     feet = [probe.feet_of(probe.nodes[node])[0] for node in slave_nodes]
     return abs(probe.c) == 1 and all(foot.xi in (0, 1) for foot in feet)
 

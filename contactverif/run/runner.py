@@ -29,6 +29,7 @@ from contactverif.contract.subject import OPTIONAL_PARTS, STATED_PARTS, Subject
 from contactverif.run.driver import SHRINK_CALLS, CaseSource, PlannedCases, draw_cases, shrink
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
+from contactverif.run.sign_check import has_opposite_sign
 from contactverif.scenes.named_states import named_case
 
 __all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
@@ -124,6 +125,7 @@ def run(
         rows=tuple(_check_property(plan, subject, question) for subject in loaded for question in questions),
         not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
         provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
+        opposite_signs=tuple(subject.name for subject in loaded if has_opposite_sign(subject)),
         provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=resolved.seed),
     )
 
@@ -246,7 +248,7 @@ def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
     if plan.scene is not None and row.promise is False:  # The formulation fails on some scene, not on every one.
         row = replace(row, promise=None)
     try:
-        witness = _witness(subject, question) if row.promise is False else None
+        witness = _witness(subject, question, source) if row.promise is False else None
     except MisuseError as error:
         return replace(row, verdict=Verdict.CRASHED, reason=f"traits: {error}")
     row = _judge_all(plan, subject, question, row, source, witness)
@@ -273,7 +275,7 @@ def _judge_all(
         row,
         planned=planned,
         outcomes=tuple(outcomes),
-        witness=None if witness is None else judge_case(question, witness, subject),
+        witness=None if witness is None else _judge_witness(question, witness, subject, outcomes),
         seconds=perf_counter() - start,
     )
     verdict, reason = _verdict_over_all(row)
@@ -284,13 +286,24 @@ def _judge_all(
     return replace(row, verdict=verdict, reason=reason)
 
 
-def _witness(subject: Subject, question: Property) -> Case:
-    """Return the case that the traits name as a proof that the formulation fails."""
+def _judge_witness(question: Property, witness: Case, subject: Subject, outcomes: Sequence[Outcome]) -> Outcome:
+    """Return the outcome of the witness, which a case of a finite list has already."""
+    judged = (outcome for outcome in outcomes if outcome.case_or_summary is witness)
+    return next(judged, None) or judge_case(question, witness, subject)
+
+
+def _witness(subject: Subject, question: Property, source: CaseSource) -> Case:
+    """Return the case that the traits name as a proof that the formulation fails.
+
+    It is a case of the property's own finite list, if that has one of this name, else a named state or scene.
+    """
     name = subject.traits.witness(question.id)
     if name is None:
         raise MisuseError(
             "witnesses", f"none for {question.id}, which {subject.name} says it does not pass", "the name of a case"
         )
+    if isinstance(source, tuple) and (matches := [case for case in source if case.name == name]):
+        return matches[0]
     if not question.bodies:
         return named_case(name)
     # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
@@ -308,9 +321,19 @@ def _verdict_over_all(row: Row) -> tuple[Verdict, str]:
     if row.judged < JUDGED_SHARE * row.planned:
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
-    if everything and all(outcome.measurement is not None and outcome.measurement.idle for outcome in everything):
-        return Verdict.NOT_JUDGED, "no case gave any force: nothing was judged"
+    if reason := _too_idle(row):
+        return Verdict.NOT_JUDGED, reason
     return Verdict.PASS, ""
+
+
+def _too_idle(row: Row) -> str:
+    """Return why too few cases were in contact, or an empty string. One idle case may be chance; all of them is not."""
+    counts, least = row.tally.counts, row.info.least_contact
+    if not counts.idle or counts.contact_share >= least or (counts.idle == 1 and counts.judged > 1):
+        return ""
+    if counts.idle == counts.judged:
+        return "nothing was in contact in any case: nothing was judged"
+    return f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
 
 
 def _reason_with_name(row: Row, outcome: Outcome) -> str:

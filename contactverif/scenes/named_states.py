@@ -1,7 +1,8 @@
 """Cases with a name: those of the reference paper, and witnesses of what a formulation says it does not do.
 
 Source: Zavarise & De Lorenzis (2009). In a1 to c-prime the penetration is uniform and ε̂ |g| = 1, so that nodal forces
-are the paper's. The paper prints no dimensions of A2; its lengths here are ours.
+are the paper's. The paper prints no dimensions of A2; its lengths here are ours. In a1-swapped to c-prime-swapped the
+lengths of slave and master are exchanged.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 
 _PENETRATION = 2.0**-4
-_FLAT: dict[str, tuple[Sequence[float], Sequence[float]]] = {
+_LENGTHS: dict[str, tuple[Sequence[float], Sequence[float]]] = {
     "a1": ([2, 2], [4]),
     "a2": ([1, 1, 2, 4], [8]),  # graded, on one rigid segment
     "b": ([2, 2, 4, 4], [3, 3, 4, 2]),
     "c": ([2, 2, 4, 4], [3, 3, 3, 3]),
     "c-prime": ([2, 2, 4, 4], [3, 3, 3.2, 2.8]),  # c without the virtual slave node on a master node
 }
+_FLAT = _LENGTHS | {f"{name}-swapped": (master, slave) for name, (slave, master) in _LENGTHS.items()}
 
 
 def named_case(name: str) -> Case:
@@ -95,6 +97,17 @@ def _moved_case_c() -> Case:
     return Case(case.interface.at(nodes), z, case.penalty, {"shift": np.array([2.0**20, -(2.0**20)])}, name="moved")
 
 
+def _slide_over_vertices() -> Case:
+    """Return two slave segments below a zigzag; the parameter "path" moves them by 2, over a vertex and a valley."""
+    slave = np.array([[0.0, -0.25], [1.5, -0.375], [3.0, -0.25]])
+    master = np.array([[9.0, 0.0], [6.0, 0.5], [4.25, 0.0], [2.25, 0.5], [0.75, 0.0], [-1.0, 0.5], [-4.0, 0.0]])
+    path = np.zeros((len(slave) + len(master), 2))
+    path[: len(slave), 0] = 2.0
+    interface = Interface.from_chains(slave, master)
+    nodes = np.vstack([slave, master])
+    return Case(interface, nodes.reshape(-1), 16.0, {"path": path.reshape(-1)}, name="sliding")
+
+
 def _places(lengths: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(lengths)])
 
@@ -107,5 +120,7 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "tilted": _tilt_segment,
     "offset-c": _offset_case_c,
     "moved": _moved_case_c,
+    "sliding": _slide_over_vertices,
 }
-NAMED: tuple[str, ...] = (*_FLAT, *_OTHERS)
+FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
+NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)

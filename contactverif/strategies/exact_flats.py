@@ -1,5 +1,7 @@
 """Flat states whose exact forces are known, with too many bits for anything but differences of positions.
 
+Their penetration is uniform, or linear along a straight slave.
+
 A state is laid out on multiples of 2^-40, or of 2^-32 if it is moved by up to 2^20, and turned and stretched by a
 Pythagorean triple. All this is exact. The turned coordinates have some 40 bits, so that products of them are rounded.
 On a flat that is parallel to an axis nearly all products would be exact, and would hide a kernel that rounds.
@@ -22,6 +24,7 @@ from contactverif.strategies.translations import FINENESS, exact_shifts
 
 _TURNS: tuple[Turn, ...] = ((4, 3, 5), (12, -5, 13), (-3, 4, 5), (-5, -12, 13))
 _FINENESS_AT_REST = 40
+_COARSE = 12  # The bits of the places of a slave that is not parallel to the master.
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 
 
@@ -41,6 +44,47 @@ def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case]
         projects inside the master.
     """
     return _exact_flat_cases() if interface is None else None
+
+
+def linear_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return states of a penetration that is linear along a straight slave, near the origin.
+
+    Parameters
+    ----------
+    interface : Interface | None
+        Random meshes if None. A given interface has no such states.
+
+    Returns
+    -------
+    SearchStrategy[Case] | None
+        Cases with the parameter "shift", as `exact_flat_cases` returns them, and "slope" (of the slave). All slave
+        nodes penetrate, by 2^-13 to 2^-5 of a segment, and lie exactly on a straight line.
+    """
+    return _linear_flat_cases() if interface is None else None
+
+
+@st.composite
+def _linear_flat_cases(draw: DrawFn) -> Case:
+    turn = draw(st.sampled_from(_TURNS))
+    slave_lengths, master_lengths = draw(_LENGTHS), draw(_LENGTHS)
+    depth, rise = 2.0 ** -draw(st.integers(6, 12)), draw(st.sampled_from([1, -1, 2, -2, 3, -3]))
+    penalty, seed = draw(penalties()), draw(seeds())
+    shift = draw(st.one_of(st.just(np.zeros(2)), exact_shifts()))
+    offsets = draw(OFFSETS)
+    end = float(sum(slave_lengths))
+    # Heights are places times a power of two, so that they need some bits more than places.
+    slave = _places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, _COARSE)
+    inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
+    master = _places([-1.0, *inside, end + 1], offsets, 13, FINENESS)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
+    # The longest slave is 16 long, so that the penetration is 5/8 of that of the middle node or more.
+    slope = depth * rise / 128
+    (p, q, _), middle = turn, slave[len(slave) // 2]
+    lift = np.outer(slope * (slave - middle), [-q, p])
+    positions = case.positions.copy()
+    positions[: len(slave)] += lift
+    parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
+    return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)
 
 
 @st.composite

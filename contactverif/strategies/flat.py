@@ -22,6 +22,8 @@ from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
 
+Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
+
 MOST_MASTER_SEGMENTS = 100  # The most master segments in one chain.
 _DEPTHS = st.integers(1, 8)  # quarters
 _SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # The distance that the slave has slid from its reference.
@@ -48,12 +50,13 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
         along the line, the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's
         first to its last node). None if the interface is not flat, or its slave is not over its master.
     """
-    return _flat_cases() if interface is None else given_interface.flat_cases(interface)
+    return uniform_penetrations(_panels()) if interface is None else given_interface.flat_cases(interface)
 
 
 @st.composite
-def _flat_cases(draw: DrawFn) -> Case:
-    sides = draw(_panels())
+def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> Case:
+    """Draw meshes and push the slave into the master by the same depth everywhere; the case is that of `flat_cases`."""
+    sides = draw(panels)
     quarters, unit = draw(_DEPTHS), draw(depth_units())
     motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
     slide, shuffle = draw(_SLIDES), draw(shuffles())
@@ -68,7 +71,7 @@ def _flat_cases(draw: DrawFn) -> Case:
 
 
 @cache
-def _panels() -> SearchStrategy[list[tuple[FloatArray, FloatArray]]]:
+def _panels() -> SearchStrategy[list[Sides]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang = st.integers(0, 3)
     side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
@@ -83,7 +86,7 @@ def _places(
     left: int,
     right: int,
     sevenths: int,
-) -> tuple[FloatArray, FloatArray]:
+) -> Sides:
     """Return the ascending x of the nodes of a slave chain and of a master chain that covers it.
 
     The master goes beyond the slave by `left` and `right`.

@@ -1,7 +1,8 @@
 """Interfaces of any shape: flat, tilted, bent, circular, overhanging on either side, partly open.
 
 The master of an open panel is the graph of a broken line, with walls; the slave's nodes lie below that line by their
-penetration. So contact is there by construction, and nothing need be filtered.
+penetration. So contact is there by construction, and nothing need be filtered: half of a slave segment lies over the
+master, and where the draws leave it open, the slave sinks as a whole until that half is closed (`contact.py`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
+from contactverif.strategies.contact import covered_start, extend_line, sink_below
 from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
 from contactverif.strategies.parts import (
     OFFSETS,
@@ -84,13 +86,14 @@ class Broken:
     slave : Sequence[float]
         Lengths along of the slave segments.
     start : int
-        X of the slave's first node; the master's is at 0.
+        X of the slave's first node; the master's is at 0. The slave moves on, and the master grows, until half of a
+        slave segment is over it.
     tilt : float
         Slope of the slave against the master, turned about its middle, flatter for long chains.
     quarters, unit : Sequence[int] or float
         Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
     upright : bool
-        Walls do not lean.
+        Walls do not lean, and the slave stays where it starts.
     """
 
     steps: Sequence[tuple[float, int, int]]
@@ -105,8 +108,12 @@ class Broken:
     def __call__(self, offsets: Sequence[int]) -> Panel:
         """Return the panel, its nodes moved off the lattice by these numerators, 0 for none."""
         line = self._master(offsets)
-        x = self.start + np.concatenate([[0.0], np.cumsum(self.slave)])
         length = min(shortest(line), min(self.slave))
+        start = float(self.start)
+        if not self.upright:
+            line = extend_line(line, self.slave, length / 8)
+            start = covered_start(start, self.slave, line[-1, 0] - length / 8)
+        x = start + np.concatenate([[0.0], np.cumsum(self.slave)])
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
@@ -114,8 +121,8 @@ class Broken:
         depth = (repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
-        heights = on_lattice(np.interp(x, *line.T)) + rise - depth
-        return Panel(np.column_stack([x, heights]), line[::-1], reference)
+        slave = np.column_stack([x, on_lattice(np.interp(x, *line.T)) + rise - depth])
+        return Panel(sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
         """Return points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.

@@ -23,11 +23,9 @@ def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
     parallel up to 64 u X, face each other, and each slave chain lies over one master chain.
     """
     nodes, n_slave = interface.nodes, interface.n_slave_nodes
-    ends = nodes[interface.slave.segments]
-    chord = (ends[:, 1] - ends[:, 0]).sum(axis=0)
-    if not chord.any():
-        return None  # closed chains
-    direction = chord / np.hypot(*chord)
+    direction = slave_direction(interface)
+    if direction is None:
+        return None
     normal = np.array([-direction[1], direction[0]])  # out of the master
     roundoff = 64 * UNIT_ROUNDOFF * float(np.abs(nodes).max())
     heights, along = nodes @ normal, nodes @ direction
@@ -40,6 +38,14 @@ def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
     ):
         return None
     return _flat_states(interface, along, direction, normal, float(heights[:n_slave].mean() - heights[n_slave:].mean()))
+
+
+def slave_direction(interface: Interface) -> FloatArray | None:
+    """Return the unit vector (2,) from the slave's first to its last nodes; None if its chains are closed."""
+    ends = interface.nodes[interface.slave.segments]
+    chord = (ends[:, 1] - ends[:, 0]).sum(axis=0)
+    direction: FloatArray = chord / (np.hypot(*chord) or 1.0)
+    return direction if chord.any() else None
 
 
 @st.composite

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.strategies.contact import radial_factor
 from contactverif.strategies.panels import Panel, on_lattice, shortest
 from contactverif.strategies.parts import depth_units, depths, repeat_cyclically, shifts
 
@@ -29,7 +30,8 @@ class Ring:
     inner_slave : bool
         The slave is the disc, else the hole around it.
     quarters, unit : Sequence[int] or float
-        As of `Broken`, measured along the radius.
+        As of `Broken`, measured along the radius. Then the slave grows or shrinks as a whole until half of a segment
+        penetrates.
     """
 
     slave: Sequence[int]
@@ -50,7 +52,10 @@ class Ring:
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
         shift = shifts(offsets, len(reference)) * length
         slave = on_lattice(reference + outward * depth[:, None]) + shift
-        return Panel(slave, master, reference, closed=self.degrees == 360)
+        least, closed = min(self.unit * length / 4, RADIUS / 16), self.degrees == 360
+        edges = master[::-1] if self.inner_slave else master
+        factor = radial_factor(slave, edges, least, outside=self.inner_slave, closed=closed)
+        return Panel(slave * factor, master, reference, closed=closed)
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
         """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""

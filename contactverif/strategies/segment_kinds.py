@@ -141,7 +141,7 @@ def second_body(draw: DrawFn) -> Sketch:
     c = draw(st.sampled_from(ROUND_PLACES))
     steps, segment = draw(slave_steps(length / 8))
     first = _graph(draw, length, slopes=False)
-    cuts = draw(st.sampled_from([[], [0.5], [0.25, 0.625]]))
+    cuts = draw(st.sampled_from([[], [0.5625], [0.3125, 0.6875]]))  # Odd sixteenths: the point is at an eighth.
     second = upper_side([(x * length, -behind) for x in (-0.5, *cuts, 1.5)])
     if draw(st.booleans()):  # The second chain faces away: it is the lower side of the first body.
         second = Chain(second.points[::-1])

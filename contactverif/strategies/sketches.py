@@ -29,6 +29,9 @@ _SIZES = st.integers(1, 28), st.sampled_from([1.0, 0.75])  # The draws e and par
 _TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 _STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
 _COUNTS = st.integers(0, 2)
+# Whether a second pair of chains is in contact. Hypothesis draws the simplest value more often than others, so two
+# draws decide.
+_COMPANY = st.tuples(*[st.sampled_from([False, True, True, True])] * 2).map(any)
 _LENGTHS = st.sampled_from([1.0, 2.0, 0.5, 0.25, 4.0])
 
 
@@ -124,7 +127,11 @@ def _mirror(chain: Chain) -> Chain:
 
 @st.composite
 def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
-    """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about."""
+    """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about.
+
+    Many kinds are open, edge-on or past an end. So most cases have company: beside the sketch stands a slave segment in
+    contact with a master segment.
+    """
     sketch = draw(sketches)
     if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
@@ -132,12 +139,28 @@ def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
     penalty, seed = draw(penalties()), draw(seeds())
     stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(shuffles())
     reference = replace(sketch.slave, points=sketch.slave.points * stretch)
-    interface, order = assemble_chains([sketch.slave], sketch.masters, [reference], motion.scale, shuffle)
-    current = np.vstack([sketch.slave.points, *(chain.points for chain in sketch.masters)])[order]
+    slaves, masters, references = [sketch.slave], list(sketch.masters), [reference]
+    if draw(_COMPANY):  # Drawn last, so that it goes first.
+        slave, master = _company(np.vstack([chain.points for chain in (*slaves, *masters)]))
+        slaves, masters, references = [*slaves, slave], [*masters, master], [*references, slave]
+    interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
+    current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
     first = int(np.flatnonzero(order == sketch.segment)[0])
     (segment,) = np.flatnonzero(interface.slave.segments[:, 0] == first)
     parameters = {"probe_segment": np.array(float(segment)), "probe_c": np.array(sketch.c)}
     return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=sketch.kind)
+
+
+def _company(points: FloatArray) -> tuple[Chain, Chain]:
+    """Return a slave segment that penetrates a master segment, to the right of a sketch's points (n, 2).
+
+    They are upside down: the slave is below and runs in −x, the master above in +x. So no slave of a sketch, which runs
+    in +x, faces that master, and none is near it.
+    """
+    low, high = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+    x, y = high[0] + (high - low).max(), low[1]
+    master = Chain(np.array([[x, y], [x + 2.0, y]]))
+    return Chain(np.array([[x + 1.5, y + 0.125], [x + 0.5, y + 0.125]])), master
 
 
 @cache

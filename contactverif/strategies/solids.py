@@ -29,7 +29,10 @@ INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
 POSITIONS = 200  # The number of positions of a punch that slides over one master segment.
 _LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
 _POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
-_TILTS = (1, 2, 3, 4, 5, 6, 13, 16, 20, 26)  # thirteenths of the approach: from 13 on contact ends within the interface
+_CLOSED_TILTS = (1, 2, 3, 4, 5, 6)  # Thirteenths of the approach: all of the interface is in contact.
+_TILTS = (*_CLOSED_TILTS, 13, 16, 20, 26)  # From 13 on contact ends within the interface.
+# Stiffer springs get a larger approach, so that gaps are far longer than the steps that Newton's method is judged by.
+_SMALLEST_STRAIN = {10.0: 6, 64.0: 5}  # The exponents of the smallest strain 2^-e.
 _STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
 _OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # Left and right; −1: the master overhangs.
 _PARTS = 8  # A master may end at this many parts of a slave segment.
@@ -77,8 +80,16 @@ def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     Given a scene, that scene alone.
     """
     if scene is None:
-        return _tilted_blocks()
+        return _tilted_blocks(_TILTS)
     return st.just(scene) if has_bodies(scene) else None
+
+
+def closed_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return scenes as `solid_cases` does, all of the interface in contact: for what has nothing to do with opening.
+
+    Given a scene, that scene alone.
+    """
+    return _tilted_blocks(_CLOSED_TILTS) if scene is None else solid_cases(scene)
 
 
 def _uniform(scene: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
@@ -146,13 +157,14 @@ def _dead_zones(draw: DrawFn) -> Case:
 
 
 @st.composite
-def _tilted_blocks(draw: DrawFn) -> Case:
+def _tilted_blocks(draw: DrawFn, tilts: Sequence[int]) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    strain, motion, seed = draw(st.integers(5, 8).map(lambda e: 2.0**-e)), draw(motions(furthest=16)), draw(seeds())
-    tilt, sevenths = draw(st.sampled_from(_TILTS)), draw(st.integers(1, 6))
+    exponent, motion, seed = draw(st.integers(5, 8)), draw(motions(furthest=16)), draw(seeds())
+    tilt, sevenths = draw(st.sampled_from(tilts)), draw(st.integers(1, 6))
     stiff = draw(st.sampled_from([1.0, 10.0, 0.125, 64.0]))
+    strain = 2.0 ** -min(exponent, _SMALLEST_STRAIN.get(stiff, exponent))
     x = _grid(slave)
     # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
     moved = x + sevenths / 7 + np.resize([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4

@@ -1,7 +1,8 @@
 """Exact ties, where a formulation must decide and none of its choices is wrong: each case stands on a kink.
 
 Slave nodes over master nodes, quarter points over master nodes, points on the bisector of a vertex, ends at ends, gaps
-of exactly zero. Motions are quarter turns and whole numbers, so that a tie stays one bit for bit.
+of exactly zero. Motions are quarter turns and whole numbers, so that a tie stays one bit for bit. Where all gaps would
+be zero or open, the slave sinks a little, so that something is in contact.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.strategies.contact import sink_below
 from contactverif.strategies.panels import Panel, assemble_panels
 from contactverif.strategies.parts import depth_units, motions, penalties, repeat_cyclically, seeds
 
@@ -67,15 +69,26 @@ def _on_bisector(
     x -= segments[0][0] * segments[0][1] / 4
     reach = 4 * x[-1]
     line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
-    slave = np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)])
+    slave = sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
     return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
 
 
 def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
     """Return a panel with slave nodes at x, sunk below the broken line (n, 2)."""
     heights = np.interp(x, *line.T)
-    slave = np.column_stack([x, heights - repeat_cyclically(quarters, len(x)) / 4 * unit])
+    depths = repeat_cyclically(quarters, len(x)) / 4 * unit
+    slave = np.column_stack([x, heights - depths])
+    if not _deepest_segment_touches(slave, line):
+        slave = sink_below(slave, line, unit / 4)
     return Panel(slave, line[::-1], np.column_stack([x, heights]))
+
+
+def _deepest_segment_touches(slave: FloatArray, line: FloatArray) -> bool:
+    """Return whether a node and a quarter point beside it are below the line, so that a gap of zero may stay."""
+    x = slave[:, 0]
+    quarters = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
+    here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, quarters))
+    return bool(here[np.r_[: len(x) - 1, 1 : len(x)]][there].any())
 
 
 _ARGUMENTS = (

@@ -60,7 +60,8 @@ def _translated_cases(draw: DrawFn) -> Case:
     degrees = 0 if kind == "plain" else draw(_angles(at_least=int(kind == "turned")))
     penalty, seed, shift = draw(penalties()), draw(seeds()), draw(exact_shifts())
     offsets = draw(OFFSETS)
-    line = _master_line(master_lengths, sum(slave_lengths), rises, offsets, covers=kind != "overhang")
+    covers, several = kind != "overhang", len(slave_lengths) > 1
+    line = _master_line(master_lengths, sum(slave_lengths), rises, offsets, covers=covers, several=several)
     slave = _slave_below(line, slave_lengths, offsets)
     moves = repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * _way_to_the_end(slave, tilt)
     current = slave - moves[:, None] * [0.0, 1.0]
@@ -84,10 +85,13 @@ def exact_shifts() -> SearchStrategy[FloatArray]:
 
 
 def _master_line(
-    lengths: Sequence[int], width: int, rises: Sequence[int], offsets: Sequence[int], *, covers: bool
+    lengths: Sequence[int], width: int, rises: Sequence[int], offsets: Sequence[int], *, covers: bool, several: bool
 ) -> FloatArray:
-    """Return the master's points (n, 2) from left to right, beyond the slave at both ends or short of its last node."""
-    begin, end = (-1.0, width + 1.0) if covers else (0.5, width - 0.375)
+    """Return the master's points (n, 2) from left to right, beyond the slave at both ends or short of it.
+
+    It is short of the slave's last node, and of the first one too unless the slave may have no other.
+    """
+    begin, end = (-1.0, width + 1.0) if covers else (0.5 if several else -1.0, width - 0.375)
     x = [begin, *(place for place in accumulate(lengths, initial=0) if begin < place < end), end]
     shift = repeat_cyclically(offsets, len(x)) / 13 / 16
     heights = np.concatenate([[0.0], np.cumsum(np.resize(rises, len(x) - 1))]) / 8

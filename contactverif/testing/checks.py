@@ -65,16 +65,18 @@ class Check:
         Raises
         ------
         AssertionError
-            If a promise is broken, something crashes, was not judged or does not load.
+            If a promise is broken, something crashes, was not judged or does not load, or if forces have the opposite
+            sign.
         """
         __tracebackhide__ = True
         for part in (self.subject, self.question):
             if isinstance(part, NotLoaded):
                 raise AssertionError(f"{part.formulation}: not loaded: {part.reason}")
-        [self.row] = run([self.subject], [self.question], profile=self.profile, known=self.known).rows
-        row = self.row
-        if row.unexpected:
-            raise AssertionError(explain(row, command=self._command()))
+        result = run([self.subject], [self.question], profile=self.profile, known=self.known)
+        [self.row] = result.rows
+        row, opposite_sign = self.row, bool(result.opposite_signs)
+        if row.unexpected or opposite_sign:
+            raise AssertionError(explain(row, command=self._command(), opposite_sign=opposite_sign))
         if row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED):
             pytest.skip(row.reason)
         if row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.known:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, excess
-from contactverif.contract.result import Row
+from contactverif.contract.result import OPPOSITE_SIGN, Row
 
 
-def explain(row: Row, *, command: str) -> str:
+def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
     """Say to a person why a row makes a run fail.
 
     Parameters
@@ -17,6 +17,8 @@ def explain(row: Row, *, command: str) -> str:
         A row that is not as it was expected.
     command : str
         The command that runs the check again.
+    opposite_sign : bool
+        The forces have the opposite sign. That is said first.
 
     Returns
     -------
@@ -24,11 +26,15 @@ def explain(row: Row, *, command: str) -> str:
         Several lines; all but the first are indented.
     """
     question = row.info
-    lines = [f"{row.formulation}, {question.id}: {row.unexpected}", f"  The property: {question.summary}"]
+    lines = [f"{row.formulation}: {OPPOSITE_SIGN}"] if opposite_sign else []
+    lines += [f"{row.formulation}, {question.id}: {row.unexpected}"] if row.unexpected else []
+    lines.append(f"  The property: {question.summary}")
     if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
         lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
     if row.reason:
         lines.append(f"  The worst case: {row.reason}" if row.shrunk else f"  The reason: {row.reason}")
+    if row.suspicion:
+        lines.append(f"  {row.suspicion}")
     outcome = row.shrunk or row.witness
     if outcome is not None:
         lines += _example(row, outcome)
@@ -58,6 +64,8 @@ def _numbers(question: PropertyInfo, outcome: Outcome) -> list[str]:
         mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
         lines.append(f"    {mark} {quantity.name}: {value:.6g}; needed: {quantity.sense} {tolerance:.3g}")
         lines.append(f"      tolerance: {quantity.tolerance} ({quantity.reason})")
+    if measurement.place:
+        lines.append(f"    {measurement.place}")
     return lines
 
 

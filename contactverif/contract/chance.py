@@ -1,0 +1,48 @@
+"""The chance of a count: whether more cases are undecided than a share explains."""
+
+from __future__ import annotations
+
+from math import exp, lgamma, log, log1p
+
+# A run has about a thousand rows, and accuses one of them by chance once in ten runs.
+BY_CHANCE = 1e-4
+
+
+def exceeds(count: int, number: int, share: float) -> bool:
+    """Return whether so many of some independent cases, or more, would be rarer than `BY_CHANCE`.
+
+    Parameters
+    ----------
+    count : int
+        The number of cases that are of some kind.
+    number : int
+        The number of all cases.
+    share : float
+        The probability that a case is of that kind.
+
+    Returns
+    -------
+    bool
+        True if the binomial probability of `count` or more is below `BY_CHANCE`.
+    """
+    if count <= number * share:
+        return False
+    return _at_least(count, number, share) < BY_CHANCE
+
+
+def _at_least(count: int, number: int, share: float) -> float:
+    """Return the binomial probability of `count` or more; terms that no longer count are left out."""
+    total = 0.0
+    for n in range(count, number + 1):
+        term = _probability(n, number, share)
+        total += term
+        if term <= 1e-6 * total:
+            break
+    return total
+
+
+def _probability(count: int, number: int, share: float) -> float:
+    if not 0 < share < 1:
+        return float(count == number * share)
+    exponent = count * log(share) + (number - count) * log1p(-share)
+    return exp(exponent + lgamma(number + 1) - lgamma(count + 1) - lgamma(number - count + 1))

@@ -1,0 +1,130 @@
+"""Two concentric arcs that penetrate each other: an interface without bodies, with the exact limit of its forces.
+
+All slave points penetrate by the same depth, so that springs press with the same pressure everywhere. On a mesh of
+straight segments forces differ from that by the square of their length, whatever the rule by which a formulation
+measures gaps. Springs that depend on how the surface bends differ on every mesh.
+
+Rule for the next editor: the master reaches beyond the slave at either end, so that nothing overhangs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+
+GRADE = 0.15  # Angles of the master are graded by so much, so that nodes do not meet nodes of the slave.
+SEGMENTS = (3, 4)  # Numbers of segments of slave and master on the coarsest mesh, at refine = 1.
+
+
+@dataclass(frozen=True, slots=True)
+class Arcs:
+    """Two concentric arcs.
+
+    Attributes
+    ----------
+    radius : float
+        The radius of the master, a length.
+    depth : float
+        The penetration d > 0, a length.
+    convex_slave : bool
+        True if the slave's body lies inside its arc, else around it.
+    slave, master : tuple[float, float]
+        The angles at which each begins and ends, in degrees.
+    penalty : float
+        The distributed stiffness ε̂.
+
+    Examples
+    --------
+    >>> from contactverif.scenes.arcs import Arcs
+    >>> arcs = Arcs(convex_slave=True)
+    >>> arcs.slave_radius, arcs.pressure
+    (4.1, 1.0)
+    """
+
+    radius: float = 4.0
+    depth: float = 0.1
+    convex_slave: bool = True
+    slave: tuple[float, float] = (10.0, 80.0)
+    master: tuple[float, float] = (0.0, 90.0)
+    penalty: float = 10.0
+
+    @property
+    def slave_radius(self) -> float:
+        """The radius of the slave: a convex one reaches out over the master, a concave one in."""
+        return self.radius + (self.depth if self.convex_slave else -self.depth)
+
+    @property
+    def pressure(self) -> float:
+        """The pressure ε̂ d on the slave, force per length."""
+        return self.penalty * self.depth
+
+    @property
+    def length(self) -> float:
+        """The length of the slave's arc."""
+        return self.slave_radius * radians(self.slave[1] - self.slave[0])
+
+    @property
+    def slave_force(self) -> FloatArray:
+        """The force (2,) that pushes the slave: the integral of the pressure along its arc, towards its body."""
+        first, last = map(radians, self.slave)
+        outwards = np.array([sin(last) - sin(first), cos(first) - cos(last)]) * self.slave_radius
+        force: FloatArray = self.pressure * (-outwards if self.convex_slave else outwards)
+        return force
+
+    def case(self, refine: int = 1, name: str = "") -> Case:
+        """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike.
+
+        Parameters
+        ----------
+        refine : int
+            The factor of the numbers of segments.
+        name : str
+            The name of the case.
+
+        Returns
+        -------
+        Case
+            The state of both arcs. The reference has the slave on the master's arc.
+        """
+        shares = np.linspace(0, 1, SEGMENTS[0] * refine + 1), np.linspace(0, 1, SEGMENTS[1] * refine + 1)
+        slave = _directions(self.slave, shares[0])
+        master = _directions(self.master, shares[1] + GRADE * shares[1] * (1 - shares[1]))
+        if self.convex_slave:  # The body is on the left: counter-clockwise around it.
+            master = master[::-1]
+        else:
+            slave = slave[::-1]
+        interface = Interface.from_chains(self.radius * slave, self.radius * master)
+        z = np.concatenate([self.slave_radius * slave, self.radius * master]).reshape(-1)
+        facts = {
+            "radius": np.array(self.radius),
+            "depth": np.array(self.depth),
+            "convex_slave": np.array(float(self.convex_slave)),
+            "slave": np.array(self.slave),
+            "master": np.array(self.master),
+        }
+        return Case(interface, z, self.penalty, facts, name=name)
+
+    @classmethod
+    def from_case(cls, case: Case) -> Arcs:
+        """Return the arcs that a case was made of by `case`, on whatever mesh."""
+        (slave, master) = (tuple(case.parameters[side].tolist()) for side in ("slave", "master"))
+        return cls(
+            case.parameter("radius"),
+            case.parameter("depth"),
+            bool(case.parameter("convex_slave")),
+            slave,
+            master,
+            case.penalty,
+        )
+
+
+def _directions(degrees: tuple[float, float], shares: FloatArray) -> FloatArray:
+    """Return unit vectors (n, 2) at shares (n,) of the way from one angle to another."""
+    angles = np.radians(degrees[0] + (degrees[1] - degrees[0]) * shares)
+    return np.column_stack([np.cos(angles), np.sin(angles)])

@@ -1,0 +1,158 @@
+"""Stresses and displacements in an elastic half-plane under a pressure on its surface.
+
+Axes: x along the surface, the depth η ≥ 0 into the body. A stress is positive in tension. Displacements are those of
+plane strain, with E' = E/(1 − ν²) and ν' = ν/(1 − ν); they grow like ln r, so that only differences mean something.
+
+Rule for the next editor: nothing here knows a mesh, a body or a formulation.
+
+References
+----------
+K. L. Johnson, Contact Mechanics (1985), equations 2.14 and 2.19 (line load, Flamant), 2.24 (displacements of the
+surface) and 4.49 (McEwan's stresses under Hertz' pressure).
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.scenes.line_pressure import LinePressure
+
+_CHUNK = 512  # Number of points that are superposed at once, so that tables stay in the cache.
+
+
+def line_load_stresses(x: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return the stresses of a line load of 1 per thickness at x = 0 that presses into the body (Johnson, 2.14).
+
+    Parameters
+    ----------
+    x, depth : FloatArray, shape (...,)
+        The place, a length each; not the load's own.
+
+    Returns
+    -------
+    FloatArray, shape (..., 3)
+        The stresses σ_xx, σ_ηη and σ_xη, per length.
+    """
+    factor = -2 * depth / (pi * (x**2 + depth**2) ** 2)
+    return np.stack([factor * x**2, factor * depth**2, factor * x * depth], axis=-1)
+
+
+def line_load_displacements(x: FloatArray, depth: FloatArray, poisson: float) -> FloatArray:
+    """Return E/(1 − ν²) times the displacements of a line load of 1 per thickness at x = 0 (Johnson, 2.19).
+
+    Parameters
+    ----------
+    x, depth : FloatArray, shape (...,)
+        The place, a length each; not the load's own.
+    poisson : float
+        Poisson's ratio ν.
+
+    Returns
+    -------
+    FloatArray, shape (..., 2)
+        The displacements along x and into the body, without unit: a displacement times E/(1 − ν²) over a force per
+        thickness.
+    """
+    contraction, square = poisson / (1 - poisson), x**2 + depth**2
+    along = -(1 - contraction) * np.arctan2(x, depth) + (1 + contraction) * x * depth / square
+    into = -np.log(square) - (1 + contraction) * x**2 / square
+    return np.stack([along, into], axis=-1) / pi
+
+
+def stresses(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return the stresses under a pressure on the surface, by superposing Flamant's solution.
+
+    Parameters
+    ----------
+    pressure : LinePressure
+        The pressure.
+    x, depth : FloatArray, shape (n,)
+        The places, some way from the loaded strip: the error is 1e-11 of the peak at a distance a, 1e-8 at a/4.
+
+    Returns
+    -------
+    FloatArray, shape (n, 3)
+        The stresses σ_xx, σ_ηη and σ_xη, force per length squared.
+    """
+    places, forces = pressure.line_loads()
+    parts = [
+        np.einsum("psk,s->pk", line_load_stresses(along[:, None] - places, down[:, None]), forces)
+        for along, down in _chunks(x, depth)
+    ]
+    return np.concatenate(parts)
+
+
+def displacements(pressure: LinePressure, x: FloatArray, depth: FloatArray, young: float, poisson: float) -> FloatArray:
+    """Return the displacements under a pressure on the surface, by superposing Flamant's solution.
+
+    Parameters
+    ----------
+    pressure : LinePressure
+        The pressure.
+    x, depth : FloatArray, shape (n,)
+        The places, some way from the loaded strip.
+    young, poisson : float
+        Young's modulus E, force per length squared, and Poisson's ratio ν.
+
+    Returns
+    -------
+    FloatArray, shape (n, 2)
+        The displacements along x and into the body, a length each. Lengths in the logarithm are over the half-width.
+    """
+    places, forces = pressure.line_loads()
+    unit = pressure.half_width
+    parts = [
+        np.einsum(
+            "psk,s->pk",
+            line_load_displacements((along[:, None] - places) / unit, down[:, None] / unit, poisson),
+            forces,
+        )
+        for along, down in _chunks(x, depth)
+    ]
+    return np.concatenate(parts) * (1 - poisson**2) / young
+
+
+def surface_displacements(pressure: LinePressure, x: FloatArray, young: float, poisson: float) -> FloatArray:
+    """Return the displacements (n, 2) of the surface at x (n,), anywhere, along x and into the body (Johnson, 2.24).
+
+    Their constants are those of `displacements`.
+    """
+    beyond = pressure.force - 2 * pressure.force_up_to(x)
+    contraction = poisson / (1 - poisson)
+    along = (1 - contraction) / 2 * beyond
+    into = pressure.deflection(x) - (1 + contraction) / pi * pressure.force
+    return np.stack([along, into], axis=-1) * (1 - poisson**2) / young
+
+
+def mcewan_stresses(x: FloatArray, depth: FloatArray, half_width: float, peak: float) -> FloatArray:
+    """Return the stresses (..., 3) under Hertz' pressure in closed form (McEwan; Johnson, 4.49).
+
+    Parameters
+    ----------
+    x, depth : FloatArray, shape (...,)
+        The place, a length each; anywhere in the body.
+    half_width, peak : float
+        The half-width a of the contact and the pressure p0 in its middle.
+
+    Returns
+    -------
+    FloatArray, shape (..., 3)
+        The stresses σ_xx, σ_ηη and σ_xη, force per length squared.
+    """
+    inside = half_width**2 - x**2 + depth**2
+    root = np.hypot(inside, 2 * x * depth)
+    m = np.sqrt((root + inside) / 2)
+    n = np.copysign(np.sqrt(np.maximum(root - inside, 0.0) / 2), x)
+    square = np.maximum(m**2 + n**2, np.finfo(float).tiny)
+    share = (depth**2 + n**2) / square
+    normal = [m * (1 + share) - 2 * depth, m * (1 - share)]
+    shear = n * (m**2 - depth**2) / square
+    return -peak / half_width * np.stack([*normal, shear], axis=-1)
+
+
+def _chunks(x: FloatArray, depth: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    count = max(1, -(-len(x) // _CHUNK))
+    return list(zip(np.array_split(x, count), np.array_split(depth, count), strict=True))

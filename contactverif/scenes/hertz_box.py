@@ -1,0 +1,334 @@
+"""Hertz' contact in two boxes: a parabola on a flat, with the exact stresses of half-planes on the sides of both.
+
+The boxes are |x| ≤ 4a, 0 ≤ η ≤ 8a with the depth η into each body; the contact is |x| ≤ a with a/R = 1e-3. Since the
+sides carry the stresses of half-planes, no error of a finite size remains. Those of the multiplier's solution (1/ε̂ = 0)
+are McEwan's. With a penalty ε̂ the pressure is that of a layer of springs, and the stresses are Flamant's, superposed.
+
+Supports take no load in the exact solution. The far node of each body next to the axis has the exact displacement
+along x, and displacements into each body are those relative to this named point. The flat is held there; the node half
+as deep has the exact displacement along x too, so that the flat cannot turn. The parabola is held by contact alone, so
+that the whole force is given.
+
+What is left of a finite slope and of finite deformations is of the order a/R: 3e-4 in nodal forces.
+
+Rules for the next editor: no node of one body meets one of the other in the contact. On each mesh the edges of the
+contact divide segments one to two and two to one, so that errors fall evenly: with edges anywhere, they scatter by a
+factor of 3. Cells grow away from the contact by a share that falls like √h, so that the error of the mesh itself falls
+like h.
+
+References
+----------
+K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from math import ceil, gcd, log1p, sqrt
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.body import Body
+from contactverif.contract.errors import MisuseError
+from contactverif.mechanics.scene import Scene
+from contactverif.scenes.disk import grade
+from contactverif.scenes.half_plane import displacements, stresses, surface_displacements
+from contactverif.scenes.line_pressure import LinePressure, hertz_contact, layer_contact
+
+# Lengths over the half-width of the contact.
+SIDE, DEPTH = 4.0, 8.0
+ZONE = 0.28  # Equally long segments reach at least this far beyond the edges of the contact. They may touch.
+COARSEST = 16  # Number of the parabola's segments across the contact on the coarsest mesh.
+RATIO = 8 / 7  # The flat has at least so many segments for each of the parabola's.
+GROWTH = 0.3  # Cells grow by this share of their distance from the zone on the coarsest mesh, by √h/h₀ of it on others.
+_POINTS = 8  # Number of Gauss points on each edge of a loaded side.
+
+
+@dataclass(frozen=True, slots=True)
+class HertzBox:
+    """The data of a parabola that is pressed on a flat.
+
+    Attributes
+    ----------
+    half_width : float
+        The half-width a of the contact, a length.
+    radius : float
+        The radius R of the parabola y = x²/2R, a length.
+    young, poisson : tuple[float, float]
+        Young's moduli, force per length squared, and Poisson's ratios of parabola and flat.
+    """
+
+    half_width: float = 1.0
+    radius: float = 1000.0
+    young: tuple[float, float] = (1.0, 3.0)
+    poisson: tuple[float, float] = (0.3, 0.2)
+
+    @property
+    def stiffness(self) -> float:
+        """The stiffness E* of both bodies together, 1/E* = Σ (1 − ν²)/E, force per length squared."""
+        pairs = zip(self.young, self.poisson, strict=True)
+        return 1 / sum((1 - poisson**2) / young for young, poisson in pairs)
+
+    def pressure(self, penalty: float | None) -> LinePressure:
+        """Return the exact pressure with the distributed penalty ε̂, or that of multipliers (None)."""
+        return _pressure(self, penalty)
+
+
+@cache
+def _pressure(box: HertzBox, penalty: float | None) -> LinePressure:
+    if penalty is None:
+        return hertz_contact(box.half_width, box.radius, box.stiffness)
+    return layer_contact(box.half_width, box.radius, box.stiffness, penalty)
+
+
+@cache
+def hertz_box(
+    box: HertzBox = HertzBox(),
+    *,
+    penalty: float,
+    rigid_layer: bool = False,
+    across: int = COARSEST,
+    parabola_is_slave: bool = True,
+    name: str = "",
+) -> Scene:
+    """Return the scene. Its first guess lowers the parabola as it is by a²/2R, so that it penetrates for |x| < a.
+
+    Parameters
+    ----------
+    box : HertzBox
+        Lengths and materials.
+    penalty : float
+        The penalty ε̂ of the scene.
+    rigid_layer : bool
+        True takes the exact solution of multipliers, 1/ε̂ = 0, and uses the penalty for nothing else.
+    across : int
+        The number of the parabola's segments across the contact, 2a/h − 1/3.
+    parabola_is_slave : bool
+        False makes the flat the slave.
+    name : str
+        The name of the scene.
+
+    Raises
+    ------
+    MisuseError
+        If `across` is below 16.
+    """
+    if across < COARSEST:
+        raise MisuseError("across", f"{across}", f"at least {COARSEST} segments across the contact")
+    law = None if rigid_layer else penalty
+    bodies = hertz_body(box, 0, penalty=law, across=across), hertz_body(box, 1, penalty=law, across=across)
+    return Scene(bodies if parabola_is_slave else bodies[::-1], penalty=penalty, name=name)
+
+
+@cache
+def hertz_body(box: HertzBox, number: int, *, penalty: float | None, across: int = COARSEST) -> Body:
+    """Return parabola (0) or flat (1) with its tractions and supports; the parabola lies above, y = x²/2R + η.
+
+    Parameters
+    ----------
+    box : HertzBox
+        Lengths and materials.
+    number : int
+        0 is the parabola, 1 the flat.
+    penalty : float | None
+        The distributed penalty ε̂ of the exact solution; None is that of multipliers.
+    across : int
+        The number of the parabola's segments across the contact, 2a/h − 1/3.
+    """
+    pressure, a = box.pressure(penalty), box.half_width
+    x, depth, zone = (a * lines for lines in mesh_lines(number, across))
+    grid = np.arange(len(x) * len(depth)).reshape(len(depth), len(x))
+    along, down = (part.reshape(-1) for part in np.meshgrid(x, depth))
+    load = side_forces(pressure, x, depth).reshape(-1, 2)
+    axis = int(np.abs(x).argmin())
+    supports = [grid[-1, axis], grid[len(depth) // 2, axis]]
+    exact = displacements(pressure, along[supports], down[supports], box.young[number], box.poisson[number])
+    fixed, imposed = np.zeros(load.shape, bool), np.zeros(load.shape)
+    if number == 0:
+        supports = supports[:1]
+    else:
+        fixed[supports[0], 1] = True
+    fixed[supports, 0], imposed[supports, 0] = True, exact[: len(supports), 0]
+    up = 1.0 if number == 0 else -1.0
+    height = along**2 / (2 * box.radius) * (1 - down / depth[-1]) if number == 0 else 0.0
+    walk = grid[0] if number == 0 else grid[0, ::-1]
+    inside = walk[np.isin(along[walk], zone)]
+    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+    cells = np.stack(corners[:: int(up)], axis=-1).reshape(-1, 4)
+    return Body(
+        np.column_stack([along, up * down + height]),
+        cells,
+        np.column_stack([inside[:-1], inside[1:]]),
+        box.young[number],
+        box.poisson[number],
+        fixed=fixed,
+        imposed=imposed,
+        load=load * [1, up],
+        start=np.array([0.0, -(a**2) / (2 * box.radius) if number == 0 else 0.0]),
+        name=("parabola", "flat")[number],
+    )
+
+
+def mesh_lines(number: int, across: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return columns x (n,) and rows η (m,) over a, and the nodes (n_contact,) of the zone among the columns.
+
+    An edge of the contact divides a segment one to two, the other edge two to one, so that errors fall evenly with h.
+    """
+    count = segments_across(number, across)
+    part = (number + 1) / 3
+    size = 2 / (count + part)
+    beyond = ceil(ZONE / size)
+    zone = -1 + size * (np.arange(count + 2.0 * beyond + 2) - beyond - part)
+    growth = GROWTH * sqrt(COARSEST / across)
+    lengths = SIDE + zone[0], SIDE - zone[-1], DEPTH
+    steps = [ceil(log1p(growth * length / size) / growth) for length in lengths]
+    left, right, depth = (grade(length, size, parts, parts) for length, parts in zip(lengths, steps, strict=True))
+    x: FloatArray = np.concatenate([zone[0] - left[:0:-1], zone, zone[-1] + right[1:]])
+    return x, depth, np.array(zone, dtype=np.float64)
+
+
+def segments_across(number: int, across: int) -> int:
+    """Return how many whole segments of parabola (0) or flat (1) lie across the contact: of the parabola `across`.
+
+    The number of the flat is such that no node of one side meets one of the other.
+    """
+    if number == 0:
+        return across
+    count = ceil(RATIO * across)
+    while gcd(3 * across + 1, 3 * count + 2) > 1:
+        count += 1
+    return count
+
+
+def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return the nodal forces of the half-plane's stresses on both sides and on the far edge of a box.
+
+    Parameters
+    ----------
+    pressure : LinePressure
+        The pressure on the surface η = 0.
+    x, depth : FloatArray, shapes (n,) and (m,)
+        The columns and the rows of the box, ascending lengths.
+
+    Returns
+    -------
+    FloatArray, shape (m, n, 2)
+        The forces along x and into the body, per thickness.
+    """
+    forces = np.zeros((len(depth), len(x), 2))
+    for column, sign in ((0, -1), (-1, 1)):
+        forces[:, column] += sign * _edge_forces(depth, partial(_traction_on_side, pressure, float(x[column])))
+    forces[-1] += _edge_forces(x, partial(_traction_below, pressure, float(depth[-1])))
+    return forces
+
+
+def _traction_on_side(pressure: LinePressure, x: float, depth: FloatArray) -> FloatArray:
+    """Return σ_xx and σ_xη (n, 2) at depths (n,) on the side at x."""
+    return stresses(pressure, np.full(len(depth), x), depth)[:, [0, 2]]
+
+
+def _traction_below(pressure: LinePressure, depth: float, x: FloatArray) -> FloatArray:
+    """Return σ_xη and σ_ηη (n, 2) at x (n,) on the far edge."""
+    return stresses(pressure, x, np.full(len(x), depth))[:, [2, 1]]
+
+
+def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return ∫ N_i t ds (n, 2) along a side with nodes at `lines` (n,)."""
+    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+    share, lengths = (points + 1) / 2, np.diff(lines)
+    places = lines[:-1, None] + share * lengths[:, None]
+    values = traction(places.reshape(-1)).reshape(*places.shape, 2) * (weights / 2 * lengths[:, None])[..., None]
+    forces = np.zeros((len(lines), 2))
+    forces[:-1] += np.einsum("p,epk->ek", 1 - share, values)
+    forces[1:] += np.einsum("p,epk->ek", share, values)
+    return forces
+
+
+def nodal_forces(pressure: LinePressure, x: FloatArray) -> FloatArray:
+    """Return ∫ N_i p ds (n,) at ascending nodes x (n,), exact."""
+    force, moment = np.diff(pressure.force_up_to(x)), np.diff(pressure.moment_up_to(x))
+    towards_second = (moment - x[:-1] * force) / np.diff(x)
+    forces = np.zeros(len(x))
+    forces[1:] += towards_second
+    forces[:-1] += force - towards_second
+    return forces
+
+
+def exact_displacements(box: HertzBox, penalty: float | None, number: int, x: FloatArray, across: int) -> FloatArray:
+    """Return the exact displacements of the surface of a body, along x and upwards.
+
+    Parameters
+    ----------
+    box : HertzBox
+        Lengths and materials.
+    penalty : float | None
+        The distributed penalty ε̂ of the exact solution; None is that of multipliers.
+    number : int
+        0 is the parabola, 1 the flat.
+    x : FloatArray, shape (n,)
+        The places, a length each.
+    across : int
+        The number of the parabola's segments across the contact, which says where the named point of the flat is.
+
+    Returns
+    -------
+    FloatArray, shape (n, 2)
+        The flat's displacements are those relative to its named point; the parabola's are such that both surfaces fit.
+    """
+    pressure = box.pressure(penalty)
+    young, poisson = box.young[number], box.poisson[number]
+    moves = surface_displacements(pressure, x, young, poisson)
+    if number == 1:
+        lines, depth, _ = mesh_lines(1, across)
+        named = box.half_width * lines[np.abs(lines).argmin()], box.half_width * depth[-1]
+        moves -= [0, 1] * displacements(pressure, np.array(named[:1]), np.array(named[1:]), young, poisson)[0]
+        return moves * [1, -1]
+    centre = np.zeros(1)
+    below = exact_displacements(box, penalty, 1, centre, across)[0, 1]
+    layer = 0.0 if penalty is None else pressure.peak / penalty
+    moves[:, 1] += below - layer - surface_displacements(pressure, centre, young, poisson)[0, 1]
+    return moves
+
+
+def exact_forces(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_slave: bool) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) that push the nodes of a scene of `hertz_box`, ∫ N_i p ds.
+
+    Parameters
+    ----------
+    box : HertzBox
+        Lengths and materials.
+    penalty : float | None
+        The distributed penalty ε̂ of the exact solution; None is that of multipliers.
+    scene : Scene
+        The scene.
+    parabola_is_slave : bool
+        The choice of the slave in the scene.
+    """
+    interface, pressure = scene.interface, box.pressure(penalty)
+    forces = np.zeros((interface.n_nodes, 2))
+    for nodes, slave in zip(_sides(scene), (True, False), strict=True):
+        order = nodes[np.argsort(interface.nodes[nodes, 0])]
+        up = 1.0 if slave == parabola_is_slave else -1.0
+        forces[order, 1] = up * nodal_forces(pressure, interface.nodes[order, 0])
+    return forces
+
+
+def exact_moves(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_slave: bool, across: int) -> FloatArray:
+    """Return the exact displacements (n_nodes, 2) of the nodes of a scene of `hertz_box`, along x and upwards.
+
+    Arguments are those of `exact_forces` and `exact_displacements`.
+    """
+    moves = np.zeros((scene.interface.n_nodes, 2))
+    for nodes, slave in zip(_sides(scene), (True, False), strict=True):
+        number = 0 if slave == parabola_is_slave else 1
+        moves[nodes] = exact_displacements(box, penalty, number, scene.interface.nodes[nodes, 0], across)
+    return moves
+
+
+def _sides(scene: Scene) -> tuple[IntArray, IntArray]:
+    """Return the numbers of the slave's nodes and of the master's."""
+    numbers = np.arange(scene.interface.n_nodes)
+    return numbers[: scene.interface.n_slave_nodes], numbers[scene.interface.n_slave_nodes :]

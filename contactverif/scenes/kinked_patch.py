@@ -1,0 +1,218 @@
+"""Two elastic blocks whose interface is a broken line, under the same pressure from all sides.
+
+With equal materials the stress is hydrostatic and uniform, whatever the shape of the interface, and every facet of the
+interface bears the same pressure. That makes the scene a patch test of kinked surfaces. Springs give way by p/ε̂ along
+the normal of each facet. With two different normals a translation of one block does that, so that the uniform state is
+exact for any penalty. With three or more it is the limit for ε̂ → ∞.
+
+Rule for the next editor: nodes of both meshes lie at every kink, and nowhere else on one another.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.body import Body
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.mechanics.scene import Scene
+
+LAYERS = 2  # Layers of cells of each block.
+LOWER, UPPER = (0.0, 0.3, 0.65, 1.0), (0.0, 0.2, 0.45, 0.75, 1.0)  # Shares of each facet at which nodes lie.
+
+_FACTS = ("line", "height", "pressure", "young", "poisson")  # The attributes of KinkedPatch.
+
+
+@dataclass(frozen=True, slots=True)
+class KinkedPatch:
+    """Two blocks on a broken line.
+
+    Attributes
+    ----------
+    line : tuple[tuple[float, float], ...]
+        The ends of the facets from left to right, a length each.
+    height : float
+        The distance of bottom and top from y = 0, a length.
+    pressure : float
+        The pressure p on all sides, force per length.
+    young, poisson : float
+        Young's modulus and Poisson's ratio of both blocks.
+
+    Examples
+    --------
+    A roof: two normals, and a penetration of 0.1 along both is a translation.
+
+    >>> from contactverif.scenes.kinked_patch import KinkedPatch
+    >>> roof = KinkedPatch(line=((0.0, 0.0), (4.0, 3.0), (8.0, 0.0)))
+    >>> roof.normals.tolist()
+    [[-0.6, 0.8], [0.6, 0.8]]
+    >>> roof.translation(0.1).round(12).tolist()
+    [0.0, -0.125]
+    """
+
+    line: tuple[tuple[float, float], ...]
+    height: float = 6.0
+    pressure: float = 1e-6
+    young: float = 1.0
+    poisson: float = 0.3
+
+    @property
+    def normals(self) -> FloatArray:
+        """The unit normals (n_facets, 2) of the facets, upwards."""
+        along = np.diff(np.array(self.line), axis=0)
+        normals: FloatArray = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+        return normals
+
+    @property
+    def sharpest(self) -> float:
+        """The tangent of half the largest angle φ between the normals of two facets that meet."""
+        cosines = (self.normals[:-1] * self.normals[1:]).sum(axis=1)
+        return float(np.sqrt((1 - cosines) / (1 + cosines)).max())
+
+    @property
+    def contraction(self) -> float:
+        """The strain p (1 + ν)(1 − 2ν)/E by which both blocks become smaller in all directions."""
+        return self.pressure * (1 + self.poisson) * (1 - 2 * self.poisson) / self.young
+
+    def translation(self, penetration: float) -> FloatArray:
+        """Return the translation (2,) of the upper block that penetrates every facet by as much, a length.
+
+        With three or more normals it is the nearest by least squares.
+        """
+        answer: FloatArray = np.linalg.lstsq(self.normals, np.full(len(self.normals), -penetration))[0]
+        return answer
+
+    def displacement(self, places: FloatArray, penetration: float, *, upper: bool) -> FloatArray:
+        """Return the displacement (n, 2) of one block at places (n, 2): both contract, and the upper one moves down.
+
+        Parameters
+        ----------
+        places : FloatArray, shape (n, 2)
+            Places in the reference configuration.
+        penetration : float
+            The penetration p/ε̂, a length; 0 for multipliers.
+        upper : bool
+            The block.
+        """
+        hinge = np.array([self.line[0][0], -self.height])
+        displacement: FloatArray = -self.contraction * (places - hinge)
+        return displacement + self.translation(penetration) if upper else displacement
+
+    def cut(self, share: float = 0.25) -> KinkedPatch:
+        """Return the patch of a line with a third normal: one kink is cut off, from `share` of both facets.
+
+        Raises
+        ------
+        MisuseError
+            If the line has another number of facets than two.
+        """
+        if len(self.line) != 3:
+            raise MisuseError("line", f"{len(self.line) - 1} facets", "two facets, which meet in one kink")
+        first, kink, last = np.array(self.line)
+        ends = (first, kink + share * (first - kink), kink + share * (last - kink), last)
+        return replace(self, line=tuple((float(x), float(y)) for x, y in ends))
+
+    def forces(self, interface: Interface) -> FloatArray:
+        """Return the exact forces (n_nodes, 2) that push the nodes of a mesh of this interface."""
+        forces = np.zeros((interface.n_nodes, 2))
+        for surface in (interface.slave, interface.master):
+            along = interface.nodes[surface.segments[:, 1]] - interface.nodes[surface.segments[:, 0]]
+            inwards = self.pressure * np.column_stack([-along[:, 1], along[:, 0]])  # The body is on the left.
+            np.add.at(forces, surface.segments.reshape(-1), np.repeat(inwards / 2, 2, axis=0))
+        return forces
+
+
+@cache
+def kinked_patch(problem: KinkedPatch, *, upper_slave: bool = True, penalty: float = 1.0) -> Scene:
+    """Return the scene of both blocks; the lower one stands on a hinge and a roller, the upper one on the lower one.
+
+    Parameters
+    ----------
+    problem : KinkedPatch
+        Line, pressure and material.
+    upper_slave : bool
+        True if the upper block is the slave.
+    penalty : float
+        The distributed stiffness ε̂. The first guess is a penetration of p/ε̂ everywhere.
+
+    Returns
+    -------
+    Scene
+        The slave first. The facts are the attributes of the problem and "upper_slave", 1 or 0; `patch_of` reads them.
+    """
+    start = problem.translation(problem.pressure / penalty)
+    bodies = _block(problem, upper=True, start=start), _block(problem, upper=False, start=np.zeros(2))
+    facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
+    facts["upper_slave"] = np.array(float(upper_slave))
+    return Scene(bodies if upper_slave else bodies[::-1], penalty=penalty, facts=facts)
+
+
+def patch_of(case: Case) -> tuple[KinkedPatch, bool]:
+    """Return the problem of a case of `kinked_patch`, and whether its upper block is the slave."""
+    line = tuple((float(x), float(y)) for x, y in case.parameters["line"])
+    numbers = {name: case.parameter(name) for name in _FACTS if name != "line"}
+    return KinkedPatch(line, **numbers), bool(case.parameter("upper_slave"))
+
+
+def exact_unknowns(problem: KinkedPatch, scene: Scene, penetration: float) -> FloatArray:
+    """Return the unknowns q (n_free,) of the uniform state, which solves the scene if there are two normals.
+
+    Parameters
+    ----------
+    problem : KinkedPatch
+        The problem.
+    scene : Scene
+        Its scene.
+    penetration : float
+        The penetration p/ε̂, a length; 0 for multipliers.
+    """
+    parts = []
+    for index, unknowns in zip(scene.bodies_in_reach, scene.unknowns, strict=True):
+        body = scene.bodies[index]
+        moves = problem.displacement(body.nodes, penetration, upper=body.name == "upper")
+        parts.append(moves.reshape(-1)[unknowns])
+    return np.concatenate(parts)
+
+
+def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
+    """Return one block, its nodes row by row from bottom to top."""
+    line, shares = np.array(problem.line), np.array(UPPER if upper else LOWER)
+    parts = [first + shares[1:, None] * (second - first) for first, second in itertools.pairwise(line)]
+    for part, end in zip(parts, line[1:], strict=True):
+        part[-1] = end  # A kink is the same point to the last bit on both sides.
+    edge = np.vstack([line[:1], *parts])
+    far = np.column_stack([edge[:, 0], np.full(len(edge), problem.height if upper else -problem.height)])
+    low, high = (edge, far) if upper else (far, edge)
+    rows = [low + layer / LAYERS * (high - low) for layer in range(LAYERS)] + [high]
+    number = np.arange((LAYERS + 1) * len(edge)).reshape(LAYERS + 1, len(edge))
+    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    sides = [number[0], number[:, -1], number[-1, ::-1], number[::-1, 0]]  # Around the block, which is on the left.
+    contact = sides.pop(0 if upper else 2)
+    nodes = np.vstack(rows)
+    load = np.zeros(nodes.shape)
+    for side in sides:
+        along = np.diff(nodes[side], axis=0)
+        inwards = problem.pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]])
+        np.add.at(load, side[:-1], inwards)
+        np.add.at(load, side[1:], inwards)
+    fixed = np.zeros(nodes.shape, bool)
+    if not upper:
+        fixed[0] = fixed[len(edge) - 1, 1] = True
+        load[fixed] = 0.0
+    return Body(
+        nodes,
+        cells,
+        np.column_stack([contact[:-1], contact[1:]]),
+        problem.young,
+        problem.poisson,
+        fixed=fixed,
+        load=load,
+        start=start,
+        name="upper" if upper else "lower",
+    )

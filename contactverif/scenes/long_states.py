@@ -1,0 +1,135 @@
+"""Named states of interfaces with more than a hundred segments a side, for what shows on none of a dozen segments.
+
+A tangent may be right on every small mesh and wrong on a large one: a table of fixed length, a block of rows that is
+forgotten, a norm that hides a small entry among a thousand. Each state differs from the others in what is long about
+it. Nodes lie off any lattice, so that no state is at a kink; all of the interface is in contact.
+
+Rule for the next editor: names and numbers are for good. A stored report refers to a state by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface, Surface
+
+N_SEGMENTS = 200  # The number of segments of the longer side.
+FINEST = 1e-3  # The shortest over the longest segment of the graded state.
+_PENALTY = 16.0
+_DEPTH = 1 / 16  # The mean penetration over the shortest segment.
+
+Curve = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A slave chain over a master chain, at rest: the slave on top, and left of the way that it is walked.
+
+    Attributes
+    ----------
+    slave, master : FloatArray, shape (n, 2)
+        The points in walking order, the body on the left.
+    inward : FloatArray, shape (n_slave, 2)
+        The unit vectors along which the slave's points penetrate the master.
+    closed : bool
+        The last point of each chain is joined to its first.
+    """
+
+    slave: FloatArray
+    master: FloatArray
+    inward: FloatArray
+    closed: bool = False
+
+
+@cache
+def long_states() -> tuple[Case, ...]:
+    """Return the states.
+
+    Returns
+    -------
+    tuple[Case, ...]
+        Cases with names (``"wave-200"``); the number is that of the segments of the longer side.
+    """
+    even, some, few = _places(1, N_SEGMENTS), _places(2, 170), _places(3, 4)
+    parts = {
+        "flat-200": [_open(even, some, _flat)],
+        "wave-200": [_open(even, some, _wave)],
+        "graded-200": [_open(_grade_places(4), _places(5, 120), _flat)],
+        "many-on-few-200": [_open(even, few, _flat)],
+        "few-on-many-200": [_open(few, even, _flat)],
+        "three-chains-180": [_open(_places(6 + k, 60), _places(9 + k, 50), _flat, along=1.5 * k) for k in range(3)],
+        "ring-160": [_ring(_places(12, 160), _places(13, 130))],
+    }
+    return tuple(_case(name, group, turn=0.5 + number) for number, (name, group) in enumerate(parts.items()))
+
+
+def _places(seed: int, count: int) -> FloatArray:
+    """Return ascending places (count + 1,) from 0 to 1; segments differ by up to a factor of 2."""
+    steps = np.random.default_rng(seed).uniform(0.7, 1.4, count)
+    places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    return places
+
+
+def _grade_places(seed: int) -> FloatArray:
+    """Return ascending places (N_SEGMENTS + 1,) from 0 to 1; segments are the shorter the nearer to the middle."""
+    half = np.geomspace(1.0, FINEST, N_SEGMENTS // 2)
+    steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, N_SEGMENTS)
+    places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    return places
+
+
+def _flat(x: FloatArray) -> FloatArray:
+    return 0 * x
+
+
+def _wave(x: FloatArray) -> FloatArray:
+    return np.cos(7 * x) / 16
+
+
+def _open(slave: FloatArray, master: FloatArray, curve: Curve, along: float = 0.0) -> Part:
+    """Return a slave over the middle of a wider master; both lie on a curve and begin at `along`, a length."""
+    slave_x, master_x = slave, (1.1 * master - 0.05)[::-1]
+    return Part(
+        np.column_stack([slave_x + along, curve(slave_x)]),
+        np.column_stack([master_x + along, curve(master_x)]),
+        np.tile([0.0, -1.0], (len(slave), 1)),
+    )
+
+
+def _ring(slave: FloatArray, master: FloatArray) -> Part:
+    """Return a slave ring around a master ring; places from 0 to 1 go once around."""
+    angles = (-2 * np.pi * slave[:-1], 2 * np.pi * master[:-1])
+    outer, inner = (np.column_stack([np.cos(angle), np.sin(angle)]) for angle in angles)
+    return Part(outer, inner, -outer, closed=True)
+
+
+def _case(name: str, parts: Sequence[Part], turn: float) -> Case:
+    """Return the state of some parts, turned by an angle; slave nodes penetrate by different depths."""
+    slaves, masters = ([getattr(part, side) for part in parts] for side in ("slave", "master"))
+    closed = [part.closed for part in parts]
+    n_slave = sum(map(len, slaves))
+    slave, master = Surface(_segments(slaves, closed, 0)), Surface(_segments(masters, closed, n_slave))
+    interface = Interface(np.vstack([*slaves, *masters]), slave, master)
+    shortest = min(surface.lengths(interface.nodes).min() for surface in (slave, master))
+    depths = shortest * np.random.default_rng(n_slave).uniform(0.5, 1.5, n_slave) * _DEPTH
+    current = np.vstack([np.vstack(slaves) + depths[:, None] * np.vstack([part.inward for part in parts]), *masters])
+    cos, sin = np.cos(turn), np.sin(turn)
+    turned = current @ np.array([[cos, sin], [-sin, cos]])
+    return Case(interface, turned.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
+
+
+def _segments(chains: Sequence[FloatArray], closed: Sequence[bool], start: int) -> IntArray:
+    """Return the segments (n, 2) of chains whose nodes are numbered one after the other from `start`."""
+    segments = []
+    for points, is_closed in zip(chains, closed, strict=True):
+        numbers = np.arange(start, start + len(points))
+        pairs = np.column_stack([numbers, np.roll(numbers, -1)])
+        segments.append(pairs if is_closed else pairs[:-1])
+        start += len(points)
+    return np.vstack(segments)

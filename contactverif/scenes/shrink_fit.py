@@ -1,0 +1,267 @@
+"""Two rings that are shrunk onto each other: Lamé's solution, and the scene of a quarter of them.
+
+The pressure between the rings is uniform, and so are the gap and the force, but the interface is bent. That makes the
+rings the patch test of curved surfaces: a mesh of straight segments has an error there, which must vanish as it is
+refined.
+
+Lamé's formula is the limit of a small interference. `ShrinkFit.finite` has no such limit: the rings stay linear, as
+they are in a scene, but contact is measured where they are after the fit. It differs by about δ/c.
+
+Rules for the next editor: `ShrinkFit` knows no mesh and no formulation, so that it can be used without the harness. The
+scene holds a quarter, cut along both lines of symmetry, so that nothing but contact loads the rings.
+
+References
+----------
+S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé's thick-walled cylinder).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from math import inf, pi
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.body import Body
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.mechanics.scene import Scene
+
+Role = Literal["inner", "outer"]
+SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
+GRADE = 0.15  # Angles of the outer ring are graded by so much, so that nodes do not meet nodes of the other ring.
+LAYERS = {"inner": 3, "outer": 6}  # Numbers of layers of cells across each ring, at refine = 1.
+
+
+_FACTS = ("inner_radius", "radius", "outer_radius", "young", "poisson", "interference")  # The attributes of ShrinkFit.
+
+
+@dataclass(frozen=True, slots=True)
+class FiniteFit:
+    """The fit of two rings, measured where they are after it.
+
+    Attributes
+    ----------
+    force : float
+        The force between the rings for each unit of angle, pressure times radius.
+    pressure : float
+        The contact pressure over the length of the slave, force per length.
+    """
+
+    force: float
+    pressure: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShrinkFit:
+    """Two concentric rings in plane strain, the outer one too small for the inner one.
+
+    Attributes
+    ----------
+    inner_radius, radius, outer_radius : float
+        The radii a < c < b: the hole, the interface after the fit, and the outside, a length each.
+    young : tuple[float, float]
+        Young's moduli of the inner and the outer ring, force per length squared.
+    poisson : tuple[float, float]
+        Poisson's ratios of both.
+    interference : float
+        The interference δ: the outer radius of the inner ring less the inner radius of the outer ring, a length.
+
+    Examples
+    --------
+    The pressure with springs of 1e3 and without springs between the rings:
+
+    >>> from contactverif import ShrinkFit
+    >>> round(ShrinkFit().pressure(1e3), 7), round(ShrinkFit().pressure(), 7)
+    (0.0650872, 0.0696185)
+    """
+
+    inner_radius: float = 1.0
+    radius: float = 1.5
+    outer_radius: float = 2.5
+    young: tuple[float, float] = (1000.0, 300.0)
+    poisson: tuple[float, float] = (0.3, 0.2)
+    interference: float = 1e-3
+
+    @property
+    def compliances(self) -> tuple[float, float]:
+        """By how much a unit pressure presses the inner ring in, and the outer ring out, at the interface: lengths."""
+        a, b, c = self.inner_radius, self.outer_radius, self.radius
+        (inner, outer), (inner_ratio, outer_ratio) = zip(*map(_plane_strain, self.young, self.poisson), strict=True)
+        return (
+            c / inner * ((c**2 + a**2) / (c**2 - a**2) - inner_ratio),
+            c / outer * ((b**2 + c**2) / (b**2 - c**2) + outer_ratio),
+        )
+
+    def pressure(self, penalty: float = inf) -> float:
+        """Return the pressure between the rings, force per length.
+
+        Parameters
+        ----------
+        penalty : float
+            The distributed stiffness ε̂ of springs between the rings; infinite without springs.
+
+        Returns
+        -------
+        float
+            The pressure p = δ / (c_i + c_o + 1/ε̂), with the compliances of both rings.
+        """
+        return self.interference / (sum(self.compliances) + 1 / penalty)
+
+    @property
+    def contact_radii(self) -> tuple[float, float]:
+        """The outer radius of the inner ring and the inner radius of the outer ring before the fit; δ lies between.
+
+        The rings share δ as their compliances, so that without springs both end near the radius c.
+        """
+        inner, outer = (self.interference * part / sum(self.compliances) for part in self.compliances)
+        return self.radius + inner, self.radius - outer
+
+    def finite(self, slave: Role, penalty: float = inf, area: Literal["current", "reference"] = "current") -> FiniteFit:
+        """Return the fit with contact measured after it.
+
+        A force f for each unit of angle is a traction f/R on a ring of contact radius R, which moves by C(R) f/R with
+        Lamé's compliance C. The springs give way by p/ε̂ with p = f/r and r the radius of the slave, after the fit or
+        before it. All that adds up to δ.
+
+        Parameters
+        ----------
+        slave : Literal['inner', 'outer']
+            The ring that the springs stand on.
+        penalty : float
+            The distributed stiffness ε̂; infinite without springs.
+        area : Literal['current', 'reference']
+            The configuration of the slave in which its length is measured.
+
+        Returns
+        -------
+        FiniteFit
+            Force and pressure.
+        """
+        radii, index = self.contact_radii, int(slave == "outer")
+        flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
+        outwards = (-flexibilities[0], flexibilities[1])[index] if area == "current" else 0.0
+
+        def excess(force: float) -> float:
+            springs = force / (radii[index] + outwards * force) / penalty
+            return sum(flexibilities) * force + springs - self.interference
+
+        force = brentq(excess, 0.0, 2 * self.pressure() * self.radius, xtol=1e-300, rtol=1e-14)
+        return FiniteFit(force, force / (radii[index] + outwards * force))
+
+    def displacement(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
+        """Return the radial displacement (n,) of a ring at the radii (n,), a length, positive outwards.
+
+        Raises
+        ------
+        MisuseError
+            If there is no such ring.
+        """
+        radius = np.asarray(radius, dtype=np.float64)
+        modulus, ratio, (mean, deviation) = self._constants(ring, penalty)
+        displacement: FloatArray = ((1 - ratio) * mean * radius + (1 + ratio) * deviation / radius) / modulus
+        return displacement
+
+    def stresses(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
+        """Return the radial and the hoop stress (n, 2) of a ring at the radii (n,), positive in tension.
+
+        Raises
+        ------
+        MisuseError
+            If there is no such ring.
+        """
+        radius = np.asarray(radius, dtype=np.float64)
+        _, _, (mean, deviation) = self._constants(ring, penalty)
+        return np.stack([mean - deviation / radius**2, mean + deviation / radius**2], axis=-1)
+
+    def _constants(self, ring: Role, penalty: float) -> tuple[float, float, tuple[float, float]]:
+        """Return E', ν' and Lamé's constants A and B of σ = A ∓ B/r² for a ring that is loaded at the interface."""
+        if ring not in SEGMENTS:
+            raise MisuseError("ring", repr(ring), "'inner' or 'outer'")
+        index = int(ring == "outer")
+        free = (self.inner_radius, self.outer_radius)[index]
+        mean = self.pressure(penalty) * self.radius**2 / (free**2 - self.radius**2)
+        return *_plane_strain(self.young[index], self.poisson[index]), (mean, mean * free**2)
+
+
+def _plane_strain(young: float, poisson: float) -> tuple[float, float]:
+    """Return E' = E/(1 − ν²) and ν' = ν/(1 − ν), with which the formulas of plane stress hold in plane strain."""
+    return young / (1 - poisson**2), poisson / (1 - poisson)
+
+
+@cache
+def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refine: int = 1) -> Scene:
+    """Return the scene of a quarter of both rings.
+
+    Parameters
+    ----------
+    problem : ShrinkFit
+        Radii, materials and interference.
+    slave : Literal['inner', 'outer']
+        The ring that is the slave.
+    refine : int
+        The number of parts that each side of each cell is divided into.
+
+    Returns
+    -------
+    Scene
+        The rings, the slave first. The penalty is 1; a study chooses its own. The facts are the attributes of the
+        problem and "outer_slave", 1 or 0; `rings_of` reads them.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such ring.
+    """
+    if slave not in SEGMENTS:
+        raise MisuseError("slave", repr(slave), "'inner' or 'outer'")
+    rings = {name: _ring(problem, name, refine) for name in ("inner", "outer")}
+    order = ("inner", "outer") if slave == "inner" else ("outer", "inner")
+    facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
+    facts["outer_slave"] = np.array(float(slave == "outer"))
+    return Scene(tuple(rings[name] for name in order), facts=facts)
+
+
+def rings_of(case: Case) -> tuple[ShrinkFit, Role]:
+    """Return the problem of a case of `shrink_fit`, on whatever mesh, and the ring that is the slave."""
+    (inner, outer), (inner_ratio, outer_ratio) = (case.parameters[name].tolist() for name in ("young", "poisson"))
+    problem = ShrinkFit(
+        case.parameter("inner_radius"),
+        case.parameter("radius"),
+        case.parameter("outer_radius"),
+        young=(inner, outer),
+        poisson=(inner_ratio, outer_ratio),
+        interference=case.parameter("interference"),
+    )
+    return problem, "outer" if case.parameter("outer_slave") else "inner"
+
+
+@cache
+def _ring(problem: ShrinkFit, ring: Role, refine: int) -> Body:
+    """Return a quarter of a ring, nodes ring by ring from the inside, each from angle 0 to a quarter turn."""
+    index = int(ring == "outer")
+    contact = problem.contact_radii[index]
+    limits = (contact, problem.outer_radius) if index else (problem.inner_radius, contact)
+    n_segments, n_layers = SEGMENTS[ring] * refine, LAYERS[ring] * refine
+    radii, shares = np.linspace(*limits, n_layers + 1), np.linspace(0, 1, n_segments + 1)
+    angles = pi / 2 * (shares + (GRADE if index else 0.0) * shares * (1 - shares))
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    directions[-1] = 0.0, 1.0
+    number = np.arange((n_layers + 1) * (n_segments + 1)).reshape(n_layers + 1, n_segments + 1)
+    cells = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    edge = number[0, ::-1] if index else number[-1]
+    fixed = np.zeros((*number.shape, 2), bool)
+    fixed[:, 0, 1] = fixed[:, -1, 0] = True
+    return Body(
+        (radii[:, None, None] * directions).reshape(-1, 2),
+        cells,
+        np.column_stack([edge[:-1], edge[1:]]),
+        problem.young[index],
+        problem.poisson[index],
+        fixed=fixed.reshape(-1, 2),
+        name=ring,
+    )

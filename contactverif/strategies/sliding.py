@@ -1,0 +1,61 @@
+"""A slave that slides along a bent master: a path of states, on which points pass the vertices of the master.
+
+The master is the graph of a broken line with slopes up to 1/2, and the slave follows it from below. So each line along
+a normal meets the master once, and penetrations are small against its segments: the nearest segment is always near.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
+from contactverif.strategies.parts import motions, penalties, seeds, shuffles
+
+_SLAVE = st.lists(st.sampled_from([1.0, 1.5, 2.0]), min_size=1, max_size=3)
+_MASTER = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=3)
+_SLOPES = st.lists(st.integers(1, 8), min_size=2, max_size=5)  # Sixteenths; their signs alternate along the master.
+_DEPTHS = st.lists(st.integers(1, 8), min_size=1, max_size=3)  # Thirty-seconds of the unit length.
+_PLACES = st.integers(0, 12)
+_MARGIN = 3.0  # The length of master on both sides of what the slave passes.
+
+
+def sliding_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return slaves that slide along a bent master by the length of a segment; None for a given mesh.
+
+    The parameter "path" (n_unknowns,) holds the way of each node, a length each: states are z + t path, 0 ≤ t ≤ 1.
+    """
+    return _sliding_cases() if interface is None else None
+
+
+@st.composite
+def _sliding_cases(draw: DrawFn) -> Case:
+    steps = draw(_SLAVE)
+    way = max(steps)
+    x = np.concatenate([[0.0], np.cumsum(steps)])
+    line = _bent_line(draw(_MASTER), draw(_SLOPES), -_MARGIN - draw(_PLACES) / 13, x[-1] + way + _MARGIN)
+    depth = np.resize(np.array(draw(_DEPTHS)) / 32, len(x))
+    # The slave follows the master as it lies in the middle of the way.
+    slave = np.column_stack([x, on_lattice(np.interp(x + way / 2, *line.T)) - depth])
+    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
+    chains = [Chain(slave)], [Chain(line[::-1])], [Chain(slave)]
+    interface, order = assemble_chains(*chains, motion.scale, shuffle)
+    nodes = np.vstack([slave, line[::-1]])
+    moved = nodes + np.where(np.arange(len(nodes)) < len(slave), way, 0.0)[:, None] * [1.0, 0.0]
+    z, end = motion(nodes[order]).reshape(-1), motion(moved[order]).reshape(-1)
+    return Case(interface, z, penalty, {"path": end - z}, seed)
+
+
+def _bent_line(lengths: list[float], slopes: list[int], start: float, end: float) -> FloatArray:
+    """Return a broken line (n, 2) from left to right; it goes up and down in turn, so that it stays near one height."""
+    points = [(start, 0.0)]
+    while points[-1][0] < end:
+        number = len(points)
+        length = lengths[number % len(lengths)]
+        slope = slopes[number % len(slopes)] / 16 * (1 if number % 2 else -1)
+        points.append((points[-1][0] + length, points[-1][1] + length * slope))
+    return on_lattice(np.array(points))

@@ -1,0 +1,126 @@
+"""A straight slave that penetrates a flat part of the master with all its length: tilted, among bent ends, over a body.
+
+The slave's depth grows along it, and all of it lies over the flat part, seen along either normal. So each rule for gaps
+sees the same straight line opposite, and the exact force is an integral of a linear gap.
+
+Rule for the next editor: everything stands on a lattice of 2^-24 with lengths below 2^8, so that `ExactTurn` rounds
+nothing: straight stays straight, and flat stays flat, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from math import ceil
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
+from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, penalties, seeds, shuffles
+from contactverif.strategies.sketches import exact_turns
+
+_SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
+_SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
+_SIGNS = st.sampled_from([1, -1])
+_QUARTERS = st.integers(1, 8)  # The depth of the shallow end, in quarters of a unit.
+_BENDS = st.sampled_from([0.3, 0.9, 0.6, 0.1, -0.1, -0.3])  # Turns of an end of the master in rad, down if positive.
+_DISTANCES = st.integers(1, 4)  # Distances of the body behind, in lengths that no depth reaches.
+
+
+def tilted_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return straight slaves, tilted by 0.06 to 0.6 rad, wholly in contact with a flat master; None for a given mesh.
+
+    The slave's reference is level, so that its lengths there are others than in the state.
+    """
+    return _tilted_cases() if interface is None else None
+
+
+def bent_end_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return slaves, straight and tilted or not, between the bent ends of a master; None for a given mesh.
+
+    The parameter "bent" (n_unknowns,) holds the positions after the two unloaded end segments of the master have turned
+    about the nodes that join them to the flat part.
+    """
+    return _bent_end_cases() if interface is None else None
+
+
+def cases_over_a_body(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return slaves as `bent_end_cases` does on a straight master, with a place for a second body; None for a mesh.
+
+    The parameter "behind" (n, 2) holds the nodes of a surface of the second body: it lies behind the master, farther
+    than any point penetrates, and is walked as the master is.
+    """
+    return _cases_over_a_body() if interface is None else None
+
+
+@st.composite
+def _tilted_cases(draw: DrawFn) -> Case:
+    slope = draw(_SIXTEENTHS) * draw(_SIGNS) / 16
+    slave, master, reference, _ = _layout(draw, slope)
+    return _place(draw, slave, master, reference)
+
+
+@st.composite
+def _bent_end_cases(draw: DrawFn) -> Case:
+    slope = draw(st.integers(0, 11)) * draw(_SIGNS) / 16
+    slave, master, reference, reach = _layout(draw, slope)
+    ends = [_turn_end(corner, side, reach, draw(_BENDS)) for corner, side in ((master[0], 1.0), (master[-1], -1.0))]
+    straight = np.vstack([master[0] + [reach, 0.0], master, master[-1] - [reach, 0.0]])
+    bent = np.vstack([ends[0], master, ends[1]])
+    return _place(draw, slave, straight, reference, bent=np.vstack([slave, bent]))
+
+
+@st.composite
+def _cases_over_a_body(draw: DrawFn) -> Case:
+    slope = draw(st.integers(0, 11)) * draw(_SIGNS) / 16
+    slave, master, reference, reach = _layout(draw, slope)
+    depth = reach * draw(_DISTANCES)
+    behind = np.column_stack([np.linspace(master[0, 0] + reach, master[-1, 0] - reach, 4), np.full(4, -2 * depth)])
+    return _place(draw, slave, master, reference, behind=on_lattice(behind))
+
+
+def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return slave, flat master and slave reference in walking order, and a length larger than all depths."""
+    x = np.concatenate([[0.0], np.cumsum(draw(_SLAVE))])
+    shortest = float(np.diff(x).min())
+    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) * shortest
+    depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
+    # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.
+    reach = float(ceil(2 * depth.max()) + 1)
+    x = x + float(on_lattice(np.array(draw(SEVENTHS) / 7)))
+    master_x = _cover(draw(lengths(graded=False)), -reach, float(ceil(x[-1])) + reach)
+    slave = np.column_stack([x, -depth])
+    master = np.column_stack([master_x[::-1], np.zeros(len(master_x))])
+    return slave, master, np.column_stack([x, np.zeros(len(x))]), reach
+
+
+def _cover(steps: Sequence[float], start: float, end: float) -> FloatArray:
+    """Return ascending places from start to end whose distances are these in turn; the last is what is left."""
+    places = [start]
+    for step in cycle(steps):
+        if places[-1] + step >= end:
+            break
+        places.append(places[-1] + step)
+    return np.array([*places, end])
+
+
+def _turn_end(corner: FloatArray, side: float, length: float, bend: float) -> FloatArray:
+    """Return the free node (2,) of an end segment that is turned by `bend` about its corner, down if positive."""
+    return on_lattice(corner + length * np.array([side * np.cos(bend), -np.sin(bend)]))
+
+
+def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: FloatArray, **others: FloatArray) -> Case:
+    """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
+    motion, penalty, seed, shuffle = draw(exact_turns()), draw(penalties()), draw(seeds()), draw(shuffles())
+    chains = [Chain(slave)], [Chain(master)], [Chain(reference)]
+    interface, order = assemble_chains(*chains, motion.scale, shuffle)
+    parameters = {}
+    for name, points in others.items():
+        moved = motion(points)
+        parameters[name] = moved[order].reshape(-1) if len(points) == len(order) and name == "bent" else moved
+    return Case(interface, motion(np.vstack([slave, master])[order]).reshape(-1), penalty, parameters, seed)
