@@ -3,11 +3,13 @@
 `cell_search` finds which pairs of segments make a cell. `cell_geometry` computes a point of a cell and its Δ,
 `integration_cells` the points of all cells. `cell_forces` turns pressures at points into forces. A method is a rule for
 the pressures: at the points themselves (`segment_to_segment`), at slave nodes from node gaps (`chen_hisada_method`), or
-at slave nodes from weighted gaps (`mortar_methods`, with `weighted_gaps` and `pressure_shapes`).
+at slave nodes from weighted gaps (`mortar_methods`, with `weighted_gaps` and `pressure_shapes`). `two_half_passes`
+weighs gaps on both surfaces, at points of `covered_ranges`, and hands no force from one body to the other.
 """
 
 from contactverif_mortar.chen_hisada_method import chen_hisada
 from contactverif_mortar.mortar_methods import mortar, mortar_dual, mortar_dual_lm, mortar_lm
 from contactverif_mortar.segment_to_segment import sts
+from contactverif_mortar.two_half_passes import mortar_two_half_pass
 
-__all__ = ["chen_hisada", "mortar", "mortar_dual", "mortar_dual_lm", "mortar_lm", "sts"]
+__all__ = ["chen_hisada", "mortar", "mortar_dual", "mortar_dual_lm", "mortar_lm", "mortar_two_half_pass", "sts"]

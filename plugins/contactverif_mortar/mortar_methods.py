@@ -231,26 +231,47 @@ def _weighting(area: str, normals: str, dual: bool) -> Weighting:
 
 def _with_multipliers(traits: Traits) -> Traits:
     """Return the promises of a penalty method, for multipliers in its place."""
-    return replace(traits, enforcement="multiplier", independent_multipliers=True, continuity=None)
+    return replace(
+        traits,
+        enforcement="multiplier",
+        independent_multipliers=True,
+        inf_sup=True,
+        continuity=None,
+        integrates_linear_gap=None,
+    )
 
 
 def _traits(area: str, normals: str, dual: bool) -> Traits:
     """Return the promises of a penalty method."""
+    averaged = bool(choose("normals", normals, NORMALS))
+    kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
+    pulls = {"nodal-push": "b"} if dual else {}
     return Traits(
         passes_flat_patch=True,
+        passes_normal_patch=True,
+        passes_single_patch=True,
+        passes_kinked_patch=not averaged,  # An averaged normal belongs to neither facet of a kink.
         covers_overhang=True,
+        converges=True,
+        locks=False,
         tangent="exact",
         symmetric=False,
         conserves_force=True,
         conserves_moment=True,
         # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
-        continuity=None if choose("normals", normals, NORMALS) else "C0",
+        continuity=None if averaged else "C0",
         area="current" if choose("area", area, AREAS) else "reference",
-        gap=None if choose("normals", normals, NORMALS) else "cells",
+        gap=None if averaged else "cells",
+        force_along=None if averaged else "slave normal",
+        integrates_linear_gap=None if averaged else False,
+        local=True,
+        nodes_push=not dual,  # Dual shapes are negative in places.
+        unbiased=False,
         translation_stable=True,
         penalty="distributed",
         batched=True,
         takes_complex=True,
         takes_longdouble=TAKES_LONGDOUBLE,
+        witnesses={**kinked, **pulls, "patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted"},
         source=_SOURCES[dual],
     )

@@ -88,8 +88,9 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
 
     Slave and master segments that face each other are cut to their overlap. Gap and force are along the normal of the
     slave segment, and the force acts at both facing points. So force and moment are conserved exactly, the flat patch
-    test is passed, and an overhang is covered. The tangent is exact and unsymmetric: the gradient of the gap is not
-    along the slave's normal.
+    test is passed, and an overhang is covered. At a high penalty its springs are
+    more conditions than the surfaces can follow, and it locks. The tangent is exact and unsymmetric: the gradient of
+    the gap is not along the slave's normal.
 
     Parameters
     ----------
@@ -105,7 +106,12 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
     return SegmentToSegment(
         Traits(
             passes_flat_patch=True,
+            passes_normal_patch=True,
+            passes_single_patch=True,
+            passes_kinked_patch=True,
             covers_overhang=True,
+            converges=True,
+            locks=True,
             tangent="exact",
             symmetric=False,
             conserves_force=True,
@@ -113,11 +119,22 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
             continuity="C0",
             area="current" if choose("area", area, AREAS) else "reference",
             gap="cells",
+            force_along="slave normal",
+            integrates_linear_gap=True,
+            local=True,
+            nodes_push=True,
+            unbiased=False,
             translation_stable=True,
             penalty="distributed",
             batched=True,
             takes_complex=True,
             takes_longdouble=TAKES_LONGDOUBLE,
+            witnesses={
+                "symmetric": "offset-c",
+                "swap": "tilted",
+                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
+                "accuracy.wavy-curved": "upper slave, 100 E/h",
+            },
             source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
         ),
         check_penalty(penalty),

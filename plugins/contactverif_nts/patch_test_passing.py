@@ -33,24 +33,44 @@ from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
+from contactverif_nts.point_contact import add_locking
 from contactverif_nts.walk import FREE_ENDS, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
 _PRINTED = Traits(
     passes_flat_patch=True,
+    passes_normal_patch=True,
+    passes_single_patch=True,
+    passes_kinked_patch=True,
     covers_overhang=False,
+    converges=True,
     tangent="exact",
     symmetric=False,
     conserves_force=False,
     conserves_moment=False,
     area="current",
     gap="closest point",
+    force_along="master normal",
+    integrates_linear_gap=False,
+    local=True,
+    nodes_push=True,
+    unbiased=False,
+    continuity="jumps",
     translation_stable=True,
     penalty="distributed",
     batched=True,
     takes_complex=True,
     takes_longdouble=TAKES_LONGDOUBLE,
-    witnesses={"balance.force": "tilted", "balance.moment": "tilted", "patch.dead-zone": "dead-zone"},
+    witnesses={
+        "balance.force": "tilted",
+        "balance.moment": "tilted",
+        "patch.dead-zone": "dead-zone",
+        "patch.tilted": "tilted",
+        "symmetric": "offset-c",
+        "swap": "tilted",
+        "continuity": "sliding",
+    },
+    published_forces={"c": "1 2 3 4 2; 3/2 3 3 3 3/2"},  # Fig. 20
     source=_PAPER,
 )
 
@@ -97,7 +117,8 @@ class PatchTestPassing:
         x, multipliers = split_state(interface, z)
         tree = search_tree(interface.master, x)
         surfaces = self._surfaces(interface, interface.nodes)
-        areas = walk.pair(x, multipliers, surfaces, tree, self.n, self.free_end, self.tau, self.penalty)
+        balanced = self.transmission == box3.BALANCED
+        areas = walk.pair(x, multipliers, surfaces, tree, self.n, self.free_end, self.tau, self.penalty, balanced)
         return Pairing(dict(zip(Areas._fields, areas, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -196,8 +217,11 @@ def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: floa
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Appendix A.
     """
+    # A segment that is continued past its free end has shares below zero.
+    pushes = None if free_end == "extend" else True
+    traits = replace(_PRINTED, covers_overhang=free_end == "cover", nodes_push=pushes)
     return PatchTestPassing(
-        traits=replace(_PRINTED, covers_overhang=free_end == "cover"),
+        traits=add_locking(traits, check_count(n)),
         penalty=check_penalty(penalty),
         n=check_count(n),
         transmission=box3.PRINTED,
@@ -223,8 +247,8 @@ def vts_ppt_basic(*, penalty: float, n: int = 2, free_end: str = "truncate", tau
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
-    witnesses = {**_PRINTED.witnesses, "tangent.directional": "offset-c", "newton": "example-1bis"}
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau)
+    witnesses = {**consistent.traits.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
     traits = replace(consistent.traits, tangent="approximate", witnesses=witnesses)
     return replace(consistent, consistent=False, traits=traits)
 
@@ -258,12 +282,13 @@ def vts_ppt_balanced(
         covers_overhang=covers,
         conserves_force=covers,
         conserves_moment=covers,
+        nodes_push=covers or None,  # Otherwise the shares at a free end have any sum, by which the force is divided.
         area="current" if current else "reference",
-        witnesses={},
+        witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"},
     )
     return replace(
         vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau),
         transmission=box3.BALANCED,
         current_area=current,
-        traits=traits,
+        traits=add_locking(traits, n),
     )

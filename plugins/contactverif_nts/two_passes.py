@@ -11,7 +11,7 @@ Source: Zavarise & De Lorenzis (2009), Sections 1 and 5, after Taylor & Papadopo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -21,9 +21,11 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, Traits
 from contactverif.contract.interface import Interface
+from contactverif.contract.published_forces import Fractions, format_forces, parse_forces
 from contactverif.contract.subject import Subject
 
 NAMES = ("pass_1.", "pass_2.")  # The prefixes of the names in a pairing.
+_EXCHANGED = "-swapped"  # The end of the name of a flat case whose slave and master have exchanged their lengths.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,27 +150,65 @@ def _traits(inner: Traits) -> Traits:
     """Return what two passes promise, from what one pass promises.
 
     With a penalty, a penetration gives twice the pressure that it should, and where one pass is wrong, the other does
-    not make it right. With nodal multipliers all gaps vanish at the nodes of both surfaces. Where force and moment
-    balance, the force of a node is spread over the segment that it meets by the lever rule. The exact forces of a
-    uniform pressure are such forces, with an overhang or without: they are those of trapezoids between neighbours in
-    the union of the nodes that face a segment.
+    not make it right. Springs twice as stiff as the penalty leave an error that falls as h alone. With nodal
+    multipliers all gaps vanish at the nodes of both surfaces. Where force and moment balance, the force of a node is
+    spread over the segment that it meets by the lever rule. The exact forces of a uniform pressure are such forces,
+    with an overhang or without: they are those of trapezoids between neighbours in the union of the nodes that face a
+    segment.
     """
-    passes, independent = None, None
+    passes, independent, converges, inf_sup, locks = None, None, None, None, None
     witnesses = {part: name for part, name in inner.witnesses.items() if not part.startswith(("patch", "multipliers"))}
+    if inner.enforcement == "penalty" and inner.locks is not None:
+        locks = True  # Each pass forces the nodes of one surface onto the other.
+        witnesses["stability.locking"] = "12 on 8, ε̂ = 1e8 E/h"
+    if inner.enforcement == "penalty" and inner.converges is not None:
+        converges = False
+        witnesses |= dict.fromkeys(("accuracy.wavy", "accuracy.wavy-curved"), "upper slave, 10 E/h")
+        witnesses["accuracy.hertz"] = "parabola-layer"
     if inner.enforcement == "penalty" and inner.passes_flat_patch is not None:
-        passes, witnesses["patch"] = False, "a1"
+        passes, witnesses["patch"], witnesses["patch.kinked"] = False, "a1", "edge of 53°, lower slave"
     elif inner.enforcement == "multiplier":
-        independent = False  # two nodes in one place have two multipliers for one gap
-        witnesses["multipliers"] = "a1"
+        independent = inf_sup = False  # two nodes in one place have two multipliers for one gap
+        witnesses |= {"multipliers": "a1", "stability.inf-sup": "matching"}
         if inner.penalty == "nodal" and inner.conserves_force and inner.conserves_moment:
             passes = True
     return replace(
         inner,
         passes_flat_patch=passes,
+        passes_normal_patch=passes if passes or inner.passes_normal_patch is not None else None,
+        passes_single_patch=passes if passes or inner.passes_single_patch is not None else None,
+        passes_kinked_patch=passes,
         covers_overhang=passes,
+        converges=converges,
+        inf_sup=inf_sup,
+        locks=locks,
         area=None,
+        integrates_linear_gap=None,
+        force_along=None,
         independent_multipliers=independent,
+        unbiased=True,
         batched=True,
         witnesses=witnesses,
+        published_forces=_add_exchanged(inner.published_forces),
         source=f"two passes of: {inner.source}" if inner.source else "",
     )
+
+
+def _add_exchanged(forces: Mapping[str, str]) -> dict[str, str]:
+    """Return the forces of two passes, wherever those of one pass are known on a case and with its roles exchanged.
+
+    Two passes on case B add up what one pass makes of B and of B with the lengths of slave and master exchanged. There
+    the slave's forces are those on the master of B.
+    """
+    both = {}
+    for name, text in forces.items():
+        other = name.removesuffix(_EXCHANGED) if name.endswith(_EXCHANGED) else name + _EXCHANGED
+        if other in forces:
+            slave, master = parse_forces(text)
+            master_2, slave_2 = parse_forces(forces[other])
+            both[name] = format_forces(_add(slave, slave_2), _add(master, master_2))
+    return both
+
+
+def _add(first: Fractions, second: Fractions) -> Fractions:
+    return tuple(a + b for a, b in zip(first, second, strict=True))

@@ -13,6 +13,10 @@ The paper is silent about free ends, too. The option `free_end` says what happen
 Everywhere else Box 3 stands as printed, whatever the option says. This holds also where the foot of V lies past the end
 of an interior segment: the parts of the segments are then neither cut nor limited to [0, 1].
 
+The balanced transmission (ours) divides by the sum S of all parts. Where the whole area lies past the same end of V's
+segment, the part of that segment is negative. As S → 0, on a slave that is seen edge-on, forces of both signs grow
+beyond all bounds. So there the balanced walk does not begin, and Eq. 6 holds.
+
 Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
 
 Source: Zavarise & De Lorenzis (2009), Boxes 1 and 2, Fig. 23.
@@ -79,10 +83,12 @@ def pair(
     free_end: int,
     tau: float,
     penalty: float,
+    balanced: bool,
 ) -> Fields:
     """Return the fields of `Areas` for the n virtual slave nodes on each slave segment, at x (n_nodes, 2).
 
-    A virtual slave node is active where `pressed` says so, its foot is on the surface and s(P) < s(Q).
+    A virtual slave node is active where `pressed` says so, its foot is on the surface and s(P) < s(Q). A balanced walk
+    does not begin where the whole area lies past one end of V's segment.
     """
     _, slave, master, neighbours = surfaces
     order, boxes = tree
@@ -112,6 +118,8 @@ def pair(
         g = cross(d, minus(x_2, x_1)) / l_12
         on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         active[i] = is_pressed(g, multipliers, i, penalty) and on_surface
+        if balanced and _lies_past_one_end(x, p, q, m, t, master):
+            continue
         first[i], last[i] = _walk(x, p, q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
             clip_p[i], clip_q[i] = _truncate(x, p, q, first[i], last[i], t, master, neighbours)
@@ -135,6 +143,17 @@ def _walk(
             break
         last = following
     return first, last
+
+
+@compile_kernel
+def _lies_past_one_end(
+    x: FloatArray, p: PointOnSegment, q: PointOnSegment, m: int, t: Vector, master: IntArray
+) -> bool:
+    """Return whether P and Q lie before the first node of segment m, or both behind its last node, along its t."""
+    x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+    return (dot(arm(x_1, p), t) < 0 and dot(arm(x_1, q), t) < 0) or (
+        dot(arm(x_2, p), t) > 0 and dot(arm(x_2, q), t) > 0
+    )
 
 
 @compile_kernel
