@@ -21,15 +21,13 @@ give the same gap.
 
 from __future__ import annotations
 
-import numpy as np
-
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import flat_cases
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.roundoff import gap_quantity, gap_tolerance
-from contactverif_properties.shared.uniform_pressure import forces_of_gap, forces_of_penetration
+from contactverif_properties.shared.roundoff import gap_quantity
+from contactverif_properties.shared.uniform_pressure import forces_of_penetration, transmission_error
 
 FORCE_ERROR = gap_quantity("error of a nodal force")
 
@@ -49,12 +47,8 @@ def measure_transmission(case: Case, subject: Subject) -> Measurement:
     Measurement
         The largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless.
     """
-    exact = forces_of_penetration(case)
-    size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
-    tolerance = gap_tolerance(case, case.parameter("penetration"))
-    forces, largest = forces_of_gap(case, subject, exact)
-    error = float(np.linalg.norm(forces - exact, axis=1).max())
-    return Measurement({FORCE_ERROR.name: error / size}, {FORCE_ERROR.name: tolerance * largest})
+    error, tolerance = transmission_error(case, subject)
+    return Measurement({FORCE_ERROR.name: error}, {FORCE_ERROR.name: tolerance})
 
 
 FLAT_TRANSMISSION = Property(

@@ -247,4 +247,5 @@ NEWTON_ORDER = Property(
     needs=frozenset({"tangent"}),
     applicable=refuse_dependent_multipliers,
     bodies=True,
+    usual_undecided=0.004,
 )

@@ -11,7 +11,8 @@ computed misleads them, and no other question sees it: the forces are right.
 - A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0. An idle point carries nothing.
 - A nodal force has the weight 1. A weighted node lies at a node, not inside a segment.
 - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
-  the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment.
+  the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment. Points of a second
+  pass push the master, and the slave by reaction; or each surface has its own points alone (half passes).
 - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
   Foot and gap along the slave's normal are quotients by the cosine between the surfaces, and rounding the ends of a
   segment turns its normal by uD/ℓ, both of which is allowed for.
@@ -138,18 +139,22 @@ def _force_difference(reported: Reported) -> FloatArray | None:
 
     A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
     """
-    points, interface = reported.points, reported.state.interface
+    points = reported.points
     size = sum_slave_forces(reported.state, reported.forces)
     balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * reported.state.n_segments * size
     if points.on_master.any() and not balanced:  # `balance.force` asks for that.
         return None
     if _bend(reported) > STRAIGHT:
         return None
-    sides = np.where(points.on_master, -1.0, 1.0)
     carrying = points.pressure > 0
-    pushes = (sides * points.pressure * points.weight)[carrying, None] * points.normal[carrying]
-    total: FloatArray = pushes.sum(axis=0) + reported.forces[: interface.n_slave_nodes].sum(axis=0)
-    return total
+    pushes = (points.pressure * points.weight)[carrying, None] * points.normal[carrying]
+    slave, master = (pushes[points.on_master[carrying] == side].sum(axis=0) for side in (False, True))
+    forces = reported.forces[: reported.state.interface.n_slave_nodes].sum(axis=0)
+    both = slave - master + forces
+    # In half passes each surface is pushed by its own points alone, and hands nothing on.
+    alone = max(slave + forces, master - forces, key=lambda difference: float(np.abs(difference).max()))
+    nearest: FloatArray = min(both, alone, key=lambda difference: float(np.abs(difference).max()))
+    return nearest
 
 
 def _bend(reported: Reported) -> float:

@@ -1,7 +1,8 @@
 """Ask whether forces are as exact as the positions allow, on flat states whose exact forces are rationals.
 
-**Question.** A turned flat interface penetrates uniformly, by 10⁻² to 10⁻⁸ of a segment, near the origin or far from
-it. Are the forces as near to the exact ones as rounding the positions relative to one another lets them be?
+**Question.** A turned flat interface penetrates by 10⁻² to 10⁻⁸ of a segment, near the origin or far from it. The
+penetration is uniform, or linear along a straight slave. Are the forces as near to the exact ones as rounding the
+positions relative to one another lets them be?
 
 **Why it matters.** A small gap is a difference of large numbers, so an error of 10⁻⁷ at a gap of 10⁻⁹ is no fault: the
 positions do not contain more digits. The same error at a gap of 10⁻² is one. A tolerance that grows with the
@@ -12,9 +13,15 @@ precision, so that a translation does not show it.
 16 at any gap, distance and penalty. What is exact depends on the traits. Where the flat patch test is promised, it is
 the force on every node, in rationals on the stored positions. Else it is the answer in long double, if the plugin says
 that it can (`takes_longdouble`), and the total force ε̂ |g| A, if `area` and `penalty` say that springs are distributed.
-Multipliers that are pressures are all ε̂ |g|, and only the distribution of their forces counts. A formulation promises
-this if it promises `translation_stable` and one of these. Ratios of lengths stay below 5: a kernel that moves the
-origin to a node rounds at the diameter, which is right, but costs digits on much shorter segments.
+Multipliers that are pressures are all ε̂ |g|, and only the distribution of their forces counts.
+
+Under a linear penetration, the force on each slave node is exact where `integrates_linear_gap` is promised. The total
+on the slave is exact where `gap`, `force_along`, `penalty` and `area` state it. Where nothing is stated, and with
+multipliers, the forces are compared with those near the origin.
+
+A formulation promises this if it promises `translation_stable` and one of the above. Ratios of lengths stay below 5: a
+kernel that moves the origin to a node rounds at the diameter, which is right, but costs digits on much shorter
+segments.
 
 **Undecided.** A failing case is undecided where a slave point faces a master node to within 64 u D. Both partners give
 the same gap there, but a search that asks for 0 ≤ ξ ≤ 1 may lose the point between them.
@@ -25,14 +32,16 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.strategies.exact_flats import exact_flat_cases
+from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.conditioning import (
@@ -42,21 +51,22 @@ from contactverif_properties.shared.conditioning import (
     measure_conditioning,
 )
 from contactverif_properties.shared.kinks import explain_by_rounded_decision
+from contactverif_properties.shared.linear_gaps import exact_slave_forces, knows_linear_total, uniform_multiplier
 from contactverif_properties.shared.roundoff import ratio
-from contactverif_properties.shared.uniform_pressure import forces_of_penetration
 
 FORCES = forces_quantity("error of the forces in roundings")
 TOTAL = forces_quantity("error of the total force in roundings")
+KINDS = ("uniform penetration", "linear penetration")
 LARGEST_DENOMINATOR = 13  # The hypotenuses of the triples are 5 and 13.
 
 
 def measure_local(case: Case, subject: Subject) -> Measurement:
-    """Compare the forces of a uniform penetration with the exact ones, in roundings.
+    """Compare the forces of a penetration with the exact ones, in roundings.
 
     Parameters
     ----------
     case : Case
-        A state of `exact_flat_cases`.
+        A state of `exact_flat_cases` or of `linear_flat_cases`.
     subject : Subject
         The formulation.
 
@@ -65,25 +75,54 @@ def measure_local(case: Case, subject: Subject) -> Measurement:
     Measurement
         The number of roundings ω of the forces, or of the total force, dimensionless.
     """
-    formulation = subject.for_case(case)
-    count = formulation.n_multipliers(case.interface)
-    near = case.with_multipliers(np.full(count, case.penalty * case.parameter("penetration")))
+    formulation, linear = subject.for_case(case), "slope" in case.parameters
+    pressure = uniform_multiplier(case) if linear else case.penalty * case.parameter("penetration")
+    near = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), pressure))
     far = move_state(near, case.parameters["shift"])
     pairing = formulation.pair(far.interface, far.z)
     forces = formulation.residual(far.interface, pairing, far.z)
-    conditioning = measure_conditioning(
-        near, formulation, pairing, formulation.residual(near.interface, pairing, near.z)
+    near_forces = formulation.residual(near.interface, pairing, near.z)
+    conditioning = measure_conditioning(near, formulation, pairing, near_forces)
+    errors = (
+        _errors_of_linear(near, subject.traits, forces) if linear else _errors_of_uniform(near, subject.traits, forces)
     )
+    if FORCES.name not in errors and subject.traits.takes_longdouble:
+        errors[FORCES.name] = forces - _in_long_double(far, formulation, pairing)
+    if not errors:
+        errors[FORCES.name] = forces - near_forces
     values = {}
-    if knows_forces(subject.traits):
-        values[FORCES.name] = conditioning.count_roundings(_error_of_patch(near, forces))
-    elif subject.traits.takes_longdouble:
-        values[FORCES.name] = conditioning.count_roundings(forces - _in_long_double(far, formulation, pairing))
-    if knows_total(subject.traits) and not knows_forces(subject.traits):
-        values[TOTAL.name] = _count_total(near, forces, conditioning)
+    if FORCES.name in errors:
+        values[FORCES.name] = conditioning.count_roundings(errors[FORCES.name])
+    if TOTAL.name in errors:
+        values[TOTAL.name] = _count_total(near, errors[TOTAL.name], conditioning)
     failed = max(values.values()) > MOST_ROUNDINGS
     undecided = explain_by_rounded_decision(near, formulation, pairing) if failed else ""
     return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS), undecided)
+
+
+def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[str, FloatArray]:
+    """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
+    if knows_forces(traits):
+        return {FORCES.name: _error_of_patch(case, forces)}
+    if not knows_total(traits):
+        return {}
+    n_slave, exact = 2 * case.interface.n_slave_nodes, exact_forces(case)
+    totals = [
+        float(sum(map(Fraction, forces[axis:n_slave:2].tolist())) - sum(exact[axis:n_slave:2])) for axis in (0, 1)
+    ]
+    return {TOTAL.name: np.array(totals)}
+
+
+def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[str, FloatArray]:
+    """Return the same under a linear penetration, of the rows of slave nodes."""
+    if traits.enforcement != "penalty" or not knows_linear_total(traits):
+        return {}
+    n_slave = case.interface.n_slave_nodes
+    error = forces[: 2 * n_slave].reshape(-1, 2) + exact_slave_forces(case, traits)
+    errors = {TOTAL.name: error.sum(axis=0)}
+    if traits.integrates_linear_gap:
+        errors[FORCES.name] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
+    return errors
 
 
 def exact_forces(case: Case) -> list[Fraction]:
@@ -117,15 +156,10 @@ def _in_long_double(case: Case, formulation: CheckedFormulation, pairing: Pairin
     return formulation.residual(case.interface, pairing, case.z.astype(np.longdouble))
 
 
-def _count_total(case: Case, forces: FloatArray, conditioning: Conditioning) -> float:
-    """Return the error of the slave's total force over what roundings of all its nodes allow."""
-    n_slave = case.interface.n_slave_nodes
-    exact = exact_forces(case)
-    along_x, along_y = (
-        float(sum(map(Fraction, forces[axis : 2 * n_slave : 2].tolist())) - sum(exact[axis : 2 * n_slave : 2]))
-        for axis in (0, 1)
-    )
-    return ratio(float(np.hypot(along_x, along_y)), UNIT_ROUNDOFF * float(conditioning.reach[:n_slave].sum()))
+def _count_total(case: Case, error: FloatArray, conditioning: Conditioning) -> float:
+    """Return the error (2,) of the slave's total force over what roundings of all its nodes allow."""
+    reach = float(conditioning.reach[: case.interface.n_slave_nodes].sum())
+    return ratio(float(np.hypot(*error)), UNIT_ROUNDOFF * reach)
 
 
 def knows_forces(traits: Traits) -> bool:
@@ -147,14 +181,20 @@ def refuse_unknown_forces(traits: Traits) -> str:
     return "no exact force is known: the traits promise no patch test, no area and no long double"
 
 
+def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return a strategy for each kind of penetration; None where an interface is given."""
+    uniform, linear = exact_flat_cases(interface), linear_flat_cases(interface)
+    return None if uniform is None or linear is None else dict(zip(KINDS, (uniform, linear), strict=True))
+
+
 STABILITY_LOCAL = Property(
     id="stability.local",
     family="stability",
     summary="Forces are as exact as the positions allow, whatever the gap and the distance from the origin.",
     quantities=(FORCES, TOTAL),
-    cases=exact_flat_cases,
+    cases=local_cases,
+    kinds=KINDS,
     measure=measure_local,
     promise=lambda traits: True if traits.translation_stable else None,
     applicable=refuse_unknown_forces,
-    exact=forces_of_penetration,
 )

@@ -108,9 +108,7 @@ def measure_stiffness(case: Case, subject: Subject) -> Measurement:
         if np.abs(system.residual(u, pairing)).max() > _settled_residual(case):
             return Measurement({}, {}, undecided="Newton's method does not settle on the frozen pairing")
         turned = _TurnedSystem(system, motion, scene.interface.at(motion.move(scene.interface.nodes)), pairing)
-        u_turned = u
-        for _ in range(STEPS):  # The matrix is the same, in other axes.
-            u_turned = u_turned + _step(system, matrix, turned.residual(u_turned))
+        u_turned = _nearest_to_balance(turned, matrix, u)
     except _SingularMatrix:
         return Measurement({}, {}, undecided="the matrix has no inverse in floats")
     state = replace(case, z=system.state(u))
@@ -134,6 +132,19 @@ def _solve(system: System, pairing: Pairing | None, u: FloatArray) -> tuple[Floa
         if n_strikes == 2 or largest == 0:
             break
     return u, matrix
+
+
+def _nearest_to_balance(turned: _TurnedSystem, matrix: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the unknowns (n,) with the least force out of balance, of a start u and of some steps from there.
+
+    The start is the solution but for roundoff, and the matrix is the same, in other axes. Where springs push one way
+    and pull another, a step from there need not come nearer.
+    """
+    states, residuals = [u], [turned.residual(u)]
+    for _ in range(STEPS):
+        states.append(states[-1] + _step(turned.system, matrix, residuals[-1]))
+        residuals.append(turned.residual(states[-1]))
+    return states[int(np.argmin([np.abs(residual).max() for residual in residuals]))]
 
 
 def _settled_residual(case: Case) -> float:

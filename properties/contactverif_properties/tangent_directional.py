@@ -1,18 +1,24 @@
 """Ask whether the tangent is the derivative of the residual on a frozen pairing.
 
-**Question.** Along eight random directions, does the tangent give the same change as differences of the residual?
+**Question.** Along some directions, does the tangent give the same change as differences of the residual?
 
 **Why it matters.** A wrong term in the tangent does not change the result, so no patch test finds it. It costs
 iterations, and makes an analysis diverge where the right tangent converges.
 
-**How it is judged.** The pairing stays frozen, so the residual is smooth. Two conditions hold together, since an
-error of 1e-3 in one entry still has a Taylor slope of 2, and a central difference has an error of its own:
+**How it is judged.** The pairing stays frozen, so the residual is smooth. Eight directions move all unknowns at random,
+and others the nodes of one chain, or the multipliers. Two more follow from what was found: the defect of the worst
+direction, and the leading singular direction of the tangent minus its difference quotient on all directions before.
+Two conditions hold together, since an error of 1e-3 in one entry still has a Taylor slope of 2, and a central
+difference has an error of its own:
 
-- The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3), relative to the largest derivative.
+- The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3) at each node. That is relative to the
+  largest derivative there, or its change over ℓ, or the largest block of the tangent in the columns that the node
+  feels. No norm over the whole matrix hides a small row.
 - The Taylor remainder |R(x+hd) − R − hKd| falls with a slope of at least 1.9. A remainder at roundoff is exact.
 
-Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ. Where the residual itself
-bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again with λ in place of ℓ.
+Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Where the
+residual itself bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again with λ
+in place of ℓ. Each block of the tangent by itself is the question of `tangent.sparsity`.
 
 **Undecided.** A failing case is undecided near a kink that the pairing does not freeze, or where the residual bends
 over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
@@ -21,12 +27,12 @@ fails.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity, Verdict, judge
@@ -34,8 +40,9 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.block_derivatives import groups_of
 from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
 
 N_DIRECTIONS = 8
 CENTRAL_STEPS = (8.0, 1.0, 0.125)  # Steps over the one at which truncation and roundoff are equal.
@@ -66,7 +73,7 @@ COMPLEX = Quantity(
 
 
 def measure_directional(case: Case, subject: Subject) -> Measurement:
-    """Compare the tangent along eight random directions with differences of the residual, all states in one batch.
+    """Compare the tangent along some directions with differences of the residual.
 
     Parameters
     ----------
@@ -78,7 +85,7 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The best central difference over the steps in the worst direction, relative to the largest derivative. The least
+        The best central difference over the steps at the worst node, relative to the derivative there. The least
         slope of the Taylor remainder; missing where all remainders are roundoff, or the residual itself has no such
         slope, as across a kink that no pairing freezes. The complex step where the plugin takes complex positions.
         Detail: the length that served as ℓ.
@@ -86,25 +93,39 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
     formulation, case = prepare_state(case, subject)
     shortest = case.shortest_segment
     pairing = formulation.pair(case.interface, case.z)
-    directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
-    derivative = (formulation.tangent(case.interface, pairing, case.z) @ directions.T).T  # (n_directions, n_unknowns)
+    tangent = dense(formulation.tangent(case.interface, pairing, case.z))
+    directions = first_directions(case, N_DIRECTIONS)
     undecided, broken = _check_pairing(case, formulation, pairing, directions[0])
+    differences = Differences(formulation, case, pairing, tangent)
 
     def measure_over(length: float) -> tuple[Measurement, float]:
-        values, bending = compare_differences(formulation, case, pairing, directions, derivative, length)
+        comparison = differences.compare(directions, length)
+        more = defect_directions(directions, comparison.defects)
+        if len(more):
+            comparison = comparison.join(differences.compare(more, length))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
         tolerances = {
             CENTRAL.name: 30 * conditioning ** (2 / 3),
             TAYLOR.name: SLOPE,
             COMPLEX.name: 1e-11 + 64 * conditioning,
         }
+        values, place = {CENTRAL.name: comparison.error}, comparison.place
+        if np.isfinite(comparison.slope):
+            values[TAYLOR.name] = comparison.slope
         if subject.traits.takes_complex:
-            values[COMPLEX.name] = complex_step_error(formulation, case, pairing, directions, derivative)
-        measurement = Measurement(values, tolerances, undecided, broken, {"length": length}, idle=bending == np.inf)
-        return measurement, bending
+            values[COMPLEX.name], complex_place = differences.compare_complex_step(
+                np.vstack([directions, more]), comparison.turns
+            )
+            if values[COMPLEX.name] > tolerances[COMPLEX.name]:
+                place = complex_place
+        idle = comparison.bending == np.inf
+        measurement = Measurement(values, tolerances, undecided, broken, {"length": length}, idle=idle, place=place)
+        return measurement, comparison.bending
 
     first, bending = measure_over(shortest)
-    if bending >= shortest / 2 or judge(TANGENT_DIRECTIONAL, first)[0] is not Verdict.FAIL:
+    if judge(TANGENT_DIRECTIONAL, first)[0] is not Verdict.FAIL:
+        return replace(first, place="")
+    if bending >= shortest / 2:
         return first
     second, _ = measure_over(max(bending, SHORTEST_BENDING * shortest))
     if bending < SHORTEST_BENDING * shortest and not undecided:
@@ -112,17 +133,46 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
     return second
 
 
-def compare_differences(
-    formulation: CheckedFormulation,
-    case: Case,
-    pairing: Pairing | None,
-    directions: FloatArray,
-    derivative: Array,
-    length: float,
-) -> tuple[dict[str, float], float]:
-    """Compare derivatives with central differences and Taylor remainders.
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """The results of differences along some directions.
 
-    Parameters
+    Attributes
+    ----------
+    error : float
+        The largest error against the best central difference, over the size of the derivative at its node.
+    slope : float
+        The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
+    bending : float
+        The length over which the residual is seen to bend, see `Differences.compare`.
+    defects : FloatArray, shape (n_directions, n_unknowns)
+        The tangent times each direction, minus the central difference.
+    place : str
+        The row of the largest error, in words.
+    turns : FloatArray, shape (n_unknowns,)
+        The change of the derivative in each row over a length ℓ, from the third derivative.
+    """
+
+    error: float
+    slope: float
+    bending: float
+    defects: FloatArray
+    place: str
+    turns: FloatArray
+
+    def join(self, other: Comparison) -> Comparison:
+        """Return the worse of both."""
+        worse = self if self.error >= other.error else other
+        turns = np.maximum(self.turns, other.turns)
+        slope, bending = min(self.slope, other.slope), min(self.bending, other.bending)
+        return replace(worse, slope=slope, bending=bending, turns=turns)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Differences:
+    """The residual around a state, and the tangent that it is compared with.
+
+    Attributes
     ----------
     formulation : CheckedFormulation
         The formulation that is judged.
@@ -130,50 +180,95 @@ def compare_differences(
         The state x.
     pairing : Pairing | None
         The frozen pairing.
-    directions : FloatArray, shape (n_directions, n_unknowns)
-        The directions d.
-    derivative : Array, shape (n_directions, n_unknowns)
-        The tangent times each direction.
-    length : float
-        The length over which the residual is taken to bend; steps are shares of it.
-
-    Returns
-    -------
-    values : dict[str, float]
-        The values of CENTRAL and TAYLOR.
-    bending : float
-        The length over which the residual is seen to bend: the root of its size over its third derivative, from the
-        central differences of two steps. The tangent plays no part in it.
+    tangent : FloatArray, shape (n_unknowns, n_unknowns)
+        The tangent K.
     """
-    reach = case.largest_coordinate
-    central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
-    taylor = np.array(TAYLOR_STEPS) * length
-    steps = np.concatenate([central, -central, taylor])
-    batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
-    states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
-    forces = formulation.residual(case.interface, pairing, states)
-    here, moved = forces[-1], forces[:-1].reshape(batch.shape)
 
-    n = len(central)
-    slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
-    size = max(np.abs(derivative).max(), np.abs(slopes).max())
-    if size == 0:
-        return {CENTRAL.name: 0.0}, np.inf
-    errors = np.abs(slopes - derivative).max(axis=2)  # (n_steps, n_directions)
-    values = {CENTRAL.name: float(errors.min(axis=0).max() / size)}
-    forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
-    remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
-    floor = 1e3 * UNIT_ROUNDOFF * reach * size
-    slope = taylor_slope(remainders, steps[forward], floor)
-    if slope < SLOPE:  # If the best difference as derivative gives no better slope, the residual is not smooth.
-        best = np.take_along_axis(slopes, errors.argmin(axis=0)[None, :, None], axis=0)[0]
-        smooth = np.abs(moved[forward] - here - steps[forward, None, None] * best).max(axis=2)
-        if taylor_slope(smooth, steps[forward], floor) < SLOPE:
-            slope = np.inf
-    if np.isfinite(slope):
-        values[TAYLOR.name] = slope
-    third = np.abs(slopes[0] - slopes[1]).max() / (central[0] ** 2 - central[1] ** 2)  # The third derivative over 6.
-    return values, float(np.sqrt(size / third)) if third > 0 else np.inf
+    formulation: CheckedFormulation
+    case: Case
+    pairing: Pairing | None
+    tangent: FloatArray
+
+    def compare(self, directions: FloatArray, length: float) -> Comparison:
+        """Compare derivatives along directions with central differences and Taylor remainders, all in one batch.
+
+        The length over which the residual bends is the root of its size over its third derivative, from the central
+        differences of two steps. The tangent plays no part in it.
+
+        Parameters
+        ----------
+        directions : FloatArray, shape (n_directions, n_unknowns)
+            The directions d.
+        length : float
+            The length over which the residual is taken to bend; steps are shares of it.
+        """
+        case, reach = self.case, self.case.largest_coordinate
+        derivative = directions @ self.tangent.T  # (n_directions, n_unknowns)
+        central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
+        taylor = np.array(TAYLOR_STEPS) * length
+        steps = np.concatenate([central, -central, taylor])
+        batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
+        states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
+        forces = self.formulation.residual(case.interface, self.pairing, states)
+        here, moved = forces[-1], forces[:-1].reshape(batch.shape)
+
+        n = len(central)
+        slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
+        size = max(np.abs(derivative).max(), np.abs(slopes).max())
+        if size == 0:
+            return Comparison(0.0, np.inf, np.inf, 0 * derivative, "", 0 * case.z)
+        errors = np.abs(slopes - derivative)  # (n_steps, n_directions, n_unknowns)
+        best = errors.max(axis=2).argmin(axis=0)
+        closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
+        third = np.abs(slopes[0] - slopes[1]).max(axis=0) / (central[0] ** 2 - central[1] ** 2)  # Third derivative / 6.
+        turns = third * case.shortest_segment**2
+        sizes = self._sizes(np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
+        error, place = self._worst_row(errors.min(axis=0), sizes, derivative, closest)
+        forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
+        remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
+        floor = 1e3 * UNIT_ROUNDOFF * reach * size
+        slope = taylor_slope(remainders, steps[forward], floor)
+        if slope < SLOPE:  # If the best difference as derivative gives no better slope, the residual is not smooth.
+            smooth = np.abs(moved[forward] - here - steps[forward, None, None] * closest).max(axis=2)
+            if taylor_slope(smooth, steps[forward], floor) < SLOPE:
+                slope = np.inf
+        bending = float(np.sqrt(size / third.max())) if third.any() else np.inf
+        return Comparison(error, slope, bending, derivative - closest, place, turns)
+
+    def compare_complex_step(self, directions: FloatArray, turns: FloatArray) -> tuple[float, str]:
+        """Return the largest difference of Im R(x + ihd)/h from the derivative, likewise, and its row in words.
+
+        The step h is so small that h² vanishes.
+        """
+        case, h = self.case, self.case.shortest_segment * 2.0**-100
+        derivative = directions @ self.tangent.T
+        exact = self.formulation.residual(case.interface, self.pairing, case.z + 1j * h * directions).imag / h
+        sizes = self._sizes(np.maximum(np.abs(exact).max(axis=0), np.abs(derivative).max(axis=0)), turns)
+        return self._worst_row(np.abs(exact - derivative), sizes, derivative, exact)
+
+    def _sizes(self, derivatives: FloatArray, turns: FloatArray) -> FloatArray:
+        """Return the size (n_unknowns,) of the derivative at the node of each row.
+
+        It is the largest of these derivatives (n_unknowns,) there, or their change over ℓ, `turns` (n_unknowns,), or
+        the largest block of the tangent in a column that the node feels: what cancels in a row is rounded like that.
+        """
+        groups = groups_of(self.case)
+        blocks = groups.largest(self.tangent)
+        around = np.where(blocks > 0, groups.surroundings(blocks), 0.0).max(axis=1)
+        at_nodes = np.zeros(groups.count)
+        np.maximum.at(at_nodes, groups.of_unknowns, np.maximum(derivatives, turns))
+        sizes: FloatArray = np.maximum(at_nodes, around)[groups.of_unknowns]
+        return sizes
+
+    def _worst_row(
+        self, errors: FloatArray, sizes: FloatArray, derivative: FloatArray, difference: FloatArray
+    ) -> tuple[float, str]:
+        """Return the largest error over the size of its row, and that row in words."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = np.where(errors > 0, errors / sizes, 0.0)
+        number, row = divmod(int(relative.argmax()), relative.shape[1])
+        numbers = f"tangent times direction {derivative[number, row]:.10g}, derivative {difference[number, row]:.10g}"
+        return float(relative[number, row]), f"row {row} ({groups_of(self.case).describe(row)}): {numbers}"
 
 
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
@@ -207,20 +302,6 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
         best = np.where(above, np.maximum(best, slope), best)
         decided |= above
     return float(best[decided].min(initial=np.inf))
-
-
-def complex_step_error(
-    formulation: CheckedFormulation, case: Case, pairing: Pairing | None, directions: FloatArray, derivative: Array
-) -> float:
-    """Return the largest difference of Im R(x + ihd)/h from the derivative, relative to the larger of the two.
-
-    The step h is so small that h² vanishes. The parameters are those of `compare_differences`.
-    """
-    h = case.shortest_segment * 2.0**-100
-    forces = formulation.residual(case.interface, pairing, case.z + 1j * h * directions)
-    exact = forces.imag / h
-    size = float(max(np.abs(exact).max(), np.abs(derivative).max()))
-    return float(np.abs(exact - derivative).max()) / size if size > 0 else 0.0
 
 
 def _check_pairing(

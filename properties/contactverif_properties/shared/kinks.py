@@ -3,7 +3,8 @@
 A kink is where a contact point changes its master segment, its gap changes sign, or an end of its area of competence
 passes a master node. The harness decides, and not the plugin's pairing, or a plugin whose pairing changes at every call
 would never fail. Where the plugin says where its contact points are, the harness computes the distance to the nearest
-kink from the positions. Where the plugin does not, one-sided differences of its residual must agree.
+kink from the positions. Where the plugin does not, one-sided differences of its residual must agree. The plugin's
+tangent is never asked: one that jumps everywhere would excuse all of its own errors.
 
 A kink excuses a choice between the answers on its sides, and no other answer: a force that is missing exactly where a
 slave node stands over a master node, and there only, is no choice.
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
@@ -25,6 +26,9 @@ from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
 N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.
+DIFFERENCE_ERROR = (
+    30.0  # Times (uX/ℓ)^(2/3): truncation and roundoff of the best central difference, as in `tangent.directional`.
+)
 N_RARE = 4  # Answers that are larger, or smaller, than all but so many of those around are no side of the kink.
 
 
@@ -90,7 +94,7 @@ def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach:
 def measure_jump(
     case: Case, formulation: CheckedFormulation, reach: float, directions: FloatArray
 ) -> tuple[float, float]:
-    """Return how much the forces and the tangent change when the nodes move by `reach`, forth or back.
+    """Return how much the forces and their derivative change when the nodes move by `reach`, forth or back.
 
     Parameters
     ----------
@@ -107,16 +111,19 @@ def measure_jump(
     -------
     force_change : float
         The largest change of a force.
-    tangent_change : float
-        The largest change of an entry of the tangent; 0 where the plugin has none.
+    slope_change : float
+        The largest change of an entry of the derivative of the residual on its pairing, less what differences may be
+        wrong by.
     """
-    force, tangent = _answers(case, formulation, case.z)
+    force, slope = _answers(case, formulation, case.z)
     others = [
         _answers(case, formulation, case.z + sign * reach * direction) for direction in directions for sign in (1, -1)
     ]
+    slope_change = max(float(np.abs(other_slope - slope).max()) for _, other_slope in others)
+    noise = DIFFERENCE_ERROR * _rounding_share(case) ** (2 / 3) * float(np.abs(slope).max())
     return (
         max(float(np.abs(other_force - force).max()) for other_force, _ in others),
-        max(float(np.abs(other_tangent - tangent).max()) for _, other_tangent in others),
+        max(0.0, slope_change - noise),
     )
 
 
@@ -126,12 +133,18 @@ def _forces(case: Case, formulation: CheckedFormulation, z: FloatArray) -> Float
 
 
 def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return forces and tangent at z with its own pairing; one zero in place of a tangent that is not provided."""
+    """Return forces at z with its own pairing, and their derivative on that pairing by central differences."""
     pairing = formulation.pair(case.interface, z)
-    forces = formulation.residual(case.interface, pairing, z)
-    if "tangent" not in formulation.provides:
-        return forces, np.zeros(1)
-    return forces, dense(formulation.tangent(case.interface, pairing, z))
+    step = case.shortest_segment * _rounding_share(case) ** (1 / 3)
+    moves = step * np.eye(z.size)
+    forces = formulation.residual(case.interface, pairing, np.concatenate([z[None], z + moves, z - moves]))
+    slope: FloatArray = (forces[1 : 1 + z.size] - forces[1 + z.size :]).T / (2 * step)
+    return forces[0], slope
+
+
+def _rounding_share(case: Case) -> float:
+    """Return uX/ℓ, the rounding of a coordinate over the shortest segment."""
+    return UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
 
 
 def explain_by_rounded_decision(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> str:

@@ -13,16 +13,20 @@ from contactverif.contract.formulation import Pairing
 from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import System, Trace, solve
 
+LOAD_STEPS = (4, 16)  # The numbers of load steps that are tried where a solution in one step is not found.
+
 
 def find_solution(system: System) -> Trace:
-    """Solve the scene with the formulation's own tangent, and with differences if that does not converge.
+    """Solve the scene with the formulation's own tangent, else with differences, else with differences in load steps.
 
-    A wrong tangent may never get there, and is judged at the solution all the same.
+    A wrong tangent may never get there, and is judged at the solution all the same. Full steps may miss a solution
+    that is there, because they overshoot into another pairing.
     """
-    trace = solve(system.scene, system.formulation)
-    if trace.converged:
-        return trace
-    return solve(system.scene, system.formulation, use_tangent=False)
+    for use_tangent, load_steps in ((True, 1), *((False, number) for number in (1, *LOAD_STEPS))):
+        trace = solve(system.scene, system.formulation, use_tangent=use_tangent, load_steps=load_steps)
+        if trace.converged:
+            break
+    return trace
 
 
 def length_units(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:

@@ -66,3 +66,20 @@ def split_passes(case: Case, points: ContactPoints) -> Iterator[Pass]:
             interface, numbers = interface.swap_roles(), np.roll(numbers, -interface.n_slave_nodes)
         z = case.positions[numbers].reshape(-1)
         yield Pass(interface, z, points if mask.all() else points.select(mask), numbers, second)
+
+
+def nearest_sum(points: ContactPoints, force: float) -> float:
+    """Return the sum of pressure × weight over active points that is nearer to a force on the slave.
+
+    In two passes the points of both surfaces push both bodies. In half passes those of the slave push the slave alone.
+
+    Parameters
+    ----------
+    points : ContactPoints
+        What a formulation reports.
+    force : float
+        The sum of the pushes on the slave along the normals of its nodes.
+    """
+    pushes = np.where(points.active, points.pressure * points.weight, 0.0)
+    sums = float(pushes[~points.on_master].sum()), float(pushes.sum())
+    return min(sums, key=lambda total: abs(total - force))

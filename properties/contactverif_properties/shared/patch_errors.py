@@ -7,6 +7,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Surface
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics.scene import Scene
 from contactverif.scenes.blocks import overhangs
@@ -119,18 +120,30 @@ def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: fl
 def beside_master(case: Case, points: ContactPoints) -> BoolArray:
     """Return which points (n_points,) lie beside the other surface, or within roundoff of its end.
 
-    A point that names no place on its surface does not lie beside the other. A point of a second pass lies on the
-    master, and the other surface is the slave.
+    A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no
+    point of the slave does. A point of a second pass lies on the master, and the other surface is the slave.
     """
     beside = np.zeros(len(points.c), bool)
-    if not overhangs(case):
-        return beside
+    covered = not overhangs(case)
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
     interface, along = case.interface, case.parameters["along"]
-    slave, master = np.split(along, [interface.n_slave_nodes])
-    for surface, other, second in ((interface.slave, master, False), (interface.master, slave, True)):
+    for surface, other, second in (
+        (interface.slave, interface.master, False),
+        (interface.master, interface.slave, True),
+    ):
         here = (points.on_master == second) & (points.slave_segment >= 0)
-        ends, c = along[surface.segments[points.slave_segment[here]]], points.c[here]
-        place = (1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1]
-        beside[here] = (place < other.min() + rounding) | (place > other.max() - rounding)
+        if here.any() and (second or not covered):
+            ends, c = along[surface.segments[points.slave_segment[here]]], points.c[here]
+            place = (1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1]
+            beside[here] = ~_faces(place, other, along, rounding)
     return beside
+
+
+def _faces(place: FloatArray, surface: Surface, along: FloatArray, rounding: float) -> BoolArray:
+    """Return which places (n,) along the interface a surface covers, up to `rounding` from its free ends."""
+    ends = along[surface.segments]  # (n_segments, 2)
+    inwards = np.sign(ends[:, ::-1] - ends)
+    ends = ends + np.where(surface.neighbours < 0, rounding, -rounding) * inwards
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    covered: BoolArray = ((place[:, None] >= low) & (place[:, None] <= high)).any(axis=1)
+    return covered

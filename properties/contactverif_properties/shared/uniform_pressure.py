@@ -9,6 +9,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import uniform_pressure_weights
+from contactverif_properties.shared.roundoff import gap_tolerance
 
 
 def consistent_forces(case: Case, pressure: float) -> FloatArray:
@@ -81,6 +82,30 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
     total, exact_total = nodal[:n].sum(axis=0), exact[:n].sum(axis=0)
     projection = float(total @ exact_total)
     return nodal * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
+
+
+def transmission_error(case: Case, subject: Subject) -> tuple[float, float]:
+    """Return the largest error of a nodal force of a uniform penetration over ε̂ |g| L, and its tolerance.
+
+    Parameters
+    ----------
+    case : Case
+        A flat case with the parameter `penetration`, a length.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    error : float
+        The largest |F − F_exact| over the nodes of both surfaces, over the total force on the slave; dimensionless.
+    tolerance : float
+        `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
+    """
+    exact = forces_of_penetration(case)
+    size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
+    forces, largest = forces_of_gap(case, subject, exact)
+    error = float(np.linalg.norm(forces - exact, axis=1).max())
+    return error / size, gap_tolerance(case, case.parameter("penetration")) * largest
 
 
 def unit_forces(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:

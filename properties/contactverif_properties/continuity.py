@@ -1,0 +1,231 @@
+"""Ask whether forces jump while a slave slides over the vertices of the master.
+
+**Question.** A slave slides along a bent master by the length of one of its segments, so that each of its points passes
+about one vertex. Do the forces change continuously, or with a continuous slope, as the trait `continuity` says?
+
+**Why it matters.** Where a force jumps, a load between both values has no equilibrium: Newton's method runs in circles
+between two pairings. Friction and dynamics make a noise there.
+
+**How it is judged.** The forces are computed after each of 12 steps of the way. The step that differs most from its
+neighbours is halved 20 times, always towards the larger change. A continuous force then changes by about 2^-20 of the
+step's change, and a jump is left as it is. The first number is the largest change of a force that is left, over Σ|R| of
+the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). Whoever promises C1 is
+asked the same about the derivative along the way, a central difference on the frozen pairing: the step is halved 16
+times, the tolerance is 2^-10 of the largest change plus 2^26 times that roundoff, and the unit is the largest
+derivative. The details say where the largest jump is (0 to 1), and how many were found, at most 3.
+
+**Undecided.** Never. The slave stays inside the master, far from its free ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies.sliding import sliding_cases
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.roundoff import ratio, rounding_distance, segment_tolerance, sum_slave_forces
+
+N_STEPS = 12  # The steps of the way that are looked at first.
+MOST_JUMPS = 3  # So many jumps are looked for, from the largest on.
+HALVINGS, HALVINGS_OF_SLOPE = 20, 16
+FIRST = 3  # So many halvings of each of the largest steps, before one is chosen.
+ALLOWED, ALLOWED_OF_SLOPE = 2.0**-12, 2.0**-10  # Shares of the largest change over a step: 2^8 and 2^6 times 2^-n.
+DIFFERENCE = 2.0**-26  # The step of the central difference along the way.
+FORCE = Quantity(
+    "jump of a force",
+    "1",
+    "2^-12 Δ + u(8Z/min(g, ℓ) + 4N)",
+    "After 20 halvings, a continuous force changes by 2^-20 of its change Δ over a step, and by roundoff.",
+)
+SLOPE = Quantity(
+    "jump of a slope",
+    "1",
+    "2^-10 Δ + 2^26 u(8Z/min(g, ℓ) + 4N)",
+    "After 16 halvings, a continuous slope changes by 2^-16 of its change Δ over a step; differences raise roundoff.",
+)
+
+Function = Callable[[float], FloatArray]
+
+
+def measure_continuity(case: Case, subject: Subject) -> Measurement:
+    """Look for jumps of the forces on a way, and of their slope where C1 is promised.
+
+    Parameters
+    ----------
+    case : Case
+        A state with the parameter "path" (n_unknowns,), the way of each node.
+    subject : Subject
+        A formulation with springs.
+
+    Returns
+    -------
+    Measurement
+        The largest jump of a force over Σ|R| of the slave, and of a slope over the largest slope; both dimensionless.
+    """
+    forces, slope = _functions(subject.for_case(case), case)
+    samples = np.array([forces(t) for t in _places()])
+    size = max(sum_slave_forces(case, sample) for sample in samples)
+    rounding = segment_tolerance(
+        case, samples[int(np.abs(samples).sum(axis=1).argmax())], rounding_distance(case, subject.traits)
+    )
+    jumps = find_jumps(forces, samples, HALVINGS, ALLOWED)
+    values = {FORCE.name: ratio(jumps[0][1], size)}
+    tolerances = {FORCE.name: ALLOWED * ratio(_largest_step(samples), size) + rounding}
+    if subject.traits.continuity == "C1":
+        samples = np.array([slope(t) for t in _places()])
+        steepest = float(np.abs(samples).max())
+        values[SLOPE.name] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)
+        tolerances[SLOPE.name] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
+    places = [place for place, jump in jumps if ratio(jump, size) > tolerances[FORCE.name]]
+    details = {"jumps": float(len(places))} | ({"place of the largest jump": places[0]} if places else {})
+    return Measurement(values, tolerances, details=details, idle=size == 0)
+
+
+def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: float) -> list[tuple[float, float]]:
+    """Return the places and sizes of the jumps of a function on the way from 0 to 1, the largest first.
+
+    Parameters
+    ----------
+    function : Function
+        The function of the place.
+    samples : FloatArray, shape (N_STEPS + 1, n)
+        Its values at `N_STEPS` + 1 equal distances.
+    halvings : int
+        The number of times that a step is halved.
+    allowed : float
+        Less than this share of the step's change counts as no jump, and ends the search.
+
+    Returns
+    -------
+    list[tuple[float, float]]
+        At least one pair of a place and the change that is left there, and at most `MOST_JUMPS`.
+    """
+    changes = np.diff(samples, axis=0)
+    padded = np.vstack([changes[1], changes, changes[-2]])
+    trends = (padded[:-2] + padded[2:]) / 2  # The change of each step if it were like its neighbours.
+    steps = [
+        Bracket(step / N_STEPS, (step + 1) / N_STEPS, samples[step], samples[step + 1], trends[step])
+        for step in range(N_STEPS)
+    ]
+    # A few halvings tell a jump from a bend of the way, which differs from its neighbours too.
+    worst = sorted(
+        (bracket.halve(function, FIRST) for bracket in _select_worst(steps)), key=lambda bracket: -bracket.excess
+    )
+    jumps: list[tuple[float, float]] = []
+    for bracket in worst:
+        last = bracket.halve(function, halvings - FIRST)
+        jumps.append((last.left, last.change))
+        if last.change <= allowed * float(np.abs(changes).max()):
+            break
+    return sorted(jumps, key=lambda jump: -jump[1])
+
+
+def _select_worst(steps: list[Bracket]) -> list[Bracket]:
+    """Return the steps with the largest excess; the neighbours of one have a part of its excess, and are left out."""
+    selected: list[int] = []
+    for number in sorted(range(len(steps)), key=lambda number: -steps[number].excess):
+        if all(abs(number - other) > 1 for other in selected):
+            selected.append(number)
+    return [steps[number] for number in selected[:MOST_JUMPS]]
+
+
+@dataclass(frozen=True, slots=True)
+class Bracket:
+    """A part of the way.
+
+    Attributes
+    ----------
+    left, right : float
+        Its ends, from 0 to 1.
+    before, behind : FloatArray, shape (n,)
+        The values of the function there.
+    trend : FloatArray, shape (n,)
+        The change that the neighbours suggest.
+    """
+
+    left: float
+    right: float
+    before: FloatArray
+    behind: FloatArray
+    trend: FloatArray
+
+    @property
+    def change(self) -> float:
+        """The largest change of a value."""
+        return float(np.abs(self.behind - self.before).max())
+
+    @property
+    def excess(self) -> float:
+        """The largest change that the trend does not explain."""
+        return float(np.abs(self.behind - self.before - self.trend).max())
+
+    def halve(self, function: Function, times: int) -> Bracket:
+        """Return the part to which halving leads, always towards the larger excess."""
+        bracket = self
+        for _ in range(times):
+            middle, trend = (bracket.left + bracket.right) / 2, bracket.trend / 2
+            value = function(middle)
+            first = Bracket(bracket.left, middle, bracket.before, value, trend)
+            second = Bracket(middle, bracket.right, value, bracket.behind, trend)
+            bracket = first if first.excess >= second.excess else second
+        return bracket
+
+
+def _functions(formulation: CheckedFormulation, case: Case) -> tuple[Function, Function]:
+    """Return the forces (n_unknowns,) as a function of the place on the way, and their slope."""
+    interface, way = case.interface, case.parameters["path"]
+
+    def forces(place: float) -> FloatArray:
+        z = case.z + place * way
+        return formulation.residual(interface, formulation.pair(interface, z), z)
+
+    def slope(place: float) -> FloatArray:
+        z = case.z + place * way
+        around = np.array([z - DIFFERENCE * way, z + DIFFERENCE * way])
+        behind, ahead = formulation.residual(interface, formulation.pair(interface, z), around)
+        slope: FloatArray = (ahead - behind) / (2 * DIFFERENCE)
+        return slope
+
+    return forces, slope
+
+
+def _places() -> FloatArray:
+    return np.linspace(0.0, 1.0, N_STEPS + 1)
+
+
+def _largest_step(samples: FloatArray) -> float:
+    return float(np.abs(np.diff(samples, axis=0)).max())
+
+
+def promise_continuity(traits: Traits) -> bool | None:
+    """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
+    return None if traits.continuity is None else traits.continuity != "jumps"
+
+
+def refuse_unstated_continuity(traits: Traits) -> str:
+    """Return why the question makes no sense for a formulation, or an empty string if it does."""
+    if traits.enforcement == "multiplier":
+        return "multipliers would change on the way, and here nothing is solved"
+    if traits.continuity is None:
+        return "the trait `continuity` is not stated"
+    return refuse_barrier(traits)
+
+
+CONTINUITY = Property(
+    id="continuity",
+    family="invariants",
+    summary="Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.",
+    quantities=(FORCE, SLOPE),
+    cases=sliding_cases,
+    measure=measure_continuity,
+    promise=promise_continuity,
+    applicable=refuse_unstated_continuity,
+)

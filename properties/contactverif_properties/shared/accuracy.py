@@ -1,0 +1,277 @@
+"""The errors of a solved scene whose exact solution is known, measured in one way for all formulations.
+
+- `force_error`: nodal forces of one surface, sqrt(Σ|F_i − F_i^exact|²/m_i) over sqrt(Σ|F_i^exact|²/m_i), m_i = ∫N_i ds.
+- `pressure_error`: reported pressures, the root of the mean of (p − p^exact)² with the plugin's own weights.
+- `displacement_error`: displacements of a surface, sqrt(∫|u_h − u^exact|² ds) over sqrt(∫|u^exact|² ds).
+- `fit_rate`: the power of h by which the errors on several meshes fall.
+
+Rules for the next editor: nothing here knows a scene. The exact field is a function of places (n, 2), in the reference
+or in the current configuration, whichever the positions are that come with it. A field that is not smooth inside a
+segment needs more `parts`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.newton import End, Trace, solve
+from contactverif.mechanics.scene import Scene
+
+Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), or to numbers (n,).
+
+# Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
+BALANCED = 1e-9
+GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 times a shape function.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """A solved scene, as its errors need it.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene, with the distributed penalty ε̂ that it was solved with.
+    trace : Trace
+        Newton's method, iterate by iterate.
+    state : Case
+        The last iterate: positions, multipliers behind them.
+    forces : FloatArray, shape (n_nodes, 2)
+        The forces by which the formulation pushes the nodes, minus its residual.
+    points : ContactPoints | None
+        The contact points; None if the plugin reports none.
+    nodal : bool
+        True if pressures of points are nodal forces (trait `penalty="nodal"`).
+    """
+
+    scene: Scene
+    trace: Trace
+    state: Case
+    forces: FloatArray
+    points: ContactPoints | None
+    nodal: bool
+
+    @property
+    def interface(self) -> Interface:
+        """The interface of the scene."""
+        return self.scene.interface
+
+    @property
+    def displacements(self) -> FloatArray:
+        """The displacements (n_nodes, 2) of the interface's nodes."""
+        moves: FloatArray = self.state.positions - self.interface.nodes
+        return moves
+
+    @property
+    def balanced(self) -> bool:
+        """True if Newton's method found a solution (up to BALANCED), or came as near to one as roundoff lets it."""
+        return self.trace.end in (End.CONVERGED, End.STAGNATED)
+
+
+def solve_for_accuracy(
+    scene: Scene, subject: Subject, start: FloatArray | None = None, step: float | None = None
+) -> Solution:
+    """Solve a scene at its own penalty, with the formulation's tangent, or with differences where that does not help.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene. Its penalty ε̂ counts; a nodal formulation gets ε̂ × the mean slave segment.
+    subject : Subject
+        The formulation.
+    start : FloatArray | None, shape (n_free,)
+        The first iterate; by default the first guess of the scene.
+    step : float | None
+        The step of differences where the formulation has no tangent, a length that is small against the penetration.
+
+    Returns
+    -------
+    Solution
+        The last iterate of Newton's method, whether or not it converged.
+    """
+    interface = scene.interface
+    guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
+    formulation = subject.for_case(guess)
+    trace = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step)
+    if not trace.converged and "tangent" in formulation.provides:
+        trace = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step, use_tangent=False)
+    z = trace.z
+    state = Case(interface, z, scene.penalty, name=scene.name, n_multipliers=len(trace.multipliers))
+    pairing = formulation.pair(interface, z)
+    forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
+    points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
+    return Solution(scene, trace, state, forces, points, subject.traits.penalty == "nodal")
+
+
+def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:
+    """Return m_i = ∫N_i ds (n_nodes,), half the length of each segment at either end; 0 at nodes of the other surface.
+
+    Parameters
+    ----------
+    surface : Surface
+        The slave or the master.
+    positions : FloatArray, shape (n_nodes, 2)
+        The positions of all nodes of the interface.
+    """
+    halves = np.repeat(surface.lengths(positions) / 2, 2)
+    return np.bincount(surface.segments.reshape(-1), weights=halves, minlength=len(positions)).astype(np.float64)
+
+
+def traction_forces(surface: Surface, positions: FloatArray, traction: Field, parts: int = 1) -> FloatArray:
+    """Return the nodal forces ∫N_i t ds of a traction t on a surface, by Gauss points.
+
+    Parameters
+    ----------
+    surface : Surface
+        The slave or the master.
+    positions : FloatArray, shape (n_nodes, 2)
+        The positions of all nodes of the interface.
+    traction : Field
+        The traction (n, 2) at places (n, 2), force per length, that acts on the body of this surface.
+    parts : int
+        The number of equal parts that each segment is divided into.
+
+    Returns
+    -------
+    FloatArray, shape (n_nodes, 2)
+        The forces; 0 at nodes of the other surface.
+    """
+    share, places, weights = _quadrature(surface, positions, parts)
+    loads = traction(places.reshape(-1, 2)).reshape(places.shape) * weights[..., None]  # (n_segments, n_points, 2)
+    forces = np.zeros((len(positions), 2))
+    for end, shape in ((0, 1 - share), (1, share)):
+        np.add.at(forces, surface.segments[:, end], np.einsum("p,spd->sd", shape, loads))
+    return forces
+
+
+def force_error(forces: FloatArray, exact: FloatArray, integrals: FloatArray) -> float:
+    """Return E_F, the error of nodal forces over the exact ones, dimensionless.
+
+    Parameters
+    ----------
+    forces, exact : FloatArray, shape (n_nodes, 2)
+        The forces and the exact ones.
+    integrals : FloatArray, shape (n_nodes,)
+        The integrals m_i = ∫N_i ds. Nodes where it is 0 do not count, so that those of one surface select it.
+    """
+    counted = integrals > 0
+    weights = 1 / integrals[counted, None]
+    return float(np.sqrt(((forces - exact)[counted] ** 2 * weights).sum() / (exact[counted] ** 2 * weights).sum()))
+
+
+def pressure_error(solution: Solution, exact: Field, scale: float) -> float | None:
+    """Return the root mean square of p − p^exact at the contact points over `scale`.
+
+    A point counts with the weight that the plugin gives it, a weighted node with ∫ of its shape. A nodal force counts
+    as a pressure F_i/m_i with the weight m_i, the current ∫N_i ds. An idle point has the pressure 0.
+
+    Parameters
+    ----------
+    solution : Solution
+        The solved scene.
+    exact : Field
+        The exact pressure (n,) at current places (n, 2) of the slave.
+    scale : float
+        The pressure that the error is divided by.
+
+    Returns
+    -------
+    float | None
+        The error, dimensionless; infinite if no point has a weight. None if nothing is reported, or if two passes share
+        the pressure, since nobody says how.
+    """
+    points = solution.points
+    if points is None or points.on_master.any():
+        return None
+    if solution.nodal:
+        places, pressures, weights = _pressures_of_nodal_forces(solution, points)
+    else:
+        places, weights = points.position, points.weight
+        pressures = np.where(points.active, points.pressure, 0.0)
+    counted = weights > 0
+    if not counted.any():
+        return np.inf
+    errors = pressures[counted] - exact(places[counted])
+    return float(np.sqrt(np.average(errors**2, weights=weights[counted]))) / scale
+
+
+def displacement_error(
+    surface: Surface, positions: FloatArray, displacements: FloatArray, exact: Field, parts: int = 1
+) -> float:
+    """Return the L2 error of the displacements of a surface over the L2 norm of the exact ones.
+
+    Parameters
+    ----------
+    surface : Surface
+        The slave or the master.
+    positions : FloatArray, shape (n_nodes, 2)
+        The reference positions of all nodes of the interface.
+    displacements : FloatArray, shape (n_nodes, 2)
+        Their displacements, which are interpolated linearly.
+    exact : Field
+        The exact displacement (n, 2) at reference places (n, 2) of this surface.
+    parts : int
+        The number of equal parts that each segment is divided into.
+    """
+    share, places, weights = _quadrature(surface, positions, parts)
+    ends = displacements[surface.segments]  # (n_segments, 2, 2)
+    interpolated = (1 - share)[:, None] * ends[:, None, 0] + share[:, None] * ends[:, None, 1]
+    expected = exact(places.reshape(-1, 2)).reshape(places.shape)
+    squares = [((weights[..., None] * field**2).sum()) for field in (interpolated - expected, expected)]
+    return float(np.sqrt(squares[0] / squares[1]))
+
+
+def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | FloatArray, floor: float = 0.0) -> float:
+    """Return the slope of log error over log h, fitted by least squares.
+
+    Parameters
+    ----------
+    sizes : Sequence[float] or FloatArray, shape (n_meshes,)
+        The sizes h of the meshes, in any unit.
+    errors : Sequence[float] or FloatArray, shape (n_meshes,)
+        The errors on these meshes.
+    floor : float
+        Errors up to this value are roundoff, and do not count.
+
+    Returns
+    -------
+    float
+        The rate; infinite if fewer than two errors are above the floor, NaN if an error is.
+    """
+    values = np.asarray(errors, dtype=np.float64)
+    if np.isnan(values).any():
+        return np.nan
+    counted = values > floor
+    if counted.sum() < 2:
+        return np.inf
+    return float(np.polyfit(np.log(np.asarray(sizes)[counted]), np.log(values[counted]), 1)[0])
+
+
+def _quadrature(surface: Surface, positions: FloatArray, parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return shares of a segment (n_points,), places (n_segments, n_points, 2) and weights (n_segments, n_points)."""
+    abscissas, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    share = ((np.arange(parts)[:, None] + (abscissas + 1) / 2) / parts).reshape(-1)
+    first, second = positions[surface.segments[:, 0]], positions[surface.segments[:, 1]]
+    places = first[:, None] + share[:, None] * (second - first)[:, None]
+    return share, places, surface.lengths(positions)[:, None] * np.tile(weights / (2 * parts), parts)
+
+
+def _pressures_of_nodal_forces(solution: Solution, points: ContactPoints) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return places (n_slave_nodes, 2), pressures F_i/m_i and weights m_i (n_slave_nodes,) of reported nodal forces."""
+    surface, positions = solution.interface.slave, solution.state.positions
+    n_nodes = solution.interface.n_slave_nodes
+    named = points.slave_segment >= 0
+    ends: IntArray = (points.c[named] > 0).astype(np.int64)
+    numbers = surface.segments[points.slave_segment[named], ends]
+    reported = np.where(points.active, points.pressure, 0.0)[named]
+    forces = np.bincount(numbers, weights=reported, minlength=n_nodes)
+    integrals = shape_integrals(surface, positions)[:n_nodes]
+    return positions[:n_nodes], forces / integrals, integrals

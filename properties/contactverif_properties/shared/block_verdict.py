@@ -1,0 +1,221 @@
+"""The verdict on the blocks of a tangent: the worst block by name, and what excuses one.
+
+A block is excused where the residual is not smooth, and where it bends over a length too short for differences. Both
+are seen in differences of the residual; the tangent has no part in it. One excused block excuses no other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.contract.property import Measurement
+from contactverif.contract.subject import Subject
+from contactverif_properties.shared.block_derivatives import STEPS, single_moves
+from contactverif_properties.shared.tangent_blocks import (
+    BLOCK,
+    COMPLEX_BLOCK,
+    EXACT,
+    JUMP,
+    LACKING,
+    SHORTEST_BENDING,
+    BlockJudge,
+    Comparison,
+    compare_blocks,
+    judge_of,
+)
+
+
+def measure_blocks(case: Case, subject: Subject) -> Measurement:
+    """Compare each block of the tangent, rows of a node × columns of a node, with the derivative of the residual.
+
+    Parameters
+    ----------
+    case : Case
+        A state.
+    subject : Subject
+        A formulation with a tangent.
+
+    Returns
+    -------
+    Measurement
+        The error of the block that is furthest beyond its tolerance or nearest to it, over the largest entry of that
+        block, and the number of entries that the pattern lacks. Its place says which block it is. Details: the number
+        of blocks, and of those that are excused.
+    """
+    judge = judge_of(case, subject)
+    comparison = compare_blocks(judge)
+    excess, excuses = comparison.excess, Excuses(0, 0)
+    if (excess > 1).any():
+        excess, excuses = _excuse(judge, comparison)
+    lacking = len(lacking_entries(judge, comparison, excess)) if (excess > 1).any() else 0
+    row, column = np.unravel_index(int(excess.argmax()), excess.shape)
+    size = float(comparison.largest[row, column]) or 1.0
+    value = float(excess[row, column])
+    error = float(comparison.error[row, column]) / size if value else 0.0  # A block that is excused has none.
+    quantity = COMPLEX_BLOCK if judge.by_complex_step else BLOCK
+    undecided = "" if value > 1 or lacking else excuses.reason
+    values = {quantity.name: error, LACKING.name: float(lacking)}
+    tolerances = {quantity.name: error / value if value else EXACT, LACKING.name: 0.0}
+    if undecided:
+        values, tolerances = {}, {}
+    return Measurement(
+        values,
+        tolerances,
+        undecided=undecided,
+        place=describe_block(judge, comparison, int(row), int(column)) if value > 1 else "",
+        details={
+            "blocks": float((comparison.largest > 0).sum()),
+            "blocks at a kink": float(excuses.kinked),
+            "blocks that bend too sharply": float(excuses.bent),
+        },
+        idle=not judge.tangent.any() and not comparison.derivative.any(),
+    )
+
+
+def describe_block(judge: BlockJudge, comparison: Comparison, row: int, column: int) -> str:
+    """Return the worst entry of a block in words: row, column, value and derivative.
+
+    Parameters
+    ----------
+    judge : BlockJudge
+        The tangent.
+    comparison : Comparison
+        Its blocks.
+    row, column : int
+        The node or multiplier of the rows, and that of the columns.
+    """
+    of_unknowns, groups = judge.groups.of_unknowns, judge.groups
+    rows, columns = np.flatnonzero(of_unknowns == row), np.flatnonzero(of_unknowns == column)
+    part = np.ix_(rows, columns)
+    errors = np.abs(judge.tangent[part] - comparison.derivative[part])
+    first, second = divmod(int(errors.argmax()), errors.shape[1])
+    i, j = int(rows[first]), int(columns[second])
+    missing = "" if judge.pattern[i, j] else " (not in the pattern)"
+    numbers = f"tangent {judge.tangent[i, j]:.10g}{missing}, derivative {comparison.derivative[i, j]:.10g}"
+    largest = f"largest entry of the block {comparison.largest[row, column]:.3g}"
+    return f"row {i} ({groups.describe(i)}), column {j} ({groups.describe(j)}): {numbers}; {largest}"
+
+
+def lacking_entries(judge: BlockJudge, comparison: Comparison, excess: FloatArray) -> IntArray:
+    """Return rows and columns (n_entries, 2) of derivatives that are not zero where the tangent has no entry.
+
+    Blocks of which `excess` (count, count) says that they do not fail lack nothing.
+    """
+    of_unknowns = judge.groups.of_unknowns
+    part = np.ix_(of_unknowns, of_unknowns)
+    lacking = ~judge.pattern & (np.abs(comparison.derivative) > comparison.tolerance[part]) & (excess[part] > 1)
+    return np.argwhere(lacking)
+
+
+@dataclass(frozen=True, slots=True)
+class Excuses:
+    """The numbers of blocks that fail and are excused, by a kink or because the residual bends too sharply."""
+
+    kinked: int
+    bent: int
+
+    @property
+    def reason(self) -> str:
+        """The reason why such a block decides nothing; empty if there is none."""
+        if self.kinked:
+            return f"a kink: one-sided differences disagree in {self.kinked} blocks"
+        if self.bent:
+            return f"roundoff: {self.bent} blocks bend over lengths that are too short for differences"
+        return ""
+
+
+def _excuse(judge: BlockJudge, comparison: Comparison) -> tuple[FloatArray, Excuses]:
+    """Return the excess (count, count) of the blocks without those that are excused, and how many those are.
+
+    The worst blocks that fail are looked at first. As soon as one has no excuse, it decides.
+    """
+    excess, kinked, bent = comparison.excess.copy(), 0, 0
+    order = np.argsort(-excess, axis=None)[: int((excess > 1).sum())]
+    columns: dict[int, _Sides] = {}
+    for place in order:
+        row, column = divmod(int(place), excess.shape[1])
+        if column not in columns:
+            columns[column] = _Sides.of_column(judge, column)
+        sides = columns[column].in_row(judge, row)
+        block, around = (getattr(comparison, name)[row, column] for name in ("largest", "surroundings"))
+        bending = sides.bending(float(around))
+        allowed = float(judge.tolerate(block, around, np.asarray(max(bending, SHORTEST_BENDING))))
+        excess[row, column] = comparison.error[row, column] / allowed
+        if excess[row, column] <= 1:
+            continue
+        if bending < SHORTEST_BENDING:
+            excess[row, column], bent = 0.0, bent + 1
+        elif sides.jump() > JUMP * sides.accuracy * around and not judge.by_complex_step:
+            excess[row, column] = 0.0
+            kinked += not sides.is_one_sided(2 * allowed)
+        else:
+            break
+    return excess, Excuses(kinked, bent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sides:
+    """One-sided differences of some rows and columns, in doubles or better.
+
+    Attributes
+    ----------
+    ahead, behind : FloatArray, shape (n_steps, n_columns, n_rows)
+        The differences to both sides, for the steps in STEPS.
+    tangent : FloatArray, shape (n_columns, n_rows)
+        The columns of the tangent.
+    step : float
+        The step h over ℓ.
+    """
+
+    ahead: FloatArray
+    behind: FloatArray
+    tangent: FloatArray
+    step: float
+
+    @classmethod
+    def of_column(cls, judge: BlockJudge, column: int) -> _Sides:
+        """Return all rows of the columns of a node or multiplier."""
+        columns, differences = np.flatnonzero(judge.groups.of_unknowns == column), judge.differences
+        dtype = np.float64 if judge.by_complex_step else judge.dtype
+        ahead, behind = differences.on_both_sides(single_moves(columns, judge.groups.size).directions(), dtype)
+        step = differences.step(dtype) / differences.case.shortest_segment
+        return cls(ahead, behind, judge.tangent[:, columns].T, step)
+
+    def in_row(self, judge: BlockJudge, row: int) -> _Sides:
+        """Return the rows of a node or multiplier alone."""
+        rows = judge.groups.of_unknowns == row
+        return _Sides(self.ahead[..., rows], self.behind[..., rows], self.tangent[:, rows], self.step)
+
+    @property
+    def accuracy(self) -> float:
+        """(uS/ℓ)^(2/3), the accuracy of a difference."""
+        return self.step**2
+
+    def bending(self, size: float) -> float:
+        """Return the length over ℓ over which a residual with derivatives of this size bends; 1 if it is longer."""
+        central = (self.ahead + self.behind) / 2
+        third = np.abs(central[0] - central[1]).max() / ((STEPS[0] ** 2 - STEPS[1] ** 2) * self.step**2)
+        bending = float(np.sqrt(size / third)) if third > 0 else 1.0
+        return bending if bending < 0.5 else 1.0
+
+    def jump(self) -> float:
+        """Return by how much the derivative jumps at the state, without what a smooth residual bends by."""
+        bends = self.ahead - self.behind
+        return float(np.abs(_extrapolate(bends)).max())
+
+    def is_one_sided(self, tolerance: float) -> bool:
+        """Return whether the block of the tangent is the derivative to one side."""
+        return any(
+            bool((np.abs(_extrapolate(side) - self.tangent) <= tolerance).all()) for side in (self.ahead, self.behind)
+        )
+
+
+def _extrapolate(differences: FloatArray) -> FloatArray:
+    """Return one-sided differences (n_steps, …) extrapolated to a step of zero, from the two shorter steps."""
+    ratio = STEPS[1] / STEPS[2]
+    limit: FloatArray = (ratio * differences[2] - differences[1]) / (ratio - 1)
+    return limit

@@ -1,0 +1,123 @@
+"""The forces of a straight slave on a flat master: the gap is linear along the slave, so its integrals are exact.
+
+A formulation measures the gap along the master's normal or along the slave's, and pushes along one of them. Its traits
+`gap` and `force_along` say which. Gaps are computed in rationals from the stored nodes.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import sqrt
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.subject import Subject
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.uniform_pressure import unit_forces
+
+ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.
+_Vector = tuple[Fraction, Fraction]
+
+
+def refuse_unknown_direction(traits: Traits) -> str:
+    """Return why the direction of the forces is unknown from the traits, or an empty string if they state it."""
+    if traits.force_along is None:
+        return "the trait `force_along` is not stated, so the direction of the force is unknown"
+    return refuse_barrier(traits)
+
+
+def knows_linear_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of a linear gap is."""
+    stated = traits.penalty == "distributed" and None not in (traits.area, traits.force_along)
+    return stated and (traits.gap is not None or traits.enforcement == "multiplier")
+
+
+def slave_forces(case: Case, subject: Subject) -> FloatArray:
+    """Return the forces (n_slave_nodes, 2) that push the slave; multipliers are all `uniform_multiplier`."""
+    formulation, interface = subject.for_case(case), case.interface
+    count = formulation.n_multipliers(interface)
+    state = case.with_multipliers(np.full(count, uniform_multiplier(case)))
+    pairing = formulation.pair(interface, state.z)
+    if count:
+        forces = unit_forces(state, formulation, pairing) @ state.multipliers
+    else:
+        forces = formulation.residual(interface, pairing, state.z)
+    return -forces[: 2 * interface.n_slave_nodes].reshape(-1, 2)
+
+
+def uniform_multiplier(case: Case) -> float:
+    """Return the pressure of a mean gap along the master's normal, ε̂ |g|."""
+    return case.penalty * abs(float(node_gaps(case).mean()))
+
+
+def node_gaps(case: Case) -> FloatArray:
+    """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
+    first, second = _longest_segment(case)
+    along = _difference(second, first)
+    length = sqrt(_dot(along, along))
+    gaps = []
+    for node in case.positions[: case.interface.n_slave_nodes]:
+        arm = _difference(_exact(node), first)
+        gaps.append(float(arm[0] * along[1] - arm[1] * along[0]) / length)
+    return np.array(gaps)
+
+
+def directions(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the unit normals (2,) along the master's and along the slave's, both out of the master."""
+    (master_1, master_2), segment = _longest_segment(case), case.positions[case.interface.slave.segments[0]]
+    master, slave = _difference(master_2, master_1), _difference(_exact(segment[1]), _exact(segment[0]))
+    return (
+        np.array([float(master[1]), -float(master[0])]) / sqrt(_dot(master, master)),
+        np.array([-float(slave[1]), float(slave[0])]) / sqrt(_dot(slave, slave)),
+    )
+
+
+def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
+    """Return the exact integrals ε̂ ∫N_i |g| ds n that push the slave's nodes.
+
+    Parameters
+    ----------
+    case : Case
+        A straight slave that penetrates a flat master with all its length.
+    traits : Traits
+        `gap` and `force_along` name the normals, `area` the configuration of ds. With multipliers the pressure is
+        `uniform_multiplier` everywhere.
+
+    Returns
+    -------
+    FloatArray, shape (n_slave_nodes, 2)
+        The forces; their sum is the total of every formulation with these traits.
+    """
+    interface, (of_master, of_slave) = case.interface, directions(case)
+    lengths = interface.slave.lengths(interface.nodes if traits.area == "reference" else case.positions)
+    depths = -node_gaps(case) / (1.0 if traits.gap in ALONG_MASTER else float(of_master @ of_slave))
+    pressures = case.penalty * depths
+    if traits.enforcement == "multiplier":
+        pressures = np.full_like(pressures, uniform_multiplier(case))
+    nodal = np.zeros(interface.n_slave_nodes)
+    for (a, b), length in zip(interface.slave.segments, lengths, strict=True):
+        nodal[a] += length * (2 * pressures[a] + pressures[b]) / 6
+        nodal[b] += length * (pressures[a] + 2 * pressures[b]) / 6
+    return np.outer(nodal, of_master if traits.force_along == "master normal" else of_slave)
+
+
+def _longest_segment(case: Case) -> tuple[_Vector, _Vector]:
+    """Return the exact ends of the longest master segment, on whose line all others lie."""
+    master = case.interface.master
+    ends = case.positions[master.segments[int(np.argmax(master.lengths(case.positions)))]]
+    return _exact(ends[0]), _exact(ends[1])
+
+
+def _exact(point: FloatArray) -> _Vector:
+    return Fraction(float(point[0])), Fraction(float(point[1]))
+
+
+def _difference(p: _Vector, q: _Vector) -> _Vector:
+    return p[0] - q[0], p[1] - q[1]
+
+
+def _dot(p: _Vector, q: _Vector) -> float:
+    return float(p[0] * q[0] + p[1] * q[1])

@@ -1,0 +1,199 @@
+"""Two states that a right formulation answers alike: the same one in other numbers, mirrored, or with a bystander.
+
+Each state is one case. `Carry` says which node of the second state is which node of the first, and how vectors go over.
+Multipliers are uniform, so that their order does not matter; only the rows of positions are compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.oracle import default_points, nearest_segments
+from contactverif_properties.shared.kinks import explain_by_kink
+from contactverif_properties.shared.passes import split_passes
+from contactverif_properties.shared.roundoff import (
+    COORDINATE_ROUNDING,
+    SEGMENT_REASON,
+    ratio,
+    rounding_distance,
+    segment_tolerance,
+    select_failures,
+    sum_slave_forces,
+)
+
+TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
+BITS = "entries with other bits"
+TIE = "a tie: a point in the normal cone of a vertex is as near to one segment as to another"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer of a formulation in one state.
+
+    Attributes
+    ----------
+    case : Case
+        The state, with uniform multipliers if the formulation has any.
+    formulation : CheckedFormulation
+        The formulation that answered.
+    pairing : Pairing | None
+        Its pairing there.
+    forces : FloatArray, shape (n_nodes, 2)
+        The position rows of the residual.
+    tangent : FloatArray | None, shape (n_unknowns, n_unknowns)
+        The rows and columns of positions; None where the plugin has no tangent.
+    """
+
+    case: Case
+    formulation: CheckedFormulation
+    pairing: Pairing | None
+    forces: FloatArray
+    tangent: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True)
+class Carry:
+    """The way in which the first of two states becomes the second.
+
+    Attributes
+    ----------
+    nodes : IntArray, shape (n_nodes,)
+        The number, in the second state, of each node of the first.
+    matrix : FloatArray, shape (2, 2)
+        What becomes of vectors: a force f becomes matrix · f.
+    """
+
+    nodes: IntArray
+    matrix: FloatArray = field(default_factory=lambda: np.eye(2))
+
+
+def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
+    """Return the quantities of `compare`, the changes of forces and tangent; `situation` ends their names."""
+    return (
+        Quantity(f"change of the forces {situation}", "1", TOLERANCE, SEGMENT_REASON),
+        Quantity(f"change of the tangent {situation}", "1", TOLERANCE, SEGMENT_REASON),
+    )
+
+
+def answer_alike(first: Case, second: Case, subject: Subject) -> tuple[Answer, Answer]:
+    """Return the answers in two states, with the numeric penalty and the uniform multiplier of the first state."""
+    penalty, multiplier = subject.penalty(first), SHARE * first.shortest_segment
+    answers = []
+    for case in (first, second):
+        formulation = subject.with_penalty(penalty)
+        count = formulation.n_multipliers(case.interface)
+        if count:
+            formulation = subject.with_penalty(1.0)
+        state = case.with_multipliers(np.full(count, multiplier)) if count else case
+        answers.append(_answer(state, formulation))
+    return answers[0], answers[1]
+
+
+def _answer(state: Case, formulation: CheckedFormulation) -> Answer:
+    n, pairing = state.interface.n_unknowns, formulation.pair(state.interface, state.z)
+    forces = formulation.residual(state.interface, pairing, state.z)[:n].reshape(-1, 2)
+    tangent = None
+    if "tangent" in formulation.provides:
+        tangent = dense(formulation.tangent(state.interface, pairing, state.z))[:n, :n]
+    return Answer(state, formulation, pairing, forces, tangent)
+
+
+def compare(
+    quantities: tuple[Quantity, Quantity],
+    subject: Subject,
+    first: Answer,
+    second: Answer,
+    carry: Carry,
+    *,
+    explain: bool = True,
+) -> Measurement:
+    """Compare the answers in two states.
+
+    Parameters
+    ----------
+    quantities : tuple[Quantity, Quantity]
+        The quantities of `same_answer_quantities`.
+    subject : Subject
+        The formulation, for its promises.
+    first, second : Answer
+        The two answers.
+    carry : Carry
+        The way in which the first state becomes the second.
+    explain : bool
+        Look for a kink that excuses a failure. It takes time, and is of no use where the formulation promises nothing.
+
+    Returns
+    -------
+    Measurement
+        The largest change of a force over Σ|R| of a side, and of an entry of the tangent over max|K|, each the largest
+        of both states; both dimensionless. The detail `BITS` counts entries that are not equal to the last bit.
+    """
+    case, size = first.case, max(_size(answer) for answer in (first, second))
+    change = second.forces[carry.nodes] - first.forces @ carry.matrix.T
+    errors, bits = {"forces": float(np.abs(change).max())}, int(np.count_nonzero(change))
+    values = {quantities[0].name: ratio(errors["forces"], size)}
+    if first.tangent is not None and second.tangent is not None:
+        places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
+        turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
+        change = second.tangent[np.ix_(places, places)] - turn @ first.tangent @ turn.T
+        errors["tangent"], bits = float(np.abs(change).max()), bits + int(np.count_nonzero(change))
+        values[quantities[1].name] = ratio(
+            errors["tangent"], float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
+        )
+    distance = max(rounding_distance(answer.case, subject.traits) for answer in (first, second))
+    tolerance = segment_tolerance(case, first.forces, distance)
+    failures = select_failures(errors, values, tolerance)
+    undecided = _explain(first, second, failures) if failures and explain else ""
+    details, idle = {BITS: float(bits)}, not (first.forces.any() or second.forces.any())
+    return Measurement(values, dict.fromkeys(values, tolerance), undecided, details=details, idle=idle)
+
+
+def _size(answer: Answer) -> float:
+    """Return Σ|R| of the slave or of the master, the larger: half passes may push one side alone."""
+    slave = sum_slave_forces(answer.case, answer.forces)
+    return max(slave, float(np.abs(answer.forces).sum()) - slave)
+
+
+def _explain(first: Answer, second: Answer, failures: dict[str, float]) -> str:
+    """Return why the failures may be the fault of a kink in one of the states, or an empty string."""
+    for answer in (first, second):
+        reach = COORDINATE_ROUNDING * answer.case.largest_coordinate
+        if reason := explain_by_kink(answer.case, answer.formulation, answer.pairing, reach, failures):
+            return reason
+    return _find_tie(first)
+
+
+def _find_tie(answer: Answer) -> str:
+    """Return why either of two segments is right for a point, or an empty string if none is tied.
+
+    A point in the normal cone of a re-entrant vertex is equally near to both segments there, wherever it is. By the
+    rule "the nearest segment" alone, a formulation may take the one with the lower number.
+    """
+    if "contact_points" in answer.formulation.provides:
+        points = answer.formulation.contact_points(answer.case.interface, answer.pairing, answer.case.z)
+        passes = [
+            (each.interface, each.z, each.points.position[each.points.active])
+            for each in split_passes(answer.case, points)
+        ]
+    else:
+        interface, positions = answer.case.interface, answer.case.positions
+        segment, c, _, _ = default_points(interface)
+        first, second = np.swapaxes(positions[interface.slave.segments[segment]], 0, 1)
+        share = (1 + c[:, None]) / 2
+        passes = [(interface, answer.case.z, (1 - share) * first + share * second)]
+    for interface, z, places in passes:
+        nodes = z[: interface.n_unknowns].reshape(-1, 2)
+        for place in places[np.isfinite(places).all(axis=1)]:
+            near = nearest_segments(nodes, interface.master.segments, (float(place[0]), float(place[1]))).segments
+            open_point = all(segment.signed_squared_gap > 0 for segment in near)
+            if len(near) > 1 and (not open_point or answer.case.n_multipliers):  # Multipliers may push across a gap.
+                return TIE
+    return ""

@@ -1,0 +1,124 @@
+"""The answer of a formulation to a wave of pressure between two blocks that are pressed together.
+
+Everything is the difference between two solutions, with the wave and without it, on the pairing of the uniform state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.newton import System
+from contactverif.scenes.blocks import exact_unknowns
+from contactverif.scenes.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
+from contactverif_properties.shared.accuracy import shape_integrals
+from contactverif_properties.shared.exact_multipliers import exact_multipliers
+from contactverif_properties.shared.frozen_solution import solve_frozen
+
+_LEAST_SHARE = 1e-8  # Springs that add less than this share to the compliance of the bodies count as adding so much.
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceAnswer:
+    """The answer of a formulation to the wave.
+
+    Attributes
+    ----------
+    compliance : float
+        The work of the wave's load on the displacements that it causes.
+    stiffness : float
+        The distributed stiffness of the springs under the mean pressure.
+    force_range : float
+        The largest minus the smallest pressure from nodal forces, over the amplitude of the wave. The surface with the
+        larger one counts.
+    point_range : float
+        The same of the pressures that the formulation reports; NaN if it reports none, or nodal forces.
+    """
+
+    compliance: float
+    stiffness: float
+    force_range: float
+    point_range: float
+
+
+def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
+    """Solve two blocks with the wave and without it.
+
+    Parameters
+    ----------
+    columns : tuple[int, int]
+        The numbers of segments of slave and master.
+    penalty : float
+        The distributed stiffness ε̂ times h/E.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    InterfaceAnswer | None
+        The answer; None if Newton's method does not converge.
+    """
+    uniform, wavy = (wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, WAVE))
+    formulation = subject.for_case(uniform.case())
+    systems = System(uniform, formulation), System(wavy, formulation)
+    start = _uniform_state(systems[0], subject)
+    pairing = systems[0].pair(start)
+    before = solve_frozen(systems[0], start, pairing)
+    after = None if before is None else solve_frozen(systems[1], before, pairing)
+    if before is None or after is None:
+        return None
+    n_free, states = uniform.n_free, (systems[0].state(before), systems[1].state(after))
+    total = -float((uniform.bodies[0].load * uniform.displacements(before[:n_free])[0]).sum())
+    bodies = float(uniform.facts["compliance"].sum())
+    springs = abs(total) / (MEAN_PRESSURE**2 * LENGTH) - bodies
+    nodal = subject.traits.penalty == "nodal" or "contact_points" not in formulation.provides
+    return InterfaceAnswer(
+        compliance=wave_work(uniform, wavy, before[:n_free], after[:n_free]),
+        stiffness=1 / max(springs, _LEAST_SHARE * bodies),
+        force_range=_force_range(uniform.interface, formulation, pairing, states),
+        point_range=np.nan if nodal else _point_range(uniform.interface, formulation, pairing, states),
+    )
+
+
+def _uniform_state(system: System, subject: Subject) -> FloatArray:
+    """Return the unknowns, and the multipliers behind them, of the exact uniform pressure."""
+    scene = system.scene
+    if not system.n_multipliers:
+        return exact_unknowns(scene, MEAN_PRESSURE, scene.penalty)
+    exact = exact_unknowns(scene, MEAN_PRESSURE, np.inf)
+    state = replace(scene.case(), z=scene.positions(exact))
+    return np.append(exact, exact_multipliers(state, subject, system.formulation, MEAN_PRESSURE))
+
+
+def _force_range(
+    interface: Interface,
+    formulation: CheckedFormulation,
+    pairing: Pairing | None,
+    states: tuple[FloatArray, FloatArray],
+) -> float:
+    before, after = (formulation.residual(interface, pairing, z)[: interface.n_unknowns] for z in states)
+    across = (after - before).reshape(-1, 2)[:, 1]
+    sides = (
+        (interface.slave, slice(0, interface.n_slave_nodes)),
+        (interface.master, slice(interface.n_slave_nodes, None)),
+    )
+    lengths = [(shape_integrals(surface, interface.nodes), nodes) for surface, nodes in sides]
+    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / WAVE
+
+
+def _point_range(
+    interface: Interface,
+    formulation: CheckedFormulation,
+    pairing: Pairing | None,
+    states: tuple[FloatArray, FloatArray],
+) -> float:
+    before, after = (formulation.contact_points(interface, pairing, z) for z in states)
+    if before.pressure.shape != after.pressure.shape:
+        return np.nan  # A formulation without a pairing may have other points.
+    change = after.pressure - before.pressure
+    return float(np.ptp(change[np.isfinite(change)])) / WAVE

@@ -1,0 +1,128 @@
+"""Ask whether the tangent is symmetric, and the forces have a potential.
+
+**Question.** Is K = Kᵀ in a random state? And do the forces do no work when the nodes run through a small closed loop,
+with the pairing frozen?
+
+**Why it matters.** With a symmetric tangent the linear solver needs half of the memory and of the time. Forces without
+a potential do work in a closed loop: a vibrating part gains energy from contact. Who says that a tangent is symmetric,
+and makes it so by leaving out its other half, loses the quadratic convergence.
+
+**How it is judged.** The first number is max|K − Kᵀ| over max|K|, rows and columns of multipliers included. The
+tolerance is u(8Z/min(g, ℓ) + 4N). The second is the work in a closed loop over the sum of the works on its parts. The
+loops are three circles with a radius of r = 2^-10 ℓ in random planes of all unknowns, and the trapezoidal rule with 16
+points is exact to roundoff there. The tolerance is 64 u Z/r: positions are rounded to uZ, and forces change over r. A
+formulation that says that its tangent is approximate is asked for the matrix alone.
+
+**Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
+than r. Otherwise never: on a frozen pairing there are no kinks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies import smooth_cases
+from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio, rounding_distance, segment_tolerance
+
+N_LOOPS = 3
+N_POINTS = 16  # Points on a loop: the error of the trapezoidal rule falls like (r/ℓ)^16.
+RADIUS = 2.0**-10  # The radius of a loop over the shortest segment.
+ASYMMETRY = Quantity("asymmetry of the tangent", "1", "u(8Z/min(g, ℓ) + 4N)", SEGMENT_REASON)
+WORK = Quantity(
+    "work in a closed loop",
+    "1",
+    "64 u Z/r",
+    "Positions are rounded to uZ, and forces change with them over the radius r.",
+)
+
+
+def measure_symmetry(case: Case, subject: Subject) -> Measurement:
+    """Compare the tangent with its transpose, and add up the work in three closed loops.
+
+    Parameters
+    ----------
+    case : Case
+        A random state.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        The largest |K − Kᵀ| over the largest |K|, and the largest work in a loop over the sum of the works on its
+        parts; both dimensionless. The first is missing without a tangent, the second with an approximate one.
+    """
+    formulation, case = prepare_state(case, subject)
+    pairing = formulation.pair(case.interface, case.z)
+    forces = formulation.residual(case.interface, pairing, case.z)
+    distance = rounding_distance(case, subject.traits)
+    values, tolerances, undecided = {}, {}, ""
+    if "tangent" in formulation.provides:
+        tangent = dense(formulation.tangent(case.interface, pairing, case.z))
+        values[ASYMMETRY.name] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
+        tolerances[ASYMMETRY.name] = segment_tolerance(case, forces, distance)
+    if subject.traits.tangent != "approximate":
+        radius = RADIUS * case.shortest_segment
+        work, throughput = work_in_loops(case, formulation, pairing, radius)
+        worst = int(np.argmax([ratio(float(w), float(t)) for w, t in zip(work, throughput, strict=True)]))
+        values[WORK.name] = ratio(float(work[worst]), float(throughput[worst]))
+        tolerances[WORK.name] = 64 * UNIT_ROUNDOFF * distance / radius
+        if values[WORK.name] > tolerances[WORK.name] and pairing is None:
+            directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
+            kinks = (find_kink(case, formulation, pairing, radius, direction) for direction in directions)
+            undecided = next(filter(None, kinks), "")
+    return Measurement(values, tolerances, undecided, idle=not forces[: case.interface.n_unknowns].any())
+
+
+def work_in_loops(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the work of the forces in closed loops around a state, on a frozen pairing.
+
+    Parameters
+    ----------
+    case : Case
+        The state, with its multipliers if any.
+    formulation : CheckedFormulation
+        The formulation.
+    pairing : Pairing | None
+        The pairing of the state.
+    radius : float
+        The radius of the circles, a length.
+
+    Returns
+    -------
+    work : FloatArray, shape (N_LOOPS,)
+        The absolute value of the work of each loop.
+    throughput : FloatArray, shape (N_LOOPS,)
+        The sum of the absolute works on the parts of the loop, without that of the mean force.
+    """
+    planes = random_directions(case.seed, 2 * N_LOOPS, case.z.size).reshape(N_LOOPS, 2, 1, -1)
+    angles = 2 * np.pi * np.arange(N_POINTS)[:, None] / N_POINTS
+    moves = radius * (np.cos(angles) * planes[:, 0] + np.sin(angles) * planes[:, 1])  # (N_LOOPS, N_POINTS, n)
+    steps = radius * (np.cos(angles) * planes[:, 1] - np.sin(angles) * planes[:, 0]) * (2 * np.pi / N_POINTS)
+    forces = formulation.residual(case.interface, pairing, case.z + moves)
+    forces = forces - forces.mean(axis=1, keepdims=True)  # A constant force does no work in a loop.
+    works = forces * steps
+    return np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))
+
+
+SYMMETRIC = Property(
+    id="symmetric",
+    family="invariants",
+    summary="The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.",
+    quantities=(ASYMMETRY, WORK),
+    cases=smooth_cases,
+    measure=measure_symmetry,
+    promise=lambda traits: traits.symmetric,
+    applicable=refuse_barrier,
+)
