@@ -19,6 +19,8 @@ ORDER = (
     "fig30_convergence",
     "section_6_2",
     "section_6_3",
+    "inf_sup_condition",
+    "locking",
     "lagrange_multipliers",
     "example_1",
     "example_1bis",

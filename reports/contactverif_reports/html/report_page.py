@@ -11,7 +11,7 @@ from markupsafe import Markup
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.coverage import coverage_of
 from contactverif.contract.property import CheckedNumber, checked_numbers
-from contactverif.contract.result import Result, Row, Run
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Iterations, count_iterations
 from contactverif_reports.draw import as_text
@@ -40,7 +40,7 @@ class Example:
     numbers : tuple[CheckedNumber, ...]
         The measured numbers beside their tolerances.
     reason : str
-        The reason of the failure, where the numbers do not say it.
+        The reason of the failure where the numbers do not say it, else the place of the worst number, if it has one.
     replay : str
         The command that judges the case again.
     """
@@ -146,6 +146,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
     return render(
         "report.html.j2",
         run=run,
+        opposite_sign=OPPOSITE_SIGN,
         row_of=run.row_of,
         title=_title(run),
         headline=headline(run),
@@ -170,6 +171,7 @@ def headline(run: Run) -> str:
     if run.promises_kept:
         return "Every promise is kept and every property was judged."
     counts = (
+        ("formulation with the opposite sign", "formulations with the opposite sign", len(run.opposite_signs)),
         ("broken promise", "broken promises", run.count(Result.BROKEN_PROMISE)),
         ("crash", "crashes", sum(row.result is Result.CRASHED for row in run.unexpected)),
         ("property not judged", "properties not judged", run.count(Result.NOT_JUDGED)),
@@ -243,7 +245,9 @@ def _examples(run: Run, path: str) -> list[Example]:
     figures = _figures(by_id)
     examples = []
     for id_, counterexample in by_id.items():
-        numbers = checked_numbers(counterexample.row.info, counterexample.outcome.measurement)
+        measurement = counterexample.outcome.measurement
+        numbers = checked_numbers(counterexample.row.info, measurement)
+        place = measurement.place if measurement is not None else ""
         numbers_say_it = any(number.value == number.value and number.ratio > 1 for number in numbers)
         examples.append(
             Example(
@@ -251,7 +255,7 @@ def _examples(run: Run, path: str) -> list[Example]:
                 figure=figures.get(id_, Markup("")),
                 text="" if id_ in figures else as_text(counterexample.case),
                 numbers=numbers,
-                reason="" if numbers_say_it else counterexample.reason,
+                reason=place if numbers_say_it else counterexample.reason,
                 replay=counterexample.replay_command(path),
             )
         )

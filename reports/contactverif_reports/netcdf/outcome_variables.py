@@ -117,6 +117,7 @@ class OutcomeVariables:
         for name, long_name in (
             ("undecided", "why a failure would not be the fault of the formulation"),
             ("broken", "a breach that no number shows"),
+            ("place", "the place of the worst number, such as a row and a column of the tangent"),
         ):
             texts = ["" if item is None else getattr(item, name) for item in self._measurements]
             table |= self._words(name, texts, long_name)

@@ -56,6 +56,8 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
         "family": schema.text(info.family),
         "summary": schema.text(info.summary),
         "needs": ", ".join(sorted(info.needs)) or schema.NONE,
+        "least_contact": np.float64(info.least_contact),
+        "usual_undecided": np.float64(info.usual_undecided),
         "comment": "one property: every random case of every formulation; names that begin with witness_ are of the "
         "named case with which a formulation proves that it fails",
     }

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import xarray as xr
@@ -181,10 +182,11 @@ class _Reader:
             rows=tuple(row for rows in by_formulation for row in rows.values()),
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
             provided=self._provided_parts(formulations),
+            opposite_signs=self._opposite_signs(formulations),
         )
         written = root_attributes(run)
         origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
-        return Run(run.rows, run.not_loaded, run.provided, origin)
+        return replace(run, provenance=origin)
 
     def _rows_of(self, j: int, property_id: str, formulations: list[str]) -> Iterator[tuple[int, Row]]:
         """Yield the rows of a property, with the number of the formulation."""
@@ -241,6 +243,12 @@ class _Reader:
             parts = zip(self._words("part"), codes, strict=True)
             provided[name] = {part: bool(code) for part, code in parts if code != schema.UNSAID}
         return provided
+
+    def _opposite_signs(self, formulations: list[str]) -> tuple[str, ...]:
+        if "sign" not in self._summary:  # Older reports say nothing of signs.
+            return ()
+        opposite = self._summary["sign"].values == schema.SIGNS["opposite"]
+        return tuple(name for name, turned in zip(formulations, opposite.tolist(), strict=True) if turned)
 
     def _words(self, name: str) -> list[str]:
         return [str(word) for word in self._summary[name].values] if name in self._summary else []

@@ -94,6 +94,7 @@ class Promise(IntEnum):
 
 PROMISES: Mapping[str, int] = {promise.name.lower(): int(promise) for promise in Promise}
 PROVIDED: Mapping[str, int] = {"not_provided": 0, "provided": 1}
+SIGNS: Mapping[str, int] = {"as_expected": 0, "opposite": 1}
 UNSAID = -1  # The code of a part of which the run does not say whether it is provided.
 SIDES: Mapping[str, int] = {"slave": 0, "master": 1}
 

@@ -15,7 +15,15 @@ import xarray as xr
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.case_summary import CaseSummary
-from contactverif.contract.property import Measurement, Outcome, PropertyInfo, Quantity, Verdict
+from contactverif.contract.property import (
+    LEAST_CONTACT,
+    NONE_UNDECIDED,
+    Measurement,
+    Outcome,
+    PropertyInfo,
+    Quantity,
+    Verdict,
+)
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import safe_names
 
@@ -51,7 +59,7 @@ class OutcomeArrays:
         if not np.isin(self.verdicts, known).all():
             raise ValueError(f"{prefix}verdict holds a code without a meaning")
         self._states = self._read("state")
-        self._texts = {name: self._read(name) for name in ("reason", "undecided", "broken") if self._has(name)}
+        self._texts = {name: self._read(name) for name in ("reason", "undecided", "broken", "place") if self._has(name)}
         self._quantities = [quantity.name for quantity in info.quantities]
         self._details = _names(dataset, "detail")
         self._values, self._tolerances, self._detail_values = (
@@ -116,6 +124,7 @@ class OutcomeArrays:
             _present(self._quantities, self._tolerances[number].tolist()),
             undecided=self._text("undecided", number),
             broken=self._text("broken", number),
+            place=self._text("place", number),
             details=_present(self._details, self._detail_values[number].tolist()) if self._details else {},
             series={
                 name: freeze(values[number, :length], np.float64)
@@ -198,6 +207,9 @@ def read_info(dataset: xr.Dataset) -> PropertyInfo:
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
         series=dict(zip(_names(dataset, "series"), _names(dataset, "series_units"), strict=True)),
         kinds=tuple(_names(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
+        # Reports that are older than these two have no such attribute.
+        least_contact=float(dataset.attrs.get("least_contact", LEAST_CONTACT)),
+        usual_undecided=float(dataset.attrs.get("usual_undecided", NONE_UNDECIDED)),
     )
 
 

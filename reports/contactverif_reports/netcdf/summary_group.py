@@ -127,6 +127,22 @@ def _rows(grid: _Grid, run: Run) -> Table:
         "planned": grid.count(lambda row: row.planned, "number of random cases planned"),
         "judged": grid.count(lambda row: row.judged, "number of random cases that were decided"),
         "idle": grid.count(lambda row: row.idle, "number of judged random cases in which nothing was in contact"),
+        "contact_share": numbers(
+            _ROW,
+            grid.each(
+                lambda row: schema.NOT_MEASURED if row.contact_share is None else row.contact_share, schema.NOT_MEASURED
+            ),
+            "share of judged random cases in which something was in contact",
+            "1",
+            "below the attribute least_contact of the property nothing is judged; missing where no case was",
+            fill=schema.NOT_MEASURED,
+        ),
+        "suspicion": words(
+            _ROW,
+            grid.each(lambda row: row.suspicion, ""),
+            "whether more cases are undecided than those of right formulations",
+            "empty if they are not",
+        ),
         "count": numbers(
             [*_ROW, "verdict"], np.array(counts, dtype=np.int32), "number of random cases with each verdict", "1"
         ),
@@ -147,6 +163,13 @@ def _provided_parts(run: Run) -> Table:
             "whether the formulation has that part",
             "see also parts",
             fill=schema.UNSAID,
+        ),
+        "sign": codes(
+            ["formulation"],
+            [int(name in run.opposite_signs) for name in run.formulations],
+            schema.SIGNS,
+            "sign of the forces",
+            "opposite: the slave is pulled towards the master, and the run fails",
         ),
     }
 

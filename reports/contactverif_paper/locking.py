@@ -1,0 +1,176 @@
+"""Section 6.3, continued: what constraints that are not inf-sup stable do at a high penalty.
+
+The compliance and the pressures of two blocks under a wave of pressure, as the property `stability.locking` measures
+them; and the pressures that real contact, which may open, has at the highest penalty.
+
+Source: Zavarise & De Lorenzis (2009), Section 6.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.property import Property
+from contactverif.mechanics.newton import solve
+from contactverif.run.registry import load_properties
+from contactverif.run.runner import judge_case
+from contactverif.scenes.wave_blocks import (
+    COLUMNS,
+    LENGTH,
+    MEAN_PRESSURE,
+    PENALTIES,
+    case_name,
+    wave_blocks,
+    wave_cases,
+)
+from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.figure_style import TWO_COLUMNS, add_legend, line_style, new_figure, new_panels
+from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_reports.netcdf.variables import numbers
+
+FORMULATIONS = (
+    formulations.VTS_PPT,
+    formulations.TWO_PASS,
+    formulations.STS,
+    formulations.NTS_AR,
+    formulations.MORTAR,
+)
+WITH_PRESSURES = (formulations.STS, formulations.MORTAR)  # Their pressures in real contact are drawn.
+FINER = COLUMNS[1]  # 12 slave segments on 8 master segments: every formulation that locks does so there.
+REAL = COLUMNS[0]
+STEPS = 10.0 ** np.arange(1, 7)  # Penalties ε̂ h/E of real contact; each starts from the solution before.
+AMPLITUDE = 0.8  # The wave of real contact over its mean pressure.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Locking:
+    """Compliance and pressures.
+
+    Attributes
+    ----------
+    drift, roughness : FloatArray, shape (n_formulations, n_penalties)
+        The loss of compliance since the softest penalty, and the range of pressures, over those of matching meshes.
+    places, pressures : tuple[FloatArray, ...], each of shape (n_points,)
+        For each of `WITH_PRESSURES`: x of the contact points, a length, and the pressure over its mean in real contact.
+    converged : bool
+        Newton's method converged at each penalty of real contact.
+    """
+
+    drift: FloatArray
+    roughness: FloatArray
+    places: tuple[FloatArray, ...]
+    pressures: tuple[FloatArray, ...]
+    converged: bool
+
+
+def compute(report_progress: Progress) -> Locking:
+    """Solve two blocks at all penalties."""
+    report_progress("Section 6.3, locking")
+    (question,) = load_properties(["stability.locking"])
+    assert isinstance(question, Property)
+    cases = {case.name: case for case in wave_cases()}
+    table = np.zeros((2, len(FORMULATIONS), len(PENALTIES)))
+    for row, formulation in enumerate(FORMULATIONS):
+        for column, penalty in enumerate(PENALTIES):
+            measurement = judge_case(question, cases[case_name(FINER, penalty)], subject_of(formulation)).measurement
+            assert measurement is not None
+            names = ("drift of the compliance", "roughness of the pressure")
+            table[:, row, column] = [measurement.values[name] for name in names]
+    places, pressures, converged = zip(*map(_real_contact, WITH_PRESSURES), strict=True)
+    drift, roughness = table
+    return Locking(drift, roughness, places, pressures, all(converged))
+
+
+def _real_contact(formulation: PaperFormulation) -> tuple[FloatArray, FloatArray, bool]:
+    """Return places and pressures at the highest penalty, and whether Newton's method converged at all of them."""
+    start, converged = None, True
+    for penalty in STEPS.tolist():
+        scene = wave_blocks(*REAL, penalty, wave=AMPLITUDE * MEAN_PRESSURE)
+        plugin = subject_of(formulation).for_case(scene.case())
+        trace = solve(scene, plugin, start=start)
+        start, converged = trace.solution, converged and trace.converged
+    points = plugin.contact_points(scene.interface, plugin.pair(scene.interface, trace.z), trace.z)
+    order = np.argsort(points.position[:, 0])
+    return points.position[order, 0], points.pressure[order] / MEAN_PRESSURE, converged
+
+
+def statements(result: Locking) -> tuple[Statement, ...]:
+    """Say what happens at a high penalty."""
+    drift = dict(zip(FORMULATIONS, result.drift[:, -1], strict=True))
+    rough, smooth = (f"{pressure.min():.2f} to {pressure.max():.1f}" for pressure in result.pressures)
+    return (
+        Statement(
+            "Section 6.3",
+            "what a high penalty does to VTS-PPT and to segment-to-segment is not said",
+            f"both lock. From ε̂ = 10 to 1e8 E/h an interface of {FINER[0]} on {FINER[1]} segments loses "
+            f"{drift[formulations.VTS_PPT]:.0%} (VTS-PPT), {drift[formulations.STS]:.0%} (segment-to-segment) and "
+            f"{drift[formulations.TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
+            f"{abs(drift[formulations.MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
+            f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
+            Agreement.SILENT,
+            "locking",
+        ),
+    )
+
+
+def plot(result: Locking) -> Figure:
+    """Draw the loss of compliance over the penalty, and pressures of real contact."""
+    figure = new_figure(TWO_COLUMNS, 3.8)
+    loss, pressure = new_panels(figure, 2)
+    for formulation, values in zip(FORMULATIONS, result.drift, strict=True):
+        loss.semilogx(PENALTIES, 100 * values, **line_style(formulation, 1))
+    loss.set_xlabel("penalty ε̂ h/E (–)")
+    loss.set_ylabel("loss of compliance (%)")
+    for formulation, x, values in zip(WITH_PRESSURES, result.places, result.pressures, strict=True):
+        pressure.plot(x / LENGTH, values, **line_style(formulation, 1))
+    pressure.set_xlabel("x / L (–)")
+    pressure.set_ylabel("pressure / mean load (–)")
+    add_legend(figure, FORMULATIONS, columns=3)
+    return figure
+
+
+def datasets(result: Locking) -> dict[str, xr.Dataset]:
+    """Return compliance, roughness, and the pressures of real contact."""
+    dims = ["formulation", "penalty"]
+    table = name_variables(FORMULATIONS) | {
+        "penalty": numbers(["penalty"], PENALTIES, "penalty ε̂ h/E", "1"),
+        "drift": numbers(dims, result.drift, "loss of compliance beside matching meshes", "1"),
+        "roughness": numbers(dims, result.roughness, "range of pressures over that of matching meshes", "1"),
+    }
+    groups = {"": xr.Dataset(table)}
+    for formulation, x, values in zip(WITH_PRESSURES, result.places, result.pressures, strict=True):
+        groups[formulation.name] = xr.Dataset(
+            {
+                "x": numbers(["point"], x, "place of the contact point", "length"),
+                "pressure": numbers(["point"], values, "pressure over the mean load at ε̂ = 1e6 E/h", "1"),
+            }
+        )
+    return groups
+
+
+ITEM = Item(
+    name="locking",
+    title="Section 6.3: locking",
+    compute=compute,
+    statements=statements,
+    datasets=datasets,
+    figures=(
+        PaperFigure(
+            "locking-stiff",
+            OURS,
+            f"(a) The compliance to a wave of pressure that an interface of {FINER[0]} on {FINER[1]} segments loses as "
+            f"the penalty rises, beside matching meshes. (b) The pressures of {REAL[0]} on {REAL[1]} segments at "
+            "1e6 E/h under 1 + 0.8 cos(2πx/L), in contact that may open.",
+            plot,
+        ),
+    ),
+    text="Two 4 × 1 blocks with meshes that share no node but at the ends. Springs at two points of a slave segment or "
+    "more are more conditions than the gap between the meshes can satisfy. So the gap, and with it the interface, "
+    "becomes straight. In real contact, points open until the rest carries the load.",
+)
