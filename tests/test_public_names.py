@@ -28,7 +28,7 @@ PUBLIC = {
         *("Formulation", "ResidualOnly", "Pairing", "Traits", "ContactPoints", "CheckedFormulation", "Subject"),
         # Bodies, scenes and their solution.
         *("Body", "Rectangle", "Placing", "block", "rigid_surface", "body_from_mesh"),
-        *("Scene", "two_blocks", "load_scene", "solve", "Trace", "End"),
+        *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
         # Properties, and runs over them.
         *("Property", "Quantity", "Measurement", "Outcome", "Verdict", "Row", "Run"),
         *("load_formulation", "load_properties", "judge_case", "verify"),

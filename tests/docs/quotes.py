@@ -8,8 +8,8 @@ A page marks a quotation by a comment before the block:
     <!-- source: FILE CLASS -->            a class of it
 
 An output is cut into pieces, each of which begins with a line that is not indented. A piece is kept if its first line
-matches one of the patterns; `all` keeps everything. One line with "…" stands for pieces that are left out, and for rows
-of a piece that match a pattern after "not ".
+matches one of the patterns; `all` keeps everything. Behind the patterns, `rows FAMILY ID …` names properties: of the
+rows of a table those of other properties are left out. One line with "…" stands for what is left out.
 
 Rules for the next editor: nobody writes a quotation by hand, and a page runs its commands in order, in one folder.
 """
@@ -29,12 +29,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from contactverif.run.registry import property_ids
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PICTURES = DOCS / "pictures"
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 MINE = ROOT / "tests" / "external" / "contactverif-mine"
 README = ROOT / "README.md"
+ROWS = "rows "  # Begins the list of properties whose rows are kept.
 
 # The classes of mine.py that exist at each step of the tutorial.
 STEPS = {
@@ -222,24 +225,25 @@ def excerpt(output: str, patterns: str) -> str:
     if patterns == "all":
         return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n") + "\n"
     words = [pattern.strip() for pattern in patterns.split(" | ")]
-    tests = [re.compile(word) for word in words if not word.startswith("not ")]
-    rows = [re.compile(word.removeprefix("not ")) for word in words if word.startswith("not ")]
+    tests = [re.compile(word) for word in words if not word.startswith(ROWS)]
+    families = [family for word in words if word.startswith(ROWS) for family in word.removeprefix(ROWS).split()]
     excerpt_lines: list[str] = []
     for piece in _pieces(lines):
         if any(test.search(piece[0]) for test in tests):
-            excerpt_lines += _without_rows(piece, rows)
+            excerpt_lines += _with_rows_of(piece, families) if families else piece
         elif excerpt_lines and excerpt_lines[-1] != "…":
             excerpt_lines.append("…")
     return re.sub(r"\n{3,}", "\n\n", "\n".join(excerpt_lines)).strip("\n…") + "\n"
 
 
-def _without_rows(piece: list[str], rows: Sequence[re.Pattern[str]]) -> list[str]:
-    """Return a piece without the rows that match, and without the remarks below them; "…" stands for them."""
+def _with_rows_of(piece: list[str], families: Sequence[str]) -> list[str]:
+    """Return a piece without the rows of other properties, and the remarks below them; "…" stands for them."""
+    others = {name for name in property_ids() if not any(f"{name}.".startswith(f"{family}.") for family in families)}
     left: list[str] = []
     dropped = False
     for line in piece:
         is_remark = line.startswith(" " * 6)
-        dropped = dropped if is_remark else any(row.search(line) for row in rows)
+        dropped = dropped if is_remark else line.strip().partition(" ")[0] in others
         if not dropped:
             left.append(line)
         elif left[-1] != "  …":

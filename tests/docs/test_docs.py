@@ -32,14 +32,8 @@ def label(page: Path) -> str:
 
 def rows(printed: str) -> list[tuple[str, ...]]:
     """Return (property, promise, verdict) of every line of the tables in a text."""
-    lines = [re.split(r" {2,}", line.strip()) for line in printed.splitlines() if line.startswith("  ")]
-    known = set(property_ids())
-    table = [
-        (cells[0], *(cell for cell in cells[1:] if cell in ("passes", "fails", "–") or VERDICT.fullmatch(cell)))
-        for cells in lines
-        if cells[0] in known
-    ]
-    return [cells for cells in table if len(cells) > 1]  # Shares of undecided and idle cases have no verdict.
+    lines = re.finditer(rf"^ +(\S+) +(passes|fails|–) +({VERDICT.pattern})", printed, re.M)
+    return [groups for line in lines if (groups := line.groups())[0] in property_ids()]
 
 
 def last_lines(printed: str) -> list[str]:
@@ -176,6 +170,18 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in (DOCS / "reference" / "api").glob("*.md"))
     described = set(re.findall(r"^::: contactverif\.(\w+)$", text, re.MULTILINE))
     assert described == set(contactverif.__all__)
+
+
+def test_the_page_of_every_property_says_what_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS / "hooks"))
+    from property_pages import property_page
+
+    pages_of = {question.id: property_page(question) for question in contactverif.load_properties()}
+    assert pages_of.keys() == set(property_ids())
+    titles = ("**Question.**", "**Why it matters.**", "**How it is judged.**", "**Undecided.**")
+    assert not [name for name, text in pages_of.items() if any(title not in text for title in titles)]
+    assert not [name for name, text in pages_of.items() if "partial(func" in text]
+    assert not [name for name, text in pages_of.items() if "**Promised by:** no trait" in text]
 
 
 @pytest.mark.parametrize("picture", sorted(PICTURES.glob("*.svg")), ids=lambda path: path.stem)

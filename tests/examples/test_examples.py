@@ -28,15 +28,44 @@ PROMISES = {
     ],
     "figure_30": [r"vts-ppt-basic: converged after 1\d iterations", r"vts-ppt: converged after [3-6] iterations"],
     "first_residual": [r"25\.", r"balance\.force: pass", r"patch\.flat\.transmission: fail"],
+    "hertz_rates": [
+        r"nts-ar +rate +-?0\.[0-3]\d, last error [4-9]\.\de-02",
+        r"vts-ppt +rate +1\.[2-4]\d, last error 1\.\de-03",
+    ],
+    "inf_sup": [
+        r"nts-lm +.*2:3: 1\.00 of β left, 0% .*3:2: 1\.00 of β left, 0% .*matching: 1\.00 of β left, 0%",
+        r"vts-ppt-lm +.*2:3: 0\.50 of β left, 0% .*3:2: 1\.00 of β left, 33%",
+    ],
     "locking": [
         r"nts-ar .*stiffest [1-9]e-01",
         r"two-pass/nts-ar .*stiffest [1-9]e-05",
         r"vts-ppt .*softest penalty [1-9]e-1[4-7]",
     ],
     "newton_trace": [r"vts-ppt\n(?s:.*?)converged: ", r"vts-me\n(?s:.*)2-cycle: "],
+    "opposite_sign": [
+        r"opposite sign: negated",
+        r"unilateral: .*\n +.*your forces have the opposite sign",
+        r"the run fails",
+    ],
     "own_mesh": [r"2 slave segments on 2 master segments", r"vts-me +patch\.flat\.transmission +fail"],
     "own_scene": [r"converged after \d iterations", r"largest pressure in the block: \d+"],
     "read_report": [r"vts-me: largest error \de\+\d\d tolerances", r"vts-ppt: largest error \de-\d\d tolerances"],
+    "shrink_fit": [
+        r"sts +error .* order 2\.0",
+        r"vts-ppt +error .* order 2\.0",
+        r"nts-ar +error .* order 2\.0",
+        r"springs a quarter .* to 5\.\de-01, order 0\.0",
+    ],
+    "stiff_springs": [
+        r"sts +at 1e6 E/h: pressures from 0\.00 to 1\d\.\d\d times",
+        r"mortar at 1e6 E/h: pressures from 0\.4\d to 1\.5\d times",
+    ],
+    "wavy_rates": [
+        r"flat interface, 10 E/h +nts-ar +pressures: rate +0\.[0-3]\d, last error [4-9]\.\de-02",
+        r"flat interface, 10 E/h +sts +pressures: rate +1\.9\d, last error [5-7]\.\de-04",
+        r"curved interface, 100 E/h +sts +pressures: rate +0\.[4-7]\d, last error [4-7]\.\de-01",
+        r"curved interface, 100 E/h +mortar +pressures: rate +1\.9\d, last error [1-3]\.\de-03",
+    ],
     "smallest_failing_mesh": [r"1 slave segment on 2 master segments", r"error of a nodal force 0\.\d+"],
 }
 

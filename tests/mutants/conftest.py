@@ -1,25 +1,40 @@
-"""Publish the kill matrix in the report of the test run."""
+"""Publish the kill matrix in the report of the test run: what this run judged, and the rest from the kept table."""
 
 from __future__ import annotations
 
+import csv
 import json
+from pathlib import Path
 
 import pytest
-from killing import EXAMPLES, KEY, OTHERS, as_lines
+from killing import EXAMPLES, KEY, as_lines
+
+FILE = Path(__file__).parents[2] / "reports" / "trust" / "kills.csv"
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Write one row for each mutant and one column for each property; workers of xdist send rows in their reports."""
+    """Write one row for each mutant and one column for each property; workers of xdist send cells in their reports."""
     reports = [
         report for every in terminalreporter.stats.values() for report in every if hasattr(report, "user_properties")
     ]
-    rows = [dict(report.user_properties)[KEY] for report in reports if KEY in dict(report.user_properties)]
-    if not rows:
+    cells = [dict(report.user_properties)[KEY] for report in reports if KEY in dict(report.user_properties)]
+    if not cells:
         return
-    matrix = {name: (intended, row) for name, intended, row in map(json.loads, dict.fromkeys(rows))}
+    rows = _kept_rows()
+    ids = list(dict.fromkeys([*next(iter(rows.values()), {}), *(json.loads(cell)[1] for cell in cells)]))
+    matrix = {}
+    for name, intended, number in map(json.loads, dict.fromkeys(cells)):
+        row = {question: int(rows.get(name, {}).get(question) or 0) for question in ids}
+        matrix[name] = intended, row | {intended: number}
     terminalreporter.section("kill matrix")
-    heading = (
-        f"the first of {EXAMPLES} cases that caught the mutant, in brackets where it is meant to; others: of {OTHERS}"
-    )
+    heading = f"the first of {EXAMPLES} cases that caught the mutant, in brackets; all others from {FILE.name}"
     for line in (heading, *as_lines(matrix)):
         terminalreporter.write_line(line)
+
+
+def _kept_rows() -> dict[str, dict[str, str]]:
+    """Return {mutant: {property: number of the first case, or empty}} of the kept table."""
+    if not FILE.exists():
+        return {}
+    with FILE.open(encoding="utf-8", newline="") as stream:
+        return {row.pop("mutant"): {k: v for k, v in row.items() if k != "caught by"} for row in csv.DictReader(stream)}

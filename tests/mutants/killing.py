@@ -14,7 +14,7 @@ from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
-OTHERS = 8  # Cases of each other property, which fill the matrix and decide nothing.
+OTHERS = 20  # Cases of each other property, which fill the matrix and decide nothing.
 OTHERS_OF_A_LIST = 1  # The same of properties with a finite list, which are many.
 OTHERS_SOLVED = 1  # The same of properties that solve bodies, which are slow.
 OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
@@ -51,6 +51,12 @@ def caught_at(question: Property, subject: Subject, examples: int | None) -> int
         if outcome.verdict is Verdict.CRASHED or outcome.breach or (promised and outcome.verdict is Verdict.FAIL):
             return number
     return 0
+
+
+def first_kill(mutant: Mutant) -> int:
+    """Return `caught_at` of the property that is meant to catch a mutant."""
+    (question,) = (question for question in properties() if question.id == mutant.caught_by)
+    return caught_at(question, Subject(mutant.name, mutant.make), None)
 
 
 def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:

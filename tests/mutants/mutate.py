@@ -18,7 +18,16 @@ import contactverif_nts
 
 PACKAGE = "contactverif_nts"
 # The modules of the copy, in the order in which they import each other.
-MODULES = ("eq6", "walk", "box3", "box3_tangent", "point_contact", "patch_test_passing", "nts_multipliers")
+MODULES = (
+    "force_tables",
+    "eq6",
+    "walk",
+    "box3",
+    "box3_tangent",
+    "point_contact",
+    "patch_test_passing",
+    "nts_multipliers",
+)
 
 _numbers = itertools.count()
 

@@ -10,12 +10,22 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import wrong_accuracy
+import wrong_bent
 import wrong_hard
+import wrong_hertz
+import wrong_invariants
+import wrong_linear
 import wrong_newton
+import wrong_patch_classes
+import wrong_pressures
 import wrong_projection
 import wrong_purity
+import wrong_pushes
 import wrong_stability
+import wrong_states
 import wrong_sweeps
+import wrong_tangent
 from mutate import Mutant, Wrapped, changed_line
 
 import contactverif_mortar
@@ -389,19 +399,29 @@ MUTANTS = (
          "x, multipliers = np.array(interface.nodes), np.zeros(0)\n        tree"),
     line("next master segment taken by its number", PATCH, "box3",
          "                j = neighbours[j, 1]", "                j = (j + 1) % len(neighbours)"),
+    *wrong_accuracy.MUTANTS,
+    *wrong_bent.MUTANTS,
+    # It is exact for a uniform gap, and so on flat interfaces; action equals reaction at each point.
+    Mutant("one Gauss point a cell", "patch.tilted.nodal",
+           lambda *, penalty: replace(contactverif_mortar.sts(penalty=penalty), quadrature=Quadrature.gauss(1, True))),
     *wrong_hard.MUTANTS,
+    *wrong_hertz.MUTANTS,
+    *wrong_invariants.MUTANTS,
+    *wrong_linear.MUTANTS,
     *wrong_newton.MUTANTS,
+    *wrong_patch_classes.MUTANTS,
+    *wrong_pressures.MUTANTS,
     *wrong_projection.MUTANTS,
     *wrong_purity.MUTANTS,
+    *wrong_pushes.MUTANTS,
     *wrong_stability.MUTANTS,
+    *wrong_states.MUTANTS,
     *wrong_sweeps.MUTANTS,
+    *wrong_tangent.MUTANTS,
 )  # fmt: skip
 
 # The mutants that no property catches yet. Each names the property that is missing.
 SURVIVORS = (
-    # It is exact for a uniform gap, and so on flat interfaces; action equals reaction at each point.
-    Mutant("one Gauss point a cell", "accuracy.linear",
-           lambda *, penalty: replace(contactverif_mortar.sts(penalty=penalty), quadrature=Quadrature.gauss(1, True))),
     # The printed VTS-PPT promises no balance on bent surfaces, and on flat ones no foot lies past an interior segment.
     # `tests/plugins/test_free_ends.py` catches it.
     line("share of an interior segment cut where the foot lies past its end", "free_end.interior", "walk",

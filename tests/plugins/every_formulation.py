@@ -43,6 +43,8 @@ FORMULATIONS = (
     "mortar-dual:normals=averaged,area=reference",
     "mortar-lm",
     "mortar-dual-lm:normals=averaged",
+    "mortar-two-half-pass",
+    "mortar-two-half-pass:area=reference,n=3",
 )
 
 

@@ -151,7 +151,7 @@ def dense_tangent(interface: Any, pairing: Any, z: Any) -> Any:
 def test_the_least_plugin_in_two_passes() -> None:
     subject, (interface, z) = wrap(), make_flat([2, 2], [3, 1])
     assert subject.provides == frozenset()
-    assert subject.traits == Traits(batched=True)
+    assert subject.traits == Traits(batched=True, unbiased=True)
     formulation = subject.with_penalty(3.0)
     assert formulation.pair(interface, z) is None
     assert formulation.n_multipliers(interface) == 0

@@ -21,9 +21,10 @@ from contactverif.scenes.blocks import pressure_of, two_blocks
 from contactverif.scenes.catalogue import load_scene_case
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
-from contactverif_properties.flat_solve import FLAT_SOLVE, SLOPE, measure_two_penalties
+from contactverif_properties.flat_solve import FLAT_SOLVE
 from contactverif_properties.patch_variants import PATCH_VARIANTS
 from contactverif_properties.shared.solved_patch import measure_at_penalty
+from contactverif_properties.shared.two_penalties import SLOPE, measure_two_penalties
 
 
 def textbook() -> Case:

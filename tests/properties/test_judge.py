@@ -83,7 +83,10 @@ def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
 def test_states_that_penetrate_are_not_for_barriers() -> None:
     """A barrier is not defined there, and would be accused of its NaN. Multipliers are asked nearly everything."""
     traits = Traits(passes_flat_patch=True, tangent="exact", gap="closest point", penalty="distributed", area="current")
-    springs_alone = ("projection.activity", "stability.stiffness")
+    traits = replace(traits, published_forces={"a1": "1 2 1; 2 2"}, force_along="master normal", continuity="C0")
+    nodal = "patch.flat.nodal"
+    springs_alone = (nodal, "projection.activity", "stability.stiffness", "continuity", "patch.tilted.nodal")
+    multipliers_alone = (nodal, "multipliers.rank", "complementarity", "stability.inf-sup")
     for question in load_properties():
         assert isinstance(question, Property)
         reasons = {
@@ -92,7 +95,7 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
         }
         assert "barrier" in reasons["barrier"]
         assert bool(reasons["multiplier"]) is (question.id in springs_alone)
-        assert bool(reasons["penalty"]) is (question.id in ("multipliers.rank", "complementarity"))
+        assert bool(reasons["penalty"]) is (question.id in multipliers_alone)
 
 
 class Pair(Handmade):

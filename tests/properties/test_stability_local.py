@@ -22,8 +22,10 @@ from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
 from contactverif_properties.shared.any_state import move_state
+from contactverif_properties.shared.linear_gaps import node_gaps
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration
 from contactverif_properties.stability_local import (
+    FORCES,
     LARGEST_DENOMINATOR,
     STABILITY_LOCAL,
     TOTAL,
@@ -33,8 +35,8 @@ from contactverif_properties.stability_local import (
 
 
 @cache
-def cases(count: int = 100) -> tuple[Case, ...]:
-    return draw_cases(STABILITY_LOCAL.cases(None), seed="0/local", examples=count).cases
+def cases(count: int = 100, kind: str = "uniform penetration") -> tuple[Case, ...]:
+    return draw_cases(STABILITY_LOCAL.cases(None)[kind], seed="0/local", examples=count).cases
 
 
 def worst_number(case: Case, subject: Subject) -> float:
@@ -169,3 +171,26 @@ def test_what_is_exact_follows_the_traits() -> None:
         Traits(passes_flat_patch=True, enforcement="multiplier", penalty="nodal")
     )
     assert "barrier" in refuse_unknown_forces(Traits(passes_flat_patch=True, enforcement="barrier"))
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "vts-g", "vts-ppt-balanced", "sts", "mortar", "mortar-lm", "chen-hisada"])
+def test_under_a_linear_penetration_the_built_in_formulations_are_as_exact(name: str) -> None:
+    assert max(worst_number(case, load_subject(name)) for case in cases(kind="linear penetration")) <= 4
+
+
+def test_a_linear_penetration_is_exactly_linear_and_closed_everywhere() -> None:
+    for case in cases(kind="linear penetration"):
+        n_slave = case.interface.n_slave_nodes
+        points = [(Fraction(x), Fraction(y)) for x, y in case.positions[:n_slave].tolist()]
+        (x_0, y_0), (x_1, y_1) = points[0], points[-1]
+        assert all((x - x_0) * (y_1 - y_0) == (y - y_0) * (x_1 - x_0) for x, y in points)
+        assert (node_gaps(case) < 0).all()
+        far = move_state(case, case.parameters["shift"])
+        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
+
+
+def test_what_is_exact_under_a_linear_penetration_follows_the_traits() -> None:
+    (case,) = cases(1, "linear penetration")
+    assert set(STABILITY_LOCAL.measure(case, load_subject("sts")).values) == {FORCES.name, TOTAL.name}
+    assert set(STABILITY_LOCAL.measure(case, load_subject("vts-ppt")).values) == {TOTAL.name}
+    assert set(STABILITY_LOCAL.measure(case, load_subject("mortar-lm")).values) == {FORCES.name}

@@ -13,6 +13,7 @@ from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.run.runner import judge_case
 from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
 from contactverif_properties.tangent_directional import (
     CENTRAL,
     COMPLEX,
@@ -236,3 +237,43 @@ def test_what_provides_no_tangent_is_not_asked() -> None:
     assert TANGENT_DIRECTIONAL.promise(Traits()) is None
     assert TANGENT_DIRECTIONAL.promise(Traits(tangent="approximate")) is False
     assert TANGENT_DIRECTIONAL.promise(Traits(tangent="exact")) is True
+
+
+def test_each_region_moves_by_itself() -> None:
+    at = case().with_multipliers(np.ones(3))
+    directions = first_directions(at, 2)
+    moved = [np.flatnonzero(direction).tolist() for direction in directions]
+    assert moved == [list(range(13)), list(range(13)), [0, 1, 2, 3], [4, 5, 6, 7, 8, 9], [10, 11, 12]]
+    assert np.array_equal(np.abs(directions).max(axis=1), np.ones(5))
+
+
+@pytest.mark.parametrize("count", [3, 12])
+def test_the_leading_singular_direction_of_the_defect_is_found(count: int) -> None:
+    """In as many directions as unknowns it is that of the matrix; in fewer, none of them has a larger defect."""
+    defect = np.diag([1.0, 2.0, 3.0, 1e-3, 7.0, 0.5])
+    directions = random_directions(1, count, 6)
+    worst, singular = defect_directions(directions, directions @ defect.T)
+    gains = np.linalg.norm(np.vstack([directions, [singular]]) @ defect.T, axis=1)
+    gains /= np.linalg.norm(np.vstack([directions, [singular]]), axis=1)
+    assert gains.argmax() == count
+    if count > 6:
+        assert gains[-1] == pytest.approx(7.0)
+    assert np.abs(worst).max() == np.abs(singular).max() == 1
+    assert len(defect_directions(directions, 0 * directions)) == 0
+
+
+def test_a_row_counts_over_its_own_derivative() -> None:
+    """An error of 1e-6 in a row that is 1e-8 of the largest one."""
+
+    class Uneven(Smooth):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return z * np.where(np.arange(z.shape[-1]) < 2, 1e-8, 1.0)
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            k = np.diag(np.where(np.arange(z.size) < 2, 1e-8, 1.0))
+            k[1, 1] *= 1 + 1e-6
+            return k
+
+    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Uneven))
+    assert outcome.verdict is Verdict.FAIL
+    assert "row 1 (y of slave node 0)" in outcome.reason

@@ -1,4 +1,4 @@
-"""The property `unilateral`: no force across an open gap, and some where the surfaces penetrate."""
+"""The properties `unilateral` and `nodal-push`: no force across an open gap, and a push where surfaces penetrate."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
+from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import Subject
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case
+from contactverif.strategies import flat_cases
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.unilateral import UNILATERAL, lift_slave
+from contactverif_properties.nodal_push import NODAL_PUSH, allowed_pushes
+from contactverif_properties.shared.openings import lift_slave
+from contactverif_properties.unilateral import UNILATERAL
 
 
 class Springs:
@@ -66,7 +70,7 @@ def test_who_is_right_passes(name: str, case: str) -> None:
 def test_nodes_that_face_free_ends_exactly_are_undecided() -> None:
     """Both nodes of a segment on one of its own length: without τ roundoff decides whether they are over it."""
     without_tau = load_subject("nts:tau=0")
-    result = run([without_tau], [UNILATERAL], examples=300, seed=0)
+    result = run([without_tau], [replace(UNILATERAL, cases=flat_cases)], examples=300, seed=0)
     assert result.rows[0].verdict is Verdict.PASS, result.rows[0].reason
     assert any(outcome.verdict is Verdict.UNDECIDED for outcome in result.rows[0].outcomes)
 
@@ -89,7 +93,7 @@ class Augmented:
 
 def test_springs_beside_multipliers_are_not_accused() -> None:
     """A unit multiplier is lost in roundoff beside them; one of their size is not."""
-    questions = load_properties(["patch.flat.*", "unilateral"])
+    questions = load_properties(["patch.flat.resultant", "patch.flat.solve", "patch.flat.transmission", "unilateral"])
     result = run([Subject("augmented", Augmented)], questions, examples=60, seed=0)
     assert {row.property_id: row.verdict for row in result.rows} == dict.fromkeys(
         ["patch.flat.resultant", "patch.flat.solve", "patch.flat.transmission", "unilateral"], Verdict.PASS
@@ -109,3 +113,70 @@ class Ungated(Augmented):
 def test_multipliers_that_are_not_gated_are_not_accused() -> None:
     result = run([Subject("ungated", Ungated)], load_properties(["complementarity", "unilateral"]), examples=60, seed=0)
     assert [row.verdict for row in result.rows] == [Verdict.PASS, Verdict.PASS], [row.reason for row in result.rows]
+
+
+class Pulling(Springs):
+    """Springs on the same nodes that pull where they should push."""
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        return -super().residual(interface, pairing, z)
+
+
+def test_a_slave_that_is_pulled_as_a_whole_is_told_so_in_words() -> None:
+    outcome = judge_case(UNILATERAL, named_case("a1"), Subject("pulling", Pulling))
+    assert (outcome.verdict, outcome.reason) == (Verdict.FAIL, OPPOSITE_SIGN)
+
+
+class OneSegment(Springs):
+    """Both nodes of a slave segment are held as soon as one of them penetrates."""
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        forces, x = np.zeros_like(z), z.reshape(-1, 2)
+        gap = x[: interface.n_slave_nodes, 1] - x[-1, 1]
+        for segment in interface.slave.segments:
+            if gap[segment].min() < 0:
+                forces.reshape(-1, 2)[segment, 1] += self.penalty * gap[segment]
+        return forces
+
+
+def test_single_nodes_are_judged_where_that_is_promised_and_told_elsewhere() -> None:
+    """A dual mortar method of a stranger, which says nothing, is not accused of what its shapes do."""
+    case = named_case("c")
+    springs = Subject("one segment", OneSegment)
+    assert judge_case(UNILATERAL, case, springs).verdict is Verdict.PASS
+    outcome = judge_case(NODAL_PUSH, case, springs)
+    assert outcome.verdict is Verdict.FAIL
+    assert "pull of a node" in outcome.reason
+    assert NODAL_PUSH.promise(springs.traits) is None
+    assert judge_case(NODAL_PUSH, case, Subject("right", Springs)).verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "two-pass/nts", "mortar:normals=averaged", "mortar-lm", "sts"])
+def test_formulations_that_push_every_node_are_not_accused(name: str) -> None:
+    [row] = run([load_subject(name)], [NODAL_PUSH], examples=60, seed=3).rows
+    assert row.verdict is Verdict.PASS, row.reason
+    assert row.contact_share is not None
+    assert row.contact_share >= 0.9
+
+
+@pytest.mark.parametrize("name", ["mortar-dual", "mortar-dual-lm"])
+def test_dual_shapes_pull_as_they_say(name: str) -> None:
+    subject = load_subject(name)
+    witness = subject.traits.witness("nodal-push")
+    assert witness is not None
+    assert judge_case(NODAL_PUSH, named_case(witness), subject).verdict is Verdict.FAIL
+
+
+def test_a_master_node_may_be_pulled_by_as_much_as_a_foot_lies_past_its_segment() -> None:
+    """Eq. 6 with the foot at ξ = −0.005: a lever, whose longer end is pushed by more than the whole."""
+    slave, master = [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.005, 0.0]]
+    interface = Interface.from_chains(slave, master)
+    z = np.array([0.0, -0.1, 1.0, -0.1, 2.0, 0.0, 0.005, 0.0])
+    case = Case(interface, z, 1.0)
+    subject = load_subject("nts")
+    formulation = subject.for_case(case)
+    forces = -formulation.residual(interface, formulation.pair(interface, z), z).reshape(-1, 2)
+    _, allowance = allowed_pushes(formulation, case)
+    assert allowance[2] == pytest.approx(0.005 / 1.995 * 0.1, rel=1e-9)
+    assert forces[2, 1] < 0  # The other node carries the slave's second node too.
+    assert judge_case(NODAL_PUSH, case, subject).verdict is Verdict.PASS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,7 +17,9 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from page_reader import Page, complaints
 
+from contactverif.contract.case_counts import percent
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif_reports.html import margin_strips as margins
 from contactverif_reports.html import pages
 from contactverif_reports.html import report_page as report_page_module
@@ -183,8 +186,9 @@ def test_numbers_agree_with_the_file(tmp_path: Path) -> None:
             row = run.row_of[name, line[0]]
             assert line[2].endswith(str(row.result))
             assert line[3] == (f"{row.judged}/{row.planned}" if row.planned else "–")
+            assert line[4] == ("–" if row.contact_share is None else percent(row.contact_share))
             closest = row.closest.number if row.closest is not None else None
-            assert line[5:7] == (
+            assert line[6:8] == (
                 [number(closest.value, 2), f"{closest.sign} {number(closest.tolerance, 2)}"] if closest else ["", ""]
             )
 
@@ -247,3 +251,10 @@ def test_the_bodies_of_a_scene_are_drawn_without_solving_it() -> None:
     svg = svg_inline(make_outline_figure(case, 5.4))
     words = "".join(ElementTree.fromstring(svg).itertext())
     assert all(word in words for word in ("slave", "master", "support", "load"))
+
+
+def test_an_opposite_sign_stands_before_everything_else(tmp_path: Path) -> None:
+    html = page(tmp_path, replace(small_run(), opposite_signs=("vts-ppt",)))
+    assert OPPOSITE_SIGN in unescape(html)
+    assert html.index("your forces have the opposite sign") < html.index("What went wrong")
+    assert "1 formulation with the opposite sign" in html

@@ -40,6 +40,7 @@ def hard_run() -> Run:
     """Rows that are hard to store: NaN, kinks, breaches, series with gaps, no quantities, fewer cases than planned."""
     info = question("newton.history", "newton", ERROR, SLOPE)
     info = replace(info, series={"residual": "N", "a/b ′": "1"}, needs=frozenset({"pair", "tangent"}))
+    info = replace(info, least_contact=0.0, usual_undecided=0.1)
     case, other = flat([2, 2], [4]), flat([1, 1, 2], [2, 2])
     series = {"residual": np.array([1.0, np.nan, 1e-9, np.nan]), "a/b ′": np.array([np.inf])}
     good = Measurement({"force error": 1e-15, "slope": 2.0}, {"force error": 1e-12, "slope": 1.9}, series=series)
@@ -69,7 +70,8 @@ def hard_run() -> Run:
         Row("yours", question("patch", "patch", ERROR), Verdict.NOT_APPLICABLE, None, reason="no springs"),
     ]  # fmt: skip
     parts = {"pair": True, "tangent": False, "contact_points": True}
-    return Run(tuple(rows), (), {"mine": parts, "yours": parts, "idle": parts}, {"seed": "1", "examples": "9"})
+    provided, origin = {"mine": parts, "yours": parts, "idle": parts}, {"seed": "1", "examples": "9"}
+    return Run(tuple(rows), (), provided, origin, opposite_signs=("yours",))
 
 
 def real_run() -> Run:
@@ -140,6 +142,7 @@ def test_what_is_counted_is_the_same(live: Run, reread: Run) -> None:
     assert (reread.formulations, list(reread.properties)) == (live.formulations, list(live.properties))
     assert reread.provided == live.provided
     assert reread.provenance == live.provenance
+    assert reread.opposite_signs == live.opposite_signs
     for ours, theirs in zip(live.rows, reread.rows, strict=True):
         assert (ours.verdict, ours.promise, ours.known, ours.reason) == (
             theirs.verdict, theirs.promise, theirs.known, theirs.reason,
@@ -150,6 +153,10 @@ def test_what_is_counted_is_the_same(live: Run, reread: Run) -> None:
         assert list(ours.tally.reasons.items()) == list(theirs.tally.reasons.items())
         assert list(ours.tally.kinds.items()) == list(theirs.tally.kinds.items())
         assert (ours.idle, ours.tally.counts, ours.info.kinds) == (theirs.idle, theirs.tally.counts, theirs.info.kinds)
+        assert (ours.contact_share, ours.suspicion) == (theirs.contact_share, theirs.suspicion)
+        assert (ours.info.least_contact, ours.info.usual_undecided) == (
+            theirs.info.least_contact, theirs.info.usual_undecided,
+        )  # fmt: skip
         assert (ours.info.quantities, ours.info.needs, ours.info.series, ours.info.summary) == (
             theirs.info.quantities, theirs.info.needs, theirs.info.series, theirs.info.summary,
         )  # fmt: skip

@@ -337,6 +337,13 @@ def test_a_promise_to_fail_is_broken_when_nothing_fails(least: int, verdict: Ver
     assert (row.planned, row.judged) == (40, 40)
 
 
+def test_a_case_of_a_finite_list_is_a_witness_by_its_name_and_is_judged_once() -> None:
+    question = replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in (1, 2, 3)))
+    row = one_row(subject(from_size(2), passes_flat_patch=False, witnesses={"patch.zero": "size 2"}), question)
+    assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
+    assert row.witness is row.outcomes[1]
+
+
 @pytest.mark.usefixtures("witnesses")
 def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() -> None:
     question = replace(ZERO, cases=lambda _: sizes(5))

@@ -1,0 +1,84 @@
+"""Mutants that pull: all signs turned round, a whole segment in contact with its one closed point, wrong shares.
+
+One more hides: its tangent is wrong by noise, which would pass for a kink if anybody asked the tangent itself.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from mutate import Mutant, Wrapped
+
+import contactverif_mortar
+import contactverif_nts
+from contactverif import Pairing
+
+UNILATERAL, NODAL_PUSH, OBJECTIVITY = "unilateral", "nodal-push", "objectivity"
+
+
+def _turn_signs_round(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Turn all signs of forces and tangent round; the contact points report what they did."""
+
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        return -right(interface, pairing, z)
+
+    return lambda *, penalty: Wrapped(penalty, make, residual=residual, tangent=residual)
+
+
+def _whole_segments(make: Callable[..., Any], **verbs: Any) -> Callable[..., Any]:
+    """Make all points of a slave segment active as soon as one of them is."""
+
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        pairing = right(interface, z)
+        closed = np.zeros(len(interface.slave), dtype=bool)
+        closed[pairing["segment"][pairing["active"]]] = True
+        return Pairing({**pairing, "active": closed[pairing["segment"]] & (pairing["master"] >= 0)})
+
+    return lambda *, penalty: Wrapped(penalty, make, pair=pair, **verbs)
+
+
+def _report_no_tension(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Report the pressures without those below zero, which the forces still have."""
+    points = right(interface, pairing, z)
+    return replace(points, pressure=np.maximum(points.pressure, 0.0))
+
+
+def _outward_shares(*, penalty: float) -> Any:
+    """Double the distance of each point from the middle of its segment in the shares of its nodes: force is kept."""
+
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.array(right(interface, pairing, z)).reshape(*z.shape[:-1], -1, 2)
+        for first, second in interface.slave.segments:
+            between = (forces[..., first, :] - forces[..., second, :]) / 2
+            forces[..., first, :] += between
+            forces[..., second, :] -= between
+        return forces.reshape(z.shape)
+
+    return Wrapped(penalty, contactverif_nts.vts_me, residual=residual)
+
+
+def _noisy_tangent(*, penalty: float) -> Any:
+    """Change each tangent by up to 1e-6 of it, by other numbers for each state: it jumps wherever it is asked."""
+
+    def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        matrix = np.array(right(interface, pairing, z).toarray())
+        random = np.random.default_rng(zlib.crc32(z.tobytes()))
+        return matrix * (1 + 1e-6 * random.uniform(-1, 1, matrix.shape))
+
+    return Wrapped(penalty, tangent=tangent)
+
+
+MUTANTS = (
+    Mutant("all signs turned round", UNILATERAL, _turn_signs_round(contactverif_nts.nts_ar)),
+    Mutant("all signs of a mortar method turned round", UNILATERAL, _turn_signs_round(contactverif_mortar.mortar)),
+    Mutant("all signs of multipliers turned round", UNILATERAL, _turn_signs_round(contactverif_nts.nts_lm)),
+    Mutant("whole slave segment active with one of its points", UNILATERAL, _whole_segments(contactverif_nts.vts_me)),
+    Mutant("whole slave segment active, and no tension reported", NODAL_PUSH,
+           _whole_segments(contactverif_nts.vts_me, contact_points=_report_no_tension)),
+    Mutant("shares of the slave nodes spread too far", NODAL_PUSH, _outward_shares),
+    Mutant("noise of 1e-6 in the tangent", OBJECTIVITY, _noisy_tangent),
+)  # fmt: skip

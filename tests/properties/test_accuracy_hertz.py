@@ -1,0 +1,88 @@
+"""Hertz' contact as a question: who converges, who does not, and strangers who compute it in other ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from subjects import load_subject, with_promises
+from textbook_cells import ClippedCells, WeightedGaps
+
+from contactverif.contract.case import Case
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.scene import scene_of
+from contactverif.run.runner import judge_case
+from contactverif.scenes.hertz_box import COARSEST, HertzBox, exact_forces
+from contactverif_properties.accuracy_hertz import ACCURACY_HERTZ, LIMITS, MESHES, PENALTIES, hertz_cases
+from contactverif_properties.shared.hertz_study import HertzStudy, hertz_errors
+
+CASES = {case.name: case for case in hertz_cases()}
+
+
+def test_each_body_is_the_slave_at_each_penalty() -> None:
+    assert list(CASES) == [f"{slave}-{word}" for slave in ("parabola", "flat") for word in PENALTIES]
+    assert LIMITS.keys() == PENALTIES.keys()
+    assert CASES["parabola-layer"].penalty == HertzBox().young[0]
+    assert CASES["flat-stiff"].penalty == pytest.approx(100 * CASES["flat-soft"].penalty)
+
+
+def test_a_case_that_was_stored_is_the_same_study() -> None:
+    case = CASES["flat-soft"]
+    again = Case.from_arrays(case.to_arrays())
+    subject = load_subject("sts")
+    values = [ACCURACY_HERTZ.measure(each, subject).values for each in (case, again)]
+    assert values[0] == values[1]
+
+
+def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
+    assert ACCURACY_HERTZ.exact is not None
+    case = CASES["parabola-soft"]
+    forces = ACCURACY_HERTZ.exact(case)
+    assert forces.sum(axis=0) == pytest.approx(0, abs=1e-12)
+    assert np.array_equal(forces, exact_forces(HertzBox(), case.penalty, scene_of(case), True))
+
+
+@pytest.mark.parametrize("name", ["sts", "vts-ppt", "mortar", "mortar-lm"])
+def test_who_passes_the_patch_test_converges(name: str) -> None:
+    subject = load_subject(name)
+    for case in CASES.values():
+        outcome = judge_case(ACCURACY_HERTZ, case, subject)
+        assert outcome.verdict is Verdict.PASS, (case.name, outcome.reason)
+        assert outcome.measurement is not None
+        assert all(len(values) == len(MESHES) for values in outcome.measurement.series.values())
+
+
+@pytest.mark.parametrize("name", ["nts", "vts-g:n=3", "vts-me:n=4", "two-pass/nts"])
+def test_the_master_forces_of_others_do_not_converge_even_at_a_fixed_penalty(name: str) -> None:
+    """More points a segment make the error smaller, and leave the rate what it is."""
+    outcome = judge_case(ACCURACY_HERTZ, CASES["parabola-layer"], load_subject(name))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    assert outcome.measurement.values["rate of master forces"] <= 0.1
+
+
+@pytest.mark.parametrize(("make", "name"), [(ClippedCells, "sts"), (WeightedGaps, "mortar")])
+def test_a_stranger_who_clips_cells_has_the_same_errors(make: type, name: str) -> None:
+    study = HertzStudy(parabola_is_slave=False, stiffness=1.0)
+    theirs = hertz_errors(study, COARSEST, Subject(make.__name__, make))
+    ours = hertz_errors(study, COARSEST, load_subject(name))
+    assert theirs.balanced
+    for word in ("slave", "master", "pressure", "peak", "half_width", "displacement"):
+        assert getattr(theirs, word) == pytest.approx(getattr(ours, word), rel=0.15), word
+
+
+def test_half_of_a_balance_is_found_at_a_stiff_penalty() -> None:
+    """Two half passes push both bodies with different forces where these are not parallel."""
+    subject = load_subject("mortar-two-half-pass")
+    verdicts = [judge_case(ACCURACY_HERTZ, CASES[f"parabola-{word}"], subject).verdict for word in PENALTIES]
+    assert verdicts == [Verdict.PASS, Verdict.PASS, Verdict.FAIL]
+
+
+def test_what_has_no_solution_is_not_asked() -> None:
+    assert "no solution" in ACCURACY_HERTZ.applicable(load_subject("vts-ppt-lm").traits)
+    assert "barrier" in ACCURACY_HERTZ.applicable(with_promises(ClippedCells, enforcement="barrier").traits)
+
+
+def test_the_penalty_is_that_of_its_word() -> None:
+    assert HertzStudy(True, 2.0, fixed=True).penalty(16) == HertzStudy(True, 2.0, fixed=True).penalty(48) == 2.0
+    assert HertzStudy(True, 2.0).penalty(48) / HertzStudy(True, 2.0).penalty(16) == pytest.approx(145 / 49)

@@ -1,0 +1,162 @@
+"""The judges of accuracy clear right formulations of other kinds, and tell those that do not converge or that lock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from subjects import load_subject
+from wave_strangers import Heights
+
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.runner import judge_case
+from contactverif.scenes.wavy import LOWER, UPPER
+from contactverif_properties.accuracy_wavy import ACCURACY_WAVY
+from contactverif_properties.accuracy_wavy_curved import ACCURACY_WAVY_CURVED, promise_without_locking
+from contactverif_properties.shared.wave_study import (
+    FORCE_RATE,
+    LAST_PRESSURE,
+    MESHES,
+    PRESSURE,
+    PRESSURE_RATE,
+    SERIES,
+    WaveStudy,
+    constant_pressure_error,
+)
+
+NAMES = ("upper slave, 10 E/h", "upper slave, 1000 E/h", "lower slave, 10 E/h", "lower slave, 1000 E/h")
+CONTRAST_NAMES = ("finer slave, 10 E/h", "coarser slave, 10 E/h")
+CURVED_NAMES = tuple(name.replace("1000", "100") for name in NAMES)
+
+
+def _case(question: Property, name: str) -> Case:
+    return next(case for case in question.cases(None) if case.name == name)
+
+
+def _verdict(question: Property, name: str, subject: Subject) -> Verdict:
+    return judge_case(question, _case(question, name), subject).verdict
+
+
+@pytest.mark.parametrize(
+    ("question", "names"), [(ACCURACY_WAVY, NAMES + CONTRAST_NAMES), (ACCURACY_WAVY_CURVED, CURVED_NAMES)]
+)
+def test_there_are_these_studies_and_none_on_a_given_interface(question: Property, names: tuple[str, ...]) -> None:
+    cases = question.cases(None)
+    assert tuple(case.name for case in cases) == names
+    assert question.cases(None) is cases
+    assert question.cases(cases[0].interface) is None
+
+
+def test_a_stored_case_is_the_same_study() -> None:
+    case = _case(ACCURACY_WAVY_CURVED, "lower slave, 100 E/h")
+    study = WaveStudy.from_case(Case.from_arrays(case.to_arrays()))
+    assert study == WaveStudy(LOWER, 100.0, 1e-6)
+    assert study.penalty(1) == pytest.approx(100 * 6 / 4)
+
+
+def test_a_coarser_slave_has_a_quarter_of_the_segments_and_none_of_the_inner_nodes() -> None:
+    case = _case(ACCURACY_WAVY, CONTRAST_NAMES[1])
+    study = WaveStudy.from_case(Case.from_arrays(case.to_arrays()))
+    assert study == WaveStudy(LOWER, 10.0, contrast=True)
+    for refine in study.meshes:
+        interface = study.scene(refine).interface
+        assert 4 * len(interface.slave) == len(interface.master) == 4 * refine
+        assert study.penalty(refine) == pytest.approx(10 * refine / 4)
+        slave, master = (np.unique(side.segments) for side in (interface.slave, interface.master))
+        distances = np.abs(interface.nodes[slave, 0] - interface.nodes[master, :1])
+        assert (distances < 1e-3).sum() == 2, "the ends"
+
+
+RIGHT: dict[str, Callable[..., Any]] = {
+    "linear pressures, nothing reported": lambda *, penalty: Heights(penalty, constant=False),
+    "linear pressures at points": lambda *, penalty: Heights(penalty, constant=False, reports="points"),
+    "constant pressures at points": lambda *, penalty: Heights(penalty, constant=True, reports="points"),
+    "constant pressures, one point a segment": lambda *, penalty: Heights(penalty, constant=True, reports="segments"),
+}
+
+
+@cache
+def _right(name: str) -> Subject:
+    return Subject(name, RIGHT[name])
+
+
+@pytest.mark.parametrize("case", NAMES[::2] + CONTRAST_NAMES)
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_formulation_of_another_kind_is_cleared(name: str, case: str) -> None:
+    outcome = judge_case(ACCURACY_WAVY, _case(ACCURACY_WAVY, case), _right(name))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "vts-me", "vts-me:n=12"])
+def test_a_slave_coarser_than_the_master_tells_who_fails_the_patch_test(name: str) -> None:
+    """Many points hide the error of VTS-ME where meshes are alike, and not here."""
+    measurement = ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, CONTRAST_NAMES[1]), load_subject(name))
+    assert measurement.values[FORCE_RATE] < 0.1
+
+
+def test_constant_pressures_have_the_error_that_the_bound_is_made_of() -> None:
+    case = _case(ACCURACY_WAVY, NAMES[0])
+    measurement = ACCURACY_WAVY.measure(case, _right("constant pressures at points"))
+    error = constant_pressure_error(WaveStudy(UPPER, 10.0))
+    assert measurement.values[LAST_PRESSURE] == pytest.approx(error, rel=0.02)
+    assert measurement.tolerances[LAST_PRESSURE] == 2 * error
+    assert measurement.values[PRESSURE_RATE] == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "question", "case"), [
+    ("nts-ar", ACCURACY_WAVY, NAMES[0]),
+    ("vts-me", ACCURACY_WAVY, NAMES[0]),
+    ("sts", ACCURACY_WAVY_CURVED, CURVED_NAMES[1]),
+    ("vts-ppt", ACCURACY_WAVY_CURVED, CURVED_NAMES[1]),
+])  # fmt: skip
+def test_the_errors_of_all_meshes_are_kept_and_a_witness_fails_clearly(
+    name: str, question: Property, case: str
+) -> None:
+    outcome = judge_case(question, _case(question, case), load_subject(name))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.measurement is not None
+    assert outcome.measurement.series.keys() == SERIES.keys()
+    assert {values.shape for values in outcome.measurement.series.values()} == {(len(MESHES),)}
+    error = "pressure error on the finest mesh"
+    assert outcome.measurement.values[error] > 1.1 * outcome.measurement.tolerances[error]
+
+
+def test_a_solution_with_multipliers_is_the_one_without_springs() -> None:
+    """The penalty is the scale of the contact decision alone, so both cases measure the same."""
+    mortar = load_subject("mortar-lm")
+    soft, stiff = (ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, name), mortar) for name in NAMES[:2])
+    np.testing.assert_allclose(list(soft.values.values()), list(stiff.values.values()), rtol=1e-6)
+
+
+def test_pressures_that_two_passes_share_are_not_judged() -> None:
+    measurement = ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, NAMES[0]), load_subject("two-pass/nts-ar"))
+    assert PRESSURE not in measurement.series
+    assert LAST_PRESSURE not in measurement.values
+
+
+def test_no_solution_is_undecided() -> None:
+    class Wanderer:
+        """A formulation whose forces have no zero: they change sign at random with the last digit."""
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 1e-6 * np.sin(1e9 * z)
+
+    outcome = judge_case(ACCURACY_WAVY, _case(ACCURACY_WAVY, NAMES[0]), Subject("w", lambda *, penalty: Wanderer()))
+    assert outcome.verdict is Verdict.UNDECIDED
+    assert "finds no solution on mesh 1" in outcome.reason
+
+
+@pytest.mark.parametrize(("converges", "locks", "promise"), [
+    (True, False, True), (True, True, False), (True, None, None),
+    (False, False, False), (False, None, False), (None, False, None), (None, True, False), (None, None, None),
+])  # fmt: skip
+def test_who_converges_and_does_not_lock_promises_the_curved_interface(
+    converges: bool | None, locks: bool | None, promise: bool | None
+) -> None:
+    assert promise_without_locking(Traits(converges=converges, locks=locks)) is promise

@@ -1,0 +1,162 @@
+"""Right formulations, wrong ones and strangers on rings, arcs and kinks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from subjects import Changed, load_property, load_subject, with_promises
+
+import contactverif_mortar
+import contactverif_nts
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.runner import judge_case, run
+
+BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
+
+
+def judge_all(property_id: str, subject: Subject) -> list[Outcome]:
+    question = load_property(property_id)
+    return [judge_case(question, case, subject) for case in question.cases(None)]
+
+
+def measurement_of(outcome: Outcome) -> Measurement:
+    assert outcome.measurement is not None, outcome.reason
+    return outcome.measurement
+
+
+def change_verbs(name: str, **verbs: Any) -> Subject:
+    """Return a formulation with verbs that get the right one's verb first."""
+    inner = load_subject(name)
+
+    def make(*, penalty: float) -> Changed:
+        plugin = inner.with_penalty(penalty).plugin
+        return Changed(plugin, **{verb: _bind(change, getattr(plugin, verb)) for verb, change in verbs.items()})
+
+    return Subject("changed", make)
+
+
+def _bind(change: Any, right: Any) -> Any:
+    return lambda *arguments: change(right, *arguments)
+
+
+@pytest.mark.parametrize("name", ["sts", "mortar", "nts-ar", "vts-ppt"])
+def test_the_error_of_the_mean_pressure_of_the_rings_is_of_second_order(name: str) -> None:
+    for outcome in judge_all("patch.curved", load_subject(name)):
+        assert 1.9 < measurement_of(outcome).details["rate"] < 2.1
+
+
+def test_springs_that_are_two_percent_too_soft_are_found_out() -> None:
+    soft = change_verbs("sts", residual=lambda right, interface, pairing, z: right(interface, pairing, z) * 0.98)
+    verdicts = [outcome.verdict for outcome in judge_all("patch.curved", soft)]
+    assert verdicts == [Verdict.FAIL] * 4
+    soft = change_verbs("sts", residual=lambda right, interface, pairing, z: right(interface, pairing, z) * 0.995)
+    assert {outcome.verdict for outcome in judge_all("accuracy.arc", soft)} == {Verdict.FAIL}
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_reported_pressures_that_are_one_percent_off_are_found_out(property_id: str) -> None:
+    def report(right: Any, *arguments: Any) -> Any:
+        points = right(*arguments)
+        return replace(points, pressure=0.99 * points.pressure)
+
+    for outcome in judge_all(property_id, change_verbs("mortar", contact_points=report)):
+        assert outcome.verdict is Verdict.FAIL
+        assert "reported" in outcome.reason
+        assert "force" not in outcome.reason.replace("against the forces", "")
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_a_wrong_tangent_or_none_plays_no_part(property_id: str) -> None:
+    def make(*, penalty: float) -> Any:
+        plugin = contactverif_mortar.sts(penalty=penalty)
+        return Changed(plugin, tangent=lambda interface, pairing, z: 3 * plugin.tangent(interface, pairing, z))
+
+    assert {outcome.verdict for outcome in judge_all(property_id, Subject("wrong tangent", make))} == {Verdict.PASS}
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_who_reports_nothing_is_judged_by_its_forces(property_id: str) -> None:
+    class Silent:
+        def __init__(self, *, penalty: float) -> None:
+            inner = contactverif_mortar.sts(penalty=penalty)
+            self.pair, self.residual, self.tangent, self.traits = (
+                inner.pair,
+                inner.residual,
+                inner.tangent,
+                inner.traits,
+            )
+
+    for outcome in judge_all(property_id, Subject("silent", Silent)):
+        assert outcome.verdict is Verdict.PASS
+        assert not any("reported" in name for name in measurement_of(outcome).values)
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_a_formulation_that_does_nothing_fails(property_id: str) -> None:
+    class Nothing:
+        traits = Traits(passes_kinked_patch=True, penalty="distributed", area="current")
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 0 * z
+
+    outcomes = judge_all(property_id, Subject("nothing", lambda *, penalty: Nothing()))
+    assert Verdict.PASS not in {outcome.verdict for outcome in outcomes}
+
+
+def test_averaged_normals_fail_at_every_kink_with_or_without_a_third_normal() -> None:
+    outcomes = judge_all("patch.kinked", load_subject("mortar:normals=averaged"))
+    assert {outcome.verdict for outcome in outcomes} == {Verdict.FAIL}
+    for outcome in outcomes:
+        assert measurement_of(outcome).values["stress error, three normals"] > 0.04
+
+
+def test_with_a_third_normal_the_error_falls_like_one_over_the_penalty() -> None:
+    name = "fall of the stress error over a decade of ε̂"
+    falls = [
+        measurement_of(outcome).values[name]
+        for formulation in ("vts-ppt", "sts")
+        for outcome in judge_all("patch.kinked", load_subject(formulation))
+    ]
+    assert len(falls) == 12
+    assert all(0.98 < fall < 1.02 for fall in falls)
+
+
+def test_a_promise_to_fail_at_kinks_is_broken_by_who_passes() -> None:
+    witnesses = {"patch.kinked": "edge of 53°, lower slave"}
+    boaster = with_promises(contactverif_nts.vts_ppt, passes_kinked_patch=False, witnesses=witnesses)
+    (row,) = run([boaster], [load_property("patch.kinked")]).rows
+    assert row.unexpected == "stated to fail, but passes"
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_a_stored_case_is_judged_alike(property_id: str) -> None:
+    question, subject = load_property(property_id), load_subject("sts")
+    case = question.cases(None)[0]
+    first, second = (judge_case(question, each, subject) for each in (case, Case.from_arrays(case.to_arrays())))
+    assert measurement_of(first).values == pytest.approx(dict(measurement_of(second).values), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("property_id", BENT)
+def test_a_scene_of_the_user_has_no_such_cases(property_id: str) -> None:
+    question = load_property(property_id)
+    interface = question.cases(None)[0].interface
+    assert question.cases(interface) is None
+
+
+def test_multipliers_have_the_pressure_without_springs() -> None:
+    for outcome in judge_all("patch.curved", load_subject("mortar-lm")):
+        assert max(measurement_of(outcome).values.values()) < 2e-4
+    assert np.isfinite(load_property("patch.curved").cases(None)[0].z).all()
+
+
+def test_an_end_that_is_lost_for_want_of_a_tolerance_is_no_accusation() -> None:
+    question = load_property("patch.curved")
+    outcome = judge_case(question, question.cases(None)[0], load_subject("nts-ar:tau=0"))
+    assert outcome.verdict is Verdict.UNDECIDED
+    assert "an end of the slave" in outcome.reason

@@ -1,0 +1,106 @@
+"""The property `continuity`: jumps are found with their size and place, and smooth formulations are not accused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from strangers import SlaveNormalAtGaussPoints
+from subjects import load_subject, with_promises
+from textbook_cells import ClippedCells, WeightedGaps
+
+import contactverif_mortar
+import contactverif_nts
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import Traits
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case
+from contactverif.scenes.named_states import named_case
+from contactverif.strategies.sliding import sliding_cases
+from contactverif_properties.continuity import CONTINUITY, N_STEPS, find_jumps, measure_continuity
+
+
+def cases(examples: int) -> tuple[Case, ...]:
+    return draw_cases(sliding_cases(), seed="sliding", examples=examples).cases
+
+
+class Cloud:
+    """Gauss points of both sides repel one another by a smooth law, so that nothing ever jumps; it has no pairing."""
+
+    traits = Traits(continuity="C1", conserves_force=True)
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        x, forces = z.reshape(-1, 2), np.zeros((interface.n_nodes, 2))
+        size = interface.slave.lengths(interface.nodes).mean()
+        middles = [x[side.segments].mean(axis=1) for side in (interface.slave, interface.master)]
+        apart = (middles[0][:, None] - middles[1]) / size
+        pushes = self.penalty * size * np.exp(-(apart**2).sum(axis=-1))[..., None] * apart
+        for side, sign, axis in ((interface.slave, -1, 1), (interface.master, 1, 0)):
+            for end in (0, 1):
+                np.add.at(forces, side.segments[:, end], sign * pushes.sum(axis=axis) / 2)
+        return forces.reshape(-1)
+
+
+def test_a_smooth_formulation_without_a_pairing_is_not_accused() -> None:
+    for case in cases(12):
+        outcome = judge_case(CONTINUITY, case, Subject("cloud", Cloud))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+@pytest.mark.parametrize("make", [SlaveNormalAtGaussPoints, ClippedCells, WeightedGaps])
+def test_a_stranger_that_pushes_along_the_slave_is_continuous(make: Callable[..., Any]) -> None:
+    for case in cases(4):
+        outcome = judge_case(CONTINUITY, case, with_promises(make, continuity="C0"))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+@pytest.mark.parametrize("name", ["nts", "vts-g", "vts-ppt", "vts-ppt-balanced", "two-pass/nts-ar"])
+def test_forces_along_the_master_jump(name: str) -> None:
+    verdicts = [judge_case(CONTINUITY, case, load_subject(name)).verdict for case in cases(20)]
+    assert verdicts.count(Verdict.FAIL) >= 10
+
+
+def test_the_size_and_the_place_of_a_jump_are_found() -> None:
+    """The middle node of the slave passes the roof at 2.25 after 0.39 of its way: its force turns by both slopes."""
+    measurement = measure_continuity(named_case("sliding"), load_subject("nts"))
+    middle, roof, depth = 1.5, 2.25, 0.375 + 0.5
+    angles = np.arctan([0.5 / 1.5, -0.5 / 2.0])
+    bisector = angles.mean()
+    place = (roof + depth * np.tan(bisector) - middle) / 2
+    assert measurement.details["jumps"] == 2  # The other one is that of the last node, in a valley.
+    assert measurement.details["place of the largest jump"] == pytest.approx(place, abs=0.02)
+    assert measurement.values["jump of a force"] > 0.1
+
+
+def test_jumps_of_a_function_are_told_from_its_slope() -> None:
+    def function(place: float) -> FloatArray:
+        steep = np.sin(2 * place) / 2 + abs(place - 0.61) / 4
+        return np.array([steep + 2e-2 * (place > 0.3) - 4e-2 * (place > 0.77), place])
+
+    samples = np.array([function(place) for place in np.linspace(0, 1, N_STEPS + 1)])
+    jumps = find_jumps(function, samples, 20, 2.0**-12)
+    sizes = {round(place, 4): size for place, size in jumps if size > 1e-3}
+    assert sizes == {0.77: pytest.approx(4e-2, rel=1e-2), 0.3: pytest.approx(2e-2, rel=1e-2)}
+
+
+@pytest.mark.parametrize(
+    ("make", "promise", "quantity"),
+    [
+        (contactverif_nts.vts_ppt_balanced, "C0", "jump of a force"),
+        (contactverif_mortar.sts, "C1", "jump of a slope"),
+        (contactverif_mortar.mortar, "C1", "jump of a slope"),
+    ],
+)
+def test_a_promise_of_too_much_smoothness_is_found_out(make: Callable[..., Any], promise: str, quantity: str) -> None:
+    boaster = with_promises(make, continuity=promise)
+    reasons = [outcome.reason for case in cases(25) if (outcome := judge_case(CONTINUITY, case, boaster)).reason]
+    assert reasons
+    assert all(quantity in reason for reason in reasons)

@@ -1,0 +1,164 @@
+"""The properties `mirror`, `renumbering`, `swap`, `remote` and `symmetric`: what they accuse, and what they do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from handmade import Springs, case, over_a_node, subject
+from subjects import load_property, load_subject, with_promises
+from test_straight_slaves import RIGHT_ONES
+from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
+
+import contactverif_nts
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case
+from contactverif_properties.remote import BEHIND, FAR, REMOTE
+from contactverif_properties.renumbering import CLOSED, RENUMBERING, renumbering_cases
+from contactverif_properties.shared.relabelled import exchange_roles, mirror, renumber
+from contactverif_properties.shared.same_answer import BITS
+from contactverif_properties.symmetric import SYMMETRIC
+
+PROMISED_BY_ALL = ("mirror", "renumbering", "remote")
+EXAMPLES = 10
+STRANGERS = {
+    **RIGHT_ONES,
+    "textbook springs of second order": Subject("quadratic", QuadraticSprings),
+    "textbook nodal multipliers": Subject("multipliers", NodalMultipliers),
+}
+
+
+def cases_of(property_id: str, examples: int = EXAMPLES) -> tuple[Case, ...]:
+    return draw_cases(load_property(property_id).cases(None), seed=f"same/{property_id}", examples=examples).cases
+
+
+@pytest.mark.parametrize("property_id", PROMISED_BY_ALL)
+@pytest.mark.parametrize("name", STRANGERS)
+def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id: str) -> None:
+    for state in cases_of(property_id):
+        outcome = judge_case(load_property(property_id), state, STRANGERS[name])
+        assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), outcome.reason
+
+
+class NodalSprings(CentredSprings):
+    """Springs of equal stiffness at all points, whatever their areas: the gradient of Σ ε g²/2."""
+
+    traits = replace(CentredSprings.traits, symmetric=True, penalty="nodal", area=None)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        x = z.reshape(-1, 2)
+        forces = np.zeros_like(x)
+        for number, (_, a, b, c) in enumerate(self.points(interface)):
+            if pairing["active"][number]:
+                first, second = master = interface.master.segments[pairing["master"][number]]
+                gap, xi, normal, _ = self.look(x, a, b, c, master)
+                shares = ((a, (1 - c) / 2), (b, (1 + c) / 2), (first, xi - 1), (second, -xi))
+                for node, share in shares:
+                    forces[node] += share * self.law(gap) * normal
+        return forces.reshape(-1)
+
+
+def test_a_stranger_with_a_potential_is_not_accused() -> None:
+    for state in cases_of("symmetric"):
+        outcome = judge_case(SYMMETRIC, state, Subject("nodal", NodalSprings))
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
+    class Decides(NodalSprings):
+        """It pairs at each state anew, and names no pairing."""
+
+        traits = replace(NodalSprings.traits, takes_complex=False)
+        pair = tangent = contact_points = None
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, NodalSprings.pair(self, interface, z), z)
+
+    slave, master = [[-1.0, -0.25], [1.0, -0.25]], [[4.0, -2.0], [0.0, 0.0], [-4.0, -2.0]]
+    # The points are at ±1/√3. Now the first one is moved over the bisector of the roof.
+    nodes = np.array([*np.add(slave, [1 / np.sqrt(3), 0.0]), *master])
+    state = Case(Interface.from_chains(nodes[:2], nodes[2:]), nodes.reshape(-1), seed=1)
+    outcome = judge_case(SYMMETRIC, state, Subject("decides", Decides))
+    assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
+    beside = replace(state, z=state.z + np.array([0.25, 0, 0.25, 0, 0, 0, 0, 0, 0, 0]))
+    assert judge_case(SYMMETRIC, beside, Subject("decides", Decides)).verdict is Verdict.PASS
+
+
+def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:
+    class Half(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            forces = super().residual(interface, pairing, z)
+            forces[0] += self.penalty * z[1]
+            return forces
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            tangent = super().tangent(interface, pairing, z)
+            tangent[0, 1] = tangent[1, 0] = self.penalty / 2
+            return tangent
+
+    outcome = judge_case(SYMMETRIC, case(seed=1), subject(Half, symmetric=True, tangent="exact"))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.reason.startswith("work in a closed loop")
+
+
+@pytest.mark.parametrize("name", ["nts", "nts-ar:area=reference", "nts-lm", "two-pass/nts"])
+def test_symmetric_formulations_pass_at_roundoff(name: str) -> None:
+    for state in cases_of("symmetric", 25):
+        values = SYMMETRIC.measure(state, load_subject(name)).values
+        assert values["asymmetry of the tangent"] < 1e-14
+
+
+@pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-ppt-balanced", "sts", "mortar", "two-pass/nts", "mortar-lm"])
+def test_our_own_formulations_keep_every_bit_beside_another_body(name: str) -> None:
+    kinds = set()
+    for state in cases_of("remote", 20):
+        assert REMOTE.measure(state, load_subject(name)).details[BITS] == 0
+        kinds.add(state.kind)
+    assert kinds == {FAR, BEHIND}
+
+
+def test_on_an_exact_bisector_numbers_decide_nothing() -> None:
+    """A node below the vertex of a roof is as near to one side as to the other: the number of a segment decides."""
+    slave, master = [[0.0, -0.25], [0.5, -0.5]], [[4.0, -2.0], [0.0, 0.0], [-4.0, -2.0]]
+    nodes = np.array([*slave, *master])
+    verdicts = set()
+    for seed in range(8):
+        state = Case(Interface.from_chains(slave, master), nodes.reshape(-1), seed=seed)
+        for question in (RENUMBERING, load_property("mirror")):
+            verdicts.add(judge_case(question, state, load_subject("nts")).verdict)
+    assert verdicts <= {Verdict.PASS, Verdict.UNDECIDED}
+    assert Verdict.UNDECIDED in verdicts
+
+
+def test_half_of_the_renumbered_meshes_are_closed_rings_with_another_seam() -> None:
+    cases = draw_cases(renumbering_cases(), seed="seam", examples=20).cases
+    closed = [state for state in cases if state.kind == CLOSED]
+    assert len(closed) == 10
+    for state in closed:
+        assert (state.interface.slave.neighbours >= 0).all()
+        assert (state.interface.master.neighbours >= 0).all()
+
+
+def test_a_relabelled_case_is_the_same_part() -> None:
+    state = over_a_node(0.25)
+    other, carry = renumber(state, np.array([1, 0, 4, 2, 3]), np.array([0]), np.array([1, 0]))
+    assert other.positions[carry.nodes].tolist() == state.positions.tolist()
+    assert other.interface.master.segments.tolist() == [[2, 3], [4, 2]]
+    image, carry = mirror(state)
+    assert image.positions.tolist() == (state.positions * [-1, 1]).tolist()
+    assert image.interface.slave.segments.tolist() == [[1, 0]]
+    exchanged, carry = exchange_roles(state)
+    assert exchanged.positions[carry.nodes].tolist() == state.positions.tolist()
+    assert exchanged.interface.n_slave_nodes == 3
+
+
+def test_a_promise_to_be_unbiased_is_found_out() -> None:
+    boaster = with_promises(contactverif_nts.nts_ar, unbiased=True)
+    verdicts = [judge_case(load_property("swap"), state, boaster).verdict for state in cases_of("swap")]
+    assert verdicts.count(Verdict.FAIL) >= 5

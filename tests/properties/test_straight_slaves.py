@@ -1,0 +1,117 @@
+"""The properties of straight slaves: `patch.tilted.*` and `locality.bend`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from gauss_springs import RIGHT, GaussSprings
+from strangers import STRANGERS
+from subjects import Changed, load_property, load_subject
+from textbook_cells import ClippedCells, WeightedGaps
+from textbook_springs import CentredSprings
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run.driver import draw_cases
+from contactverif.run.runner import judge_case
+from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
+from contactverif_properties.shared.same_answer import BITS
+
+IDS = ("patch.tilted.resultant", "patch.tilted.nodal", "locality.bend")
+EXAMPLES = 15
+
+
+def with_traits(make: Any, **traits: Any) -> Subject:
+    def make_changed(*, penalty: float) -> Any:
+        inner = make(penalty=penalty)
+        return Changed(inner, traits=replace(inner.traits, **traits))
+
+    return Subject("stranger", make_changed)
+
+
+MASTER = {"force_along": "master normal", "local": True}
+SLAVE = {"force_along": "slave normal", "local": True}
+RIGHT_ONES = {
+    **{
+        name: with_traits(make, **(SLAVE if make.traits.gap == "slave normal" else MASTER))
+        for name, make in STRANGERS.items()
+    },
+    **{
+        f"Gauss springs, {name}": with_traits(
+            partial(GaussSprings, way=way, before=before),
+            gap="closest point",
+            integrates_linear_gap=True,
+            translation_stable=True,
+            **MASTER,
+        )
+        for name, (way, before) in RIGHT.items()
+    },
+    "textbook springs about the mean of all nodes": with_traits(CentredSprings, integrates_linear_gap=True, **MASTER),
+    "textbook cells": with_traits(ClippedCells, integrates_linear_gap=True, **SLAVE),
+    "textbook mortar": with_traits(WeightedGaps, **SLAVE),
+}
+
+
+def cases_of(property_id: str, examples: int = EXAMPLES) -> tuple[Case, ...]:
+    return draw_cases(load_property(property_id).cases(None), seed=f"straight/{property_id}", examples=examples).cases
+
+
+@pytest.mark.parametrize("property_id", IDS)
+@pytest.mark.parametrize("name", RIGHT_ONES)
+def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id: str) -> None:
+    question, subject = load_property(property_id), RIGHT_ONES[name]
+    if question.promise(subject.traits) is None:
+        return
+    for case in cases_of(property_id):
+        outcome = judge_case(question, case, subject)
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
+def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:
+    for case in cases_of("patch.tilted.resultant", 60):
+        master, slave = directions(case)
+        assert 0.05 < np.arccos(float(master @ slave)) < 0.61
+        assert (node_gaps(case) < 0).all()
+        n, points = case.interface.n_slave_nodes, case.positions
+        heights = (points[:n] - points[0]) @ slave, (points[n:] - points[n]) @ master
+        for side in heights:
+            assert np.ptp(side) <= 2.0**-50 * case.largest_coordinate
+
+
+def tilted_segment() -> Case:
+    """One slave segment from (0, −1) to (4, −4) below a master on the x-axis: gaps −1 and −4, length 5."""
+    nodes = np.array([[0.0, -1.0], [4.0, -4.0], [16.0, 0.0], [-16.0, 0.0]])
+    interface = Interface.from_chains(nodes[:2] * [1, 0], nodes[2:])
+    return Case(interface, nodes.reshape(-1), penalty=2.0)
+
+
+def test_the_exact_forces_are_those_of_a_hand_calculation() -> None:
+    case, traits = tilted_segment(), load_subject("vts-g").traits
+    assert exact_slave_forces(case, traits) == pytest.approx(np.array([[0, 10.0], [0, 15.0]]))
+    # Along the slave's normal, with cosine 4/5, gaps are 5/4 as long.
+    assert exact_slave_forces(case, load_subject("sts").traits) == pytest.approx(
+        1.25 * np.array([[6.0, 8.0], [9.0, 12.0]])
+    )
+    reference = load_subject("nts-ar:area=reference").traits
+    assert exact_slave_forces(case, reference).sum(axis=0) == pytest.approx([0, 20.0])
+
+
+def test_a_force_along_the_other_normal_is_told_by_its_direction() -> None:
+    question = load_property("patch.tilted.resultant")
+    outcome = judge_case(question, tilted_segment(), with_traits(ClippedCells, force_along="master normal"))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.reason.startswith("part of the force off the normal 0.6")
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "vts-ppt-balanced", "sts", "mortar", "two-pass/nts", "nts-lm"])
+def test_our_own_formulations_keep_every_bit_beside_a_bend(name: str) -> None:
+    for case in cases_of("locality.bend"):
+        measurement = load_property("locality.bend").measure(case, load_subject(name))
+        assert measurement.details[BITS] == 0
+        assert not measurement.idle

@@ -1,0 +1,118 @@
+"""The exact fields of the wavy half-planes satisfy the equations of elasticity, and the scene is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.mechanics.bulk import elasticity
+from contactverif.scenes.wavy import (
+    LOWER,
+    UPPER,
+    WavyProblem,
+    wavy_displacements,
+    wavy_pressure,
+    wavy_profile,
+    wavy_scene,
+    wavy_stresses,
+)
+
+STEP = 1e-30
+BODIES = pytest.mark.parametrize("body", [UPPER, LOWER])
+PROBLEM = WavyProblem(height=1.5, mean=3e-6, wave=2e-6, penalty=7.0)
+
+
+def _places(body: int) -> FloatArray:
+    random = np.random.default_rng(1)
+    into = 1 if body == UPPER else -1
+    return np.column_stack([random.uniform(0, 4, 50), into * random.uniform(0.05, 1.4, 50)])
+
+
+def _gradient(field: Callable[[FloatArray], FloatArray], places: FloatArray) -> FloatArray:
+    """Return ∂field_i/∂x_j (n, components, 2) by complex steps."""
+    columns = [field(places + 1j * STEP * np.eye(2)[direction]).imag / STEP for direction in (0, 1)]
+    return np.stack(columns, axis=-1)
+
+
+@BODIES
+def test_stresses_are_in_equilibrium(body: int) -> None:
+    gradient = _gradient(lambda x: wavy_stresses(PROBLEM, body, x), _places(body))
+    size = PROBLEM.wave * PROBLEM.wave_number
+    np.testing.assert_allclose((gradient[:, 0, 0] + gradient[:, 2, 1]) / size, 0, atol=1e-14)
+    np.testing.assert_allclose((gradient[:, 2, 0] + gradient[:, 1, 1]) / size, 0, atol=1e-14)
+
+
+@BODIES
+def test_stresses_follow_from_displacements_by_hookes_law(body: int) -> None:
+    places = _places(body)
+    gradient = _gradient(lambda x: wavy_displacements(PROBLEM, body, x), places)
+    strain = np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1)
+    material = elasticity(wavy_scene(PROBLEM).bodies[body])
+    np.testing.assert_allclose(
+        strain @ material / PROBLEM.wave, wavy_stresses(PROBLEM, body, places) / PROBLEM.wave, atol=1e-13
+    )
+
+
+def test_both_bodies_press_on_one_another_with_the_pressure_and_without_friction() -> None:
+    x = np.linspace(0, 4, 41)
+    for body in (UPPER, LOWER):
+        stresses = wavy_stresses(PROBLEM, body, np.column_stack([x, 0 * x]))
+        np.testing.assert_allclose(-stresses[:, 1], wavy_pressure(PROBLEM, x), rtol=1e-14)
+        assert not stresses[:, 2].any()
+
+
+@pytest.mark.parametrize("penalty", [0.5, 7.0, np.inf])
+@pytest.mark.parametrize("amplitude", [0.0, 1e-4])
+def test_the_gap_that_is_left_is_the_pressure_over_the_penalty(penalty: float, amplitude: float) -> None:
+    problem = replace(PROBLEM, penalty=penalty, amplitude=amplitude)
+    x = np.linspace(0, 4, 41)
+    flat = np.column_stack([x, 0 * x])
+    heights = [
+        wavy_profile(problem, body) * np.cos(problem.wave_number * x) + wavy_displacements(problem, body, flat)[:, 1]
+        for body in (UPPER, LOWER)
+    ]
+    gap = heights[UPPER] - heights[LOWER]
+    np.testing.assert_allclose(gap, -wavy_pressure(problem, x) / penalty, rtol=1e-9, atol=1e-15 * (amplitude + 1e-5))
+    wave = (heights[UPPER] + heights[LOWER]) / 2
+    np.testing.assert_allclose(
+        wave - wave.mean(), amplitude * (np.cos(problem.wave_number * x) - 1 / 41), atol=1e-14 * (amplitude + 1e-5)
+    )
+
+
+@BODIES
+def test_sides_are_planes_of_symmetry(body: int) -> None:
+    y = (1 if body == UPPER else -1) * np.linspace(0, 1.5, 7)
+    for x in (0.0, 4.0):
+        places = np.column_stack([np.full(7, x), y])
+        assert np.abs(wavy_displacements(PROBLEM, body, places)[:, 0]).max() < 1e-15 * PROBLEM.wave
+        assert np.abs(wavy_stresses(PROBLEM, body, places)[:, 2]).max() < 1e-14 * PROBLEM.wave
+
+
+@BODIES
+def test_the_far_edge_moves_with_the_exact_field(body: int) -> None:
+    scene = wavy_scene(PROBLEM, 2)
+    nodes = scene.bodies[body].nodes
+    far = np.flatnonzero(np.abs(np.abs(nodes[:, 1]) - PROBLEM.height) < 1e-12)
+    assert len(far) in (13, 17)
+    assert scene.bodies[body].fixed[far].all()
+    exact = wavy_displacements(PROBLEM, body, nodes[far])
+    np.testing.assert_allclose(scene.bodies[body].imposed[far], exact, atol=1e-14 * PROBLEM.approach)
+
+
+@pytest.mark.parametrize("refine", [1, 2, 4, 8, 16])
+def test_nodes_of_the_two_surfaces_meet_at_the_sides_only(refine: int) -> None:
+    x = wavy_scene(WavyProblem(), refine).interface.nodes[:, 0]
+    upper, lower = x[1 : 6 * refine], np.sort(x[6 * refine + 1 :])[1:-1]
+    assert np.abs(upper[:, None] - lower).min() * refine > 1e-3
+    assert (len(upper), len(lower)) == (6 * refine - 1, 8 * refine - 1)
+
+
+def test_either_body_may_be_the_slave() -> None:
+    scene = wavy_scene(PROBLEM, 1, LOWER)
+    assert scene.slave == (LOWER,)
+    assert len(scene.interface.slave) == 8
+    assert wavy_scene(PROBLEM, 1, LOWER) is scene
