@@ -13,6 +13,8 @@ from contactverif.run.registry import load_formulations
 
 _COLUMNS = {
     "passes_flat_patch": "flat patch test",
+    "passes_normal_patch": "node on node",
+    "passes_single_patch": "nodes on midpoints",
     "covers_overhang": "overhang",
     "tangent": "tangent",
     "symmetric": "symmetric",

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterable
 from dataclasses import fields
+from functools import partial
+from importlib import import_module
+from importlib.metadata import entry_points
 from itertools import combinations
 from pathlib import Path
 
@@ -14,15 +18,29 @@ from contactverif import Property, Quantity, Traits
 
 _VALUES = {
     "passes_flat_patch": (True,),
+    "passes_normal_patch": (True,),
+    "passes_single_patch": (True,),
     "covers_overhang": (True,),
     "tangent": ("exact",),
     "symmetric": (True,),
     "conserves_force": (True,),
     "conserves_moment": (True,),
     "continuity": ("C0",),
-    "area": ("current",),
-    "penalty": ("distributed",),
+    "area": ("current", "reference"),
+    "penalty": ("distributed", "nodal"),
+    "enforcement": ("multiplier",),
+    "passes_kinked_patch": (True,),
+    "converges": (True,),
+    "inf_sup": (True,),
+    "locks": (False,),
+    "integrates_linear_gap": (True,),
+    "force_along": ("master normal", "slave normal"),
+    "local": (True,),
+    "unbiased": (True,),
+    "nodes_push": (True,),
+    "translation_stable": (True,),
     "independent_multipliers": (True,),
+    "published_forces": ({"a1": "1 2 1; 2 2"},),
 }
 
 
@@ -30,22 +48,23 @@ def promised_by(question: Property) -> str:
     """Return in words which traits promise that the property passes; each small set of traits is tried."""
     if question.promise(Traits()):
         return "every formulation, whatever its traits say"
-    singles = {name: values[0] for name, values in _VALUES.items() if name in {field.name for field in fields(Traits)}}
+    names = {field.name for field in fields(Traits)}
+    singles = [(name, value) for name, values in _VALUES.items() if name in names for value in values]
     for size in (1, 2):
-        hits = [set(names) for names in combinations(singles, size) if _promises(question, names, singles)]
+        hits = [dict(hit) for hit in combinations(singles, size) if len(dict(hit)) == size and _promises(question, hit)]
         if hits:
-            return " or ".join(" with ".join(f"`{name}={singles[name]!r}`" for name in sorted(hit)) for hit in hits)
+            return " or ".join(" with ".join(f"`{name}={hit[name]!r}`" for name in sorted(hit)) for hit in hits)
     return "no trait"
 
 
-def _promises(question: Property, names: tuple[str, ...], values: dict[str, object]) -> bool:
-    traits = Traits(**{name: values[name] for name in names})  # type: ignore[arg-type]
-    return bool(question.promise(traits))
+def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
+    return bool(question.promise(Traits(**dict(values))))  # type: ignore[arg-type]
 
 
 def property_page(question: Property) -> str:
     """Return the page of one property."""
-    parts = docstring_parts(question.measure)
+    measure = question.measure.func if isinstance(question.measure, partial) else question.measure
+    parts = docstring_parts(measure)
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     facts = [
@@ -75,8 +94,12 @@ def property_page(question: Property) -> str:
 
 
 def _answers(question: Property) -> list[str]:
-    """Return the paragraphs about question, reason, judgement and undecided cases that begin a property's file."""
-    text = inspect.getdoc(inspect.getmodule(question.measure)) or ""
+    """Return the paragraphs about question, reason, judgement and undecided cases that begin a property's file.
+
+    The file is the one that the entry point names: `measure` may be shared by several properties.
+    """
+    entry, *_ = entry_points(group="contactverif.properties", name=question.id)
+    text = inspect.getdoc(import_module(entry.module)) or ""
     if "**Question.**" not in text:
         return []
     answers = []

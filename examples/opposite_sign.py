@@ -1,0 +1,29 @@
+"""Turn all signs of a right formulation round, and see what the harness says first.
+
+The residual is internal minus external force, so minus the residual pushes a slave node along the master's outward
+normal. A first plugin often has it the other way round. The harness sees that before it asks any property.
+"""
+
+from contactverif import Subject, Traits, load_formulation, load_properties, verify
+
+right = load_formulation("nts-ar")
+
+
+class Negated:
+    traits = Traits(penalty="distributed")
+
+    def __init__(self, *, penalty):
+        self.inner = right.with_penalty(penalty)
+
+    def pair(self, interface, z):
+        return self.inner.pair(interface, z)
+
+    def residual(self, interface, pairing, z):
+        return -self.inner.residual(interface, pairing, z)
+
+
+run = verify([Subject("negated", Negated)], load_properties(["balance.*", "unilateral"]), examples=20, seed=1)
+print("forces of the opposite sign:", *run.opposite_signs)
+for row in run.rows:
+    print(f"{row.property_id}: {row.result}", row.reason, sep="\n    " if row.reason else "")
+print("every promise is kept" if run.promises_kept else "the run fails")
