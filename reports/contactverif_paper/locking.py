@@ -114,7 +114,7 @@ def statements(result: Locking) -> tuple[Statement, ...]:
             f"{abs(drift[formulations.MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
             f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
             Agreement.SILENT,
-            "locking",
+            "locking-stiff",
         ),
     )
 
