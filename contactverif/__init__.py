@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
-    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly, Traits
+    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly
     from contactverif.contract.interface import Interface, Surface
     from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
+    from contactverif.contract.traits import Traits
     from contactverif.mechanics.bulk import body_from_mesh
     from contactverif.mechanics.newton import End, Trace, solve
     from contactverif.mechanics.scene import Scene
@@ -41,11 +42,12 @@ _HOMES = {
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
-    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly", "Traits"),
+    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly"),
     "contract.interface": ("Interface", "Surface"),
     "contract.property": ("Measurement", "Outcome", "Property", "Quantity", "Verdict"),
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
+    "contract.traits": ("Traits",),
     "mechanics.bulk": ("body_from_mesh",),
     "mechanics.newton": ("End", "Trace", "solve"),
     "mechanics.scene": ("Scene",),

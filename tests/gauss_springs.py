@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 
 C = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # The places of the Gauss points on a slave segment
 TRAITS = Traits(area="current", penalty="distributed", tangent="exact", batched=True, takes_longdouble=True)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.traits import Traits
 
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 

@@ -43,11 +43,11 @@ from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle import projection_cases
 from contactverif.run.registry import load_properties, property_ids, standalone_names
 from contactverif.run.runner import judge_case, run

@@ -8,10 +8,10 @@ from rich.table import Table
 from rich.text import Text
 
 from contactverif.cli.console import plain_table
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import Wrapper
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)

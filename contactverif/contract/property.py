@@ -17,8 +17,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.case_summary import CaseSummary
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 
 LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says little.
 # With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the

@@ -17,8 +17,9 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
@@ -71,9 +72,7 @@ class Subject:
             raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`")
         traits = _call_plugin("traits", getattr, plugin, "traits", Traits())
         if not isinstance(traits, Traits):
-            raise ContractError(
-                f"traits: found a {type(traits).__name__}; needed contactverif.contract.formulation.Traits"
-            )
+            raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.contract.traits.Traits")
         self.traits: Traits = traits
         self.provides = frozenset(
             part for part in OPTIONAL_PARTS if callable(_call_plugin(part, getattr, plugin, part, None))

@@ -15,9 +15,10 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
+from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.option_checks import choose
+from contactverif.contract.traits import Traits
 from contactverif_nts.patch_test_passing import PatchTestPassing, vts_ppt, vts_ppt_balanced
 from contactverif_nts.point_contact import PointContact, nts, vts_me
 

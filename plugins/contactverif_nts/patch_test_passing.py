@@ -25,10 +25,11 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
-from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
+from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, box3_tangent, walk

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Property, Quantity
+from contactverif.contract.traits import Traits
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.wave_study import (

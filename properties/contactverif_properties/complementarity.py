@@ -20,9 +20,9 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import System, solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.strategies.solids import solid_cases

@@ -26,9 +26,9 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.roundoff import ratio, rounding_distance, segment_tolerance, sum_slave_forces

@@ -24,9 +24,9 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights
 from contactverif.strategies import overhung_cases
 from contactverif_properties.shared.applicability import refuse_barrier

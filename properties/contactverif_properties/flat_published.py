@@ -24,10 +24,10 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.scenes.named_states import FLAT_NAMES, named_case
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import Cases, unless_given

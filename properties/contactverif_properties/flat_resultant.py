@@ -23,9 +23,9 @@ from dataclasses import replace
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies import flat_cases
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.kinks import explain_by_kink

@@ -25,9 +25,9 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of

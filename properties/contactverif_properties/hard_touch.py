@@ -25,9 +25,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.scenes.touching_states import touching_states
 from contactverif_properties.shared.finite_lists import unless_given
 

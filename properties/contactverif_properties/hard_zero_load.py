@@ -22,9 +22,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.scenes.hard_scenes import unloaded_scenes

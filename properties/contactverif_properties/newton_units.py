@@ -25,9 +25,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics import linear
 from contactverif.mechanics.changed_scenes import change_units
 from contactverif.mechanics.newton import End, System, Trace, solve

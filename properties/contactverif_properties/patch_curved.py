@@ -39,9 +39,9 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.scenes.shrink_fit import FiniteFit, Role, ShrinkFit, rings_of, shrink_fit
 from contactverif_properties.flat_resultant import refuse_unknown_total
 from contactverif_properties.shared.accuracy import (

@@ -24,9 +24,10 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_choices import DEEP
 from contactverif_properties.shared.exact_places import (
     CLOSEST,

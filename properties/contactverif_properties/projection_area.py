@@ -29,9 +29,10 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_points import Lattice
 from contactverif_properties.shared.applicability import refuse_barrier

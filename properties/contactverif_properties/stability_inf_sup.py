@@ -30,9 +30,9 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.inf_sup import inf_sup_constant
 from contactverif.scenes.refined_blocks import refinement_cases, refinements
 from contactverif_properties.shared.applicability import refuse_unstated_penalty, refuse_without_multipliers

@@ -36,10 +36,11 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif_properties.shared.any_state import move_state

@@ -36,9 +36,9 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.scenes.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.finite_lists import unless_given

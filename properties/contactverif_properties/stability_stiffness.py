@@ -26,10 +26,11 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
 from contactverif.scenes.blocks import exact_unknowns, pressure_of

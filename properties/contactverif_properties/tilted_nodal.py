@@ -18,9 +18,9 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies.straight import tilted_cases
 from contactverif_properties.shared.linear_gaps import (
     exact_slave_forces,

@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from contactverif.contract.errors import ContractError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.published_forces import format_forces, parse_forces
+from contactverif.contract.traits import Traits
 
 
 def test_text_becomes_fractions_and_text_again() -> None:

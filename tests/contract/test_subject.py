@@ -12,9 +12,10 @@ from scipy import sparse
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.formulation import ContactPoints, Pairing, Traits
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.named_states import named_case
 

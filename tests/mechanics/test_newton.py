@@ -15,9 +15,9 @@ from scipy import sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError, PluginError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics import bulk
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.newton import End, System, Trace, solve

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import Traits
+from contactverif.contract.traits import Traits
 
 
 class PointSprings:

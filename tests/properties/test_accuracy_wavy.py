@@ -12,9 +12,9 @@ from subjects import load_subject
 from wave_strangers import Heights
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.runner import judge_case
 from contactverif.scenes.wavy import LOWER, UPPER
 from contactverif_properties.accuracy_wavy import ACCURACY_WAVY

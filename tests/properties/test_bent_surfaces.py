@@ -12,9 +12,9 @@ from subjects import Changed, load_property, load_subject, with_promises
 import contactverif_mortar
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.runner import judge_case, run
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")

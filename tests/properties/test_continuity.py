@@ -15,9 +15,9 @@ import contactverif_mortar
 import contactverif_nts
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case
 from contactverif.scenes.named_states import named_case

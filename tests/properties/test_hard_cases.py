@@ -13,9 +13,9 @@ from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import property_ids
 from contactverif.run.runner import judge_case, run
 from contactverif_properties.hard_dead_zone import covered_share

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, subject
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Property, Verdict
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes.named_states import named_case

@@ -11,9 +11,9 @@ from subjects import Changed, load_subject
 
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case
 from contactverif.strategies.solids import solid_cases

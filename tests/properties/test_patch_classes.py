@@ -18,10 +18,10 @@ from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.catalogue import load_scene_case

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from handmade import case
 
-from contactverif.contract.formulation import Traits
+from contactverif.contract.traits import Traits
 from contactverif_properties.shared import roundoff
 
 U = 2.0**-53

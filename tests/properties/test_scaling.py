@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from handmade import Springs, case, subject
 
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
+from contactverif.contract.traits import Traits
 from contactverif.run.runner import judge_case, run
 from contactverif_properties.scaling import FORCES, SCALING, TANGENT, measure_scaling
 

@@ -16,9 +16,9 @@ from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, single_
 from subjects import load_subject
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
 from contactverif_properties.shared.any_state import move_state

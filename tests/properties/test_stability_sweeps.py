@@ -10,9 +10,9 @@ import pytest
 from gauss_springs import RIGHT, WRONG, springs_of
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.run.registry import load_formulation

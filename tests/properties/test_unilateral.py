@@ -10,11 +10,12 @@ import pytest
 from subjects import load_subject
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing, Traits
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.named_states import named_case

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.traits import Traits
 
 STEP = 1e-40  # The complex step: no difference is formed, so any step will do.
 

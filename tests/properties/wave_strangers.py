@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints, Traits
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.traits import Traits
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(2)
 

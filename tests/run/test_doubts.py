@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Property, PropertyInfo, Quantity, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import run
 from contactverif.scenes.named_states import named_case

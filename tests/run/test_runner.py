@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.run import runner
 from contactverif.run.runner import PROFILES, Progress, judge_case, run
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 from hypothesis import strategies as st
 from contactverif.run import registry
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
+from contactverif.contract.traits import Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
 

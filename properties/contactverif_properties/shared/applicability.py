@@ -5,7 +5,7 @@ Each function returns an empty string where the question can be asked, and else 
 
 from __future__ import annotations
 
-from contactverif.contract.formulation import Traits
+from contactverif.contract.traits import Traits
 
 
 def refuse_barrier(traits: Traits) -> str:

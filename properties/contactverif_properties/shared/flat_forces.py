@@ -16,9 +16,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif_properties.shared.roundoff import ratio
 from contactverif_properties.shared.uniform_pressure import forces_of_gap, forces_of_penetration, unit_forces
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import has_bodies
 from contactverif_properties.shared.flat_forces import FLAT_QUANTITIES, exact_forces, measure_flat
 from contactverif_properties.shared.solved_patch import MULTIPLIERS, QUANTITIES, forces_to_draw, measure_once

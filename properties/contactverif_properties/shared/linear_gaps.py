@@ -13,8 +13,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.uniform_pressure import unit_forces
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Measurement
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.oracle import is_of_class
 from contactverif.strategies.solids import block_cases
 from contactverif_properties.shared.finite_lists import Cases

@@ -14,8 +14,8 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Traits
 from contactverif.contract.property import Quantity
+from contactverif.contract.traits import Traits
 
 GAP_TOLERANCE = "u(8X/|g| + 4N)"
 GAP_REASON = "A gap is a difference of coordinates, each rounded to uX, and N forces are summed."
