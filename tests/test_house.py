@@ -51,7 +51,7 @@ REPORTS = ("reports", "reports.netcdf", "reports.draw", "reports.html", "reports
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
-    "geometry": Room(("contract",), ("numpy", "numba"), QUIET),
+    "geometry": Room(("contract",), ("numpy", "numba", "scipy.sparse"), QUIET),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
     "meshes": Room(("contract",), ("numpy", "meshio")),
