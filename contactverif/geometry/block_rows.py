@@ -18,7 +18,7 @@ Rules for the next editor:
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.compiled import compile_kernel
 
 NumberArray = NDArray[np.int32]
+AnyIntArray = NDArray[Any]  # int32 or int64
 _MOST = np.iinfo(np.int32).max  # The largest number of entries that scipy numbers by int32.
 
 
@@ -63,7 +64,7 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> spars
     members, member_starts = _couplings_of_columns(n_nodes + n_multipliers, nodes, starts, first_row)
     indptr = _row_starts(n_nodes, size, nodes, starts, first_row, members, member_starts)
     n_entries = int(indptr[-1])
-    number = np.int32 if n_entries <= _MOST else np.int64
+    number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indices = np.empty(n_entries, dtype=number)
     _write_columns(indices, n_nodes, indptr, nodes, starts, first_row, members, member_starts)
     matrix = sparse.csr_array((np.zeros(n_entries), indices, indptr.astype(number)), shape=(size, size))
@@ -102,7 +103,7 @@ def _row_starts(
 ) -> IntArray:
     """Return where the entries of each row begin (size + 1,)."""
     n_numbers = len(member_starts) - 1
-    last_column = np.full(n_numbers, -1, dtype=np.int32)  # the last column that a row has met
+    last_column = np.full(n_numbers, -1, dtype=np.int32)  # The last column that each row has met.
     indptr = np.zeros(size + 1, dtype=np.int64)
     for column in range(n_numbers):
         width = 2 if column < n_nodes else 1
@@ -122,7 +123,7 @@ def _row_starts(
 
 @compile_kernel
 def _write_columns(
-    indices: IntArray,
+    indices: AnyIntArray,
     n_nodes: int,
     indptr: IntArray,
     nodes: NumberArray,
@@ -134,7 +135,7 @@ def _write_columns(
     """Write the columns of all rows. Columns are met in ascending order, so they are sorted as they stand."""
     n_numbers = len(member_starts) - 1
     last_column = np.full(n_numbers, -1, dtype=np.int32)
-    ends = np.empty(n_numbers, dtype=np.int64)  # where the next column of a row belongs
+    ends = np.empty(n_numbers, dtype=np.int64)  # The place of the next column of each row.
     for row in range(n_numbers):
         ends[row] = indptr[_first_unknown(row, n_nodes)]
     for column in range(n_numbers):
@@ -163,7 +164,7 @@ def _first_unknown(number: int, n_nodes: int) -> int:
 
 
 @compile_kernel
-def find_place(indices: IntArray, first: int, last: int, column: int) -> int:
+def find_place(indices: AnyIntArray, first: int, last: int, column: int) -> int:
     """Return where a column stands among the ascending columns indices[first:last] of a row; it must be there."""
     count = last - first
     while count > 1:
@@ -176,7 +177,7 @@ def find_place(indices: IntArray, first: int, last: int, column: int) -> int:
 @compile_kernel
 def add_block(
     indptr: IntArray,
-    indices: IntArray,
+    indices: AnyIntArray,
     data: FloatArray,
     row: int,
     column: int,
@@ -197,7 +198,7 @@ def add_block(
 
 @compile_kernel
 def add_row(
-    indptr: IntArray, indices: IntArray, data: FloatArray, unknown: int, column: int, x: float, y: float
+    indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, unknown: int, column: int, x: float, y: float
 ) -> None:
     """Add (x, y) to the row of the multiplier with this unknown and the columns of the node `column`."""
     place = find_place(indices, indptr[unknown], indptr[unknown + 1], 2 * column)
@@ -207,7 +208,7 @@ def add_row(
 
 @compile_kernel
 def add_column(
-    indptr: IntArray, indices: IntArray, data: FloatArray, row: int, unknown: int, x: float, y: float
+    indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, unknown: int, x: float, y: float
 ) -> None:
     """Add (x, y) to the rows of the node `row` and the column of the multiplier with this unknown."""
     first, second = indptr[2 * row], indptr[2 * row + 1]
@@ -217,6 +218,6 @@ def add_column(
 
 
 @compile_kernel
-def add_entry(indptr: IntArray, indices: IntArray, data: FloatArray, row: int, column: int, value: float) -> None:
+def add_entry(indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, column: int, value: float) -> None:
     """Add a number to one entry, whose row and column are unknowns."""
     data[find_place(indices, indptr[row], indptr[row + 1], column)] += value
