@@ -37,20 +37,15 @@ from math import inf, pi
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.arrays import BoolArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
+from contactverif.scenes.ring_errors import ring_force_error
 from contactverif.scenes.shrink_fit import FiniteFit, Role, ShrinkFit, rings_of, shrink_fit
 from contactverif_properties.flat_resultant import refuse_unknown_total
-from contactverif_properties.shared.accuracy import (
-    Solution,
-    force_error,
-    shape_integrals,
-    solve_for_accuracy,
-    traction_forces,
-)
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.passes import nearest_sum
@@ -112,7 +107,7 @@ def measure_rings(case: Case, subject: Subject) -> Measurement:
             return Measurement({}, {}, f"Newton's method: {solution.trace.end.label} at refine = {refine}")
         undecided = undecided or _lost_end(solution)
         means.append(_mean_errors(solution, fit, slave))
-        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": _nodal_error(solution, fit, slave)}
+        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": ring_force_error(solution, fit, slave)}
     coarse, fine = means
     details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf
     values = {SLAVE.name: _extrapolate(coarse.slave, fine.slave), MASTER.name: _extrapolate(coarse.master, fine.master)}
@@ -141,20 +136,6 @@ def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role) -> Means:
     if points is not None:
         reported = nearest_sum(points, float(radial[:n_slave].sum())) / exact - 1
     return Means(float(radial[:n_slave].sum() / exact - 1), float(-radial[n_slave:].sum() / exact - 1), reported)
-
-
-def _nodal_error(solution: Solution, fit: FiniteFit, slave: Role) -> float:
-    """Return the error E_F of the slave's nodal forces against those of the exact pressure on the current slave."""
-    towards = -fit.pressure if slave == "inner" else fit.pressure
-
-    def traction(places: FloatArray) -> FloatArray:
-        pressures: FloatArray = towards * places / np.linalg.norm(places, axis=1)[:, None]
-        return pressures
-
-    surface, positions = solution.interface.slave, solution.state.positions
-    exact = traction_forces(surface, positions, traction)
-    # The ends of a quarter are held across their line of symmetry, and bear what contact does there.
-    return force_error(solution.forces, exact, shape_integrals(surface, positions))
 
 
 def _extrapolate(coarse: float, fine: float) -> float:

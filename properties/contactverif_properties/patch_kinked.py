@@ -38,9 +38,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.mechanics.scene import Scene
 from contactverif.scenes.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
-from contactverif_properties.shared.accuracy import solve_for_accuracy
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details

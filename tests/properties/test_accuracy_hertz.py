@@ -13,8 +13,8 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
 from contactverif.run.runner import judge_case
 from contactverif.scenes.hertz_box import COARSEST, HertzBox, exact_forces
+from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
 from contactverif_properties.accuracy_hertz import ACCURACY_HERTZ, LIMITS, MESHES, PENALTIES, hertz_cases
-from contactverif_properties.shared.hertz_study import HertzStudy, hertz_errors
 
 CASES = {case.name: case for case in hertz_cases()}
 

@@ -5,14 +5,14 @@ refined. In two more studies one of the meshes is four times finer than the othe
 the finer ones are made here. Each scene has the exact field of its own penalty, so that the errors are those of the
 meshes alone.
 
-Rule for the next editor: the exact field is in `contactverif.scenes.wavy`, the errors are those of `accuracy`. Bounds
-belong to the properties, with the measurements that they come from.
+Rule for the next editor: the exact field is in `contactverif.scenes.wavy`, the errors are those of
+`contactverif.scenes.wavy_errors`. Bounds belong to the properties, with the measurements that they come from.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from itertools import product
 from math import inf, sqrt
 
@@ -23,25 +23,22 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 from contactverif.contract.property import Measurement
 from contactverif.contract.subject import Subject
+from contactverif.mechanics.accuracy import fit_rate, solve_for_accuracy
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.wavy import COLUMNS, LOWER, UPPER, WavyProblem, wavy_displacements, wavy_pressure, wavy_scene
-from contactverif_properties.shared.accuracy import (
-    Solution,
-    displacement_error,
-    fit_rate,
-    force_error,
-    pressure_error,
-    shape_integrals,
-    solve_for_accuracy,
-    traction_forces,
+from contactverif.scenes.wavy import COLUMNS, LOWER, UPPER, WavyProblem, wavy_scene
+from contactverif.scenes.wavy_errors import (
+    MASTER_FORCES,
+    MASTER_MOTION,
+    PRESSURE,
+    SLAVE_FORCES,
+    SLAVE_MOTION,
+    wavy_errors,
+    wavy_forces,
 )
 
 MESHES = (1, 2, 4, 8)  # The refinements r of the study.
 # The cells along both surfaces where one mesh is four times finer, and r. No inner node meets a node for these r.
 CONTRAST_COLUMNS, CONTRAST_MESHES = (4, 1), (6, 9, 13, 18)
-SLAVE_FORCES, MASTER_FORCES = "slave force error", "master force error"
-SLAVE_MOTION, MASTER_MOTION = "slave displacement error", "master displacement error"
-PRESSURE = "pressure error"
 SERIES = dict.fromkeys((SLAVE_FORCES, MASTER_FORCES, SLAVE_MOTION, MASTER_MOTION, PRESSURE), "1")
 
 FORCE_RATE, MOTION_RATE, PRESSURE_RATE = "rate of forces", "rate of displacements", "rate of pressures"
@@ -162,7 +159,7 @@ def measure_study(case: Case, subject: Subject, bounds: dict[str, float]) -> Mea
         iterations = solution.trace.n_iterations
         if not solution.balanced and not failures:
             failures = f"Newton's method finds no solution on mesh {refine}: {solution.trace.end.label}"
-        errors.append(study_errors(solution, study, study.problem(refine, multipliers=multipliers)))
+        errors.append(wavy_errors(solution, study.problem(refine, multipliers=multipliers), study.slave))
     measurement = _fit_rates(study, errors, bounds)
     return replace(measurement, undecided=failures, details={"iterations": float(iterations)})
 
@@ -185,34 +182,6 @@ def _fit_rates(study: WaveStudy, errors: list[dict[str, float]], bounds: dict[st
     return Measurement(values, tolerances, series=series)
 
 
-def study_errors(solution: Solution, study: WaveStudy, problem: WavyProblem) -> dict[str, float]:
-    """Return the errors of a solution under the names of SERIES, that of the pressure only if it is reported.
-
-    Forces and displacements are over the exact ones, pressures over the amplitude p1 of their wave.
-
-    Parameters
-    ----------
-    solution : Solution
-        The solved scene of a mesh.
-    study : WaveStudy
-        The study.
-    problem : WavyProblem
-        The problem on that mesh.
-    """
-    interface, current = solution.interface, solution.state.positions
-    errors = {}
-    for surface, body, names in (
-        (interface.slave, study.slave, (SLAVE_FORCES, SLAVE_MOTION)),
-        (interface.master, 1 - study.slave, (MASTER_FORCES, MASTER_MOTION)),
-    ):
-        exact = traction_forces(surface, current, partial(_traction, problem, body))
-        errors[names[0]] = force_error(solution.forces, exact, shape_integrals(surface, current))
-        field = partial(_displacements, problem, body)
-        errors[names[1]] = displacement_error(surface, interface.nodes, solution.displacements, field)
-    pressure = pressure_error(solution, lambda places: wavy_pressure(problem, places[:, 0]), problem.wave)
-    return errors if pressure is None else errors | {PRESSURE: pressure}
-
-
 def constant_pressure_error(study: WaveStudy) -> float:
     """Return kh/√24 for the mean slave segment h of the finest mesh.
 
@@ -228,16 +197,5 @@ def exact_study_forces(case: Case) -> FloatArray:
     study, interface = WaveStudy.from_case(case), case.interface
     problem = study.problem(study.meshes[0])
     sides: tuple[tuple[Surface, int], ...] = ((interface.slave, study.slave), (interface.master, 1 - study.slave))
-    forces = [traction_forces(side, case.positions, partial(_traction, problem, body)) for side, body in sides]
+    forces = [wavy_forces(side, case.positions, problem, body) for side, body in sides]
     return forces[0] + forces[1]
-
-
-def _traction(problem: WavyProblem, body: int, places: FloatArray) -> FloatArray:
-    """Return the traction (n, 2) on a body: the surface is flat but for slopes of 1e-6."""
-    pressure = wavy_pressure(problem, places[:, 0])
-    return np.column_stack([0 * pressure, pressure if body == UPPER else -pressure])
-
-
-def _displacements(problem: WavyProblem, body: int, places: FloatArray) -> FloatArray:
-    """Return the displacements (n, 2) of the surface, whose waviness counts for nothing."""
-    return wavy_displacements(problem, body, np.column_stack([places[:, 0], 0 * places[:, 0]]))

@@ -11,8 +11,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.subject import Subject
-from contactverif.scenes.hertz_box import HertzBox, exact_displacements, exact_forces, exact_moves, hertz_box
-from contactverif_properties.shared.accuracy import (
+from contactverif.mechanics.accuracy import (
     Solution,
     displacement_error,
     force_error,
@@ -20,6 +19,8 @@ from contactverif_properties.shared.accuracy import (
     shape_integrals,
     solve_for_accuracy,
 )
+from contactverif.mechanics.scene import Scene
+from contactverif.scenes.hertz_box import HertzBox, exact_displacements, exact_forces, exact_moves, hertz_box
 
 BOX = HertzBox()
 # An iterate that is out of balance by less than this share of the largest nodal force tells the errors of a solution.
@@ -49,6 +50,23 @@ class HertzStudy:
         """Return the penalty ε̂ on the mesh with so many segments of the parabola across the contact."""
         length = BOX.half_width if self.fixed else 2 * BOX.half_width / (across + 1 / 3)
         return self.stiffness * BOX.young[0] / length
+
+    def scene(self, across: int, *, multipliers: bool) -> tuple[Scene, FloatArray | None]:
+        """Return the scene on a mesh, and the first iterate (n_free,), which is the exact solution.
+
+        Parameters
+        ----------
+        across : int
+            The number of the parabola's segments across the contact.
+        multipliers : bool
+            True for a formulation with multipliers. It starts at the first guess of the scene: its exact gaps are 0,
+            so they do not say which nodes are in contact; penetration does.
+        """
+        penalty, role = self.penalty(across), self.parabola_is_slave
+        scene = hertz_box(BOX, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
+        if multipliers:
+            return scene, None
+        return scene, scene.transformation.T @ exact_moves(BOX, penalty, scene, role, across).reshape(-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,14 +113,26 @@ def hertz_errors(study: HertzStudy, across: int, subject: Subject) -> HertzError
     subject : Subject
         The formulation.
     """
-    penalty, role = study.penalty(across), study.parabola_is_slave
-    rigid = subject.traits.enforcement == "multiplier"
-    law = None if rigid else penalty
-    scene = hertz_box(BOX, penalty=penalty, rigid_layer=rigid, across=across, parabola_is_slave=role)
-    start = None  # Exact gaps of multipliers are 0, so they do not say which nodes are in contact; penetration does.
-    if not rigid:
-        start = scene.transformation.T @ exact_moves(BOX, law, scene, role, across).reshape(-1)
-    solution = solve_for_accuracy(scene, subject, start)
+    multipliers = subject.traits.enforcement == "multiplier"
+    scene, start = study.scene(across, multipliers=multipliers)
+    return errors_of_solution(study, across, solve_for_accuracy(scene, subject, start), multipliers=multipliers)
+
+
+def errors_of_solution(study: HertzStudy, across: int, solution: Solution, *, multipliers: bool) -> HertzErrors:
+    """Return the errors of a solution of the study's scene.
+
+    Parameters
+    ----------
+    study : HertzStudy
+        The choice of slave and penalty.
+    across : int
+        The number of the parabola's segments across the contact.
+    solution : Solution
+        The solution.
+    multipliers : bool
+        True for a formulation with multipliers, whose exact solution is Hertz' own.
+    """
+    law, role, scene = None if multipliers else study.penalty(across), study.parabola_is_slave, solution.scene
     exact, pressure = exact_forces(BOX, law, scene, role), BOX.pressure(law)
     nodes = scene.interface.nodes
     lengths = [shape_integrals(surface, nodes) for surface in (scene.interface.slave, scene.interface.master)]

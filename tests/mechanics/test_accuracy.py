@@ -1,4 +1,4 @@
-"""The error measures of `shared/accuracy.py` are exact where the answer is known by hand."""
+"""The error measures of `contactverif.mechanics.accuracy` are exact where the answer is known by hand."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from subjects import load_subject
 
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
-from contactverif.scenes.catalogue import load_scene
-from contactverif_properties.shared.accuracy import (
+from contactverif.mechanics.accuracy import (
     displacement_error,
     fit_rate,
     force_error,
@@ -21,6 +20,7 @@ from contactverif_properties.shared.accuracy import (
     solve_for_accuracy,
     traction_forces,
 )
+from contactverif.scenes.catalogue import load_scene
 
 INTERFACE = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[3, 0], [0, 0]])
 

@@ -21,7 +21,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene
 
@@ -100,15 +100,56 @@ def solve_for_accuracy(
     interface = scene.interface
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
     formulation = subject.for_case(guess)
+    trace = solve_in_tries(scene, formulation, start, step)[-1]
+    return solution_of(trace, formulation, nodal=subject.traits.penalty == "nodal")
+
+
+def solve_in_tries(
+    scene: Scene, formulation: CheckedFormulation, start: FloatArray | None = None, step: float | None = None
+) -> tuple[Trace, ...]:
+    """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    formulation : CheckedFormulation
+        The formulation with its penalty.
+    start : FloatArray | None, shape (n_free,)
+        The first iterate; by default the first guess of the scene.
+    step : float | None
+        The step of differences, as in `solve_for_accuracy`.
+
+    Returns
+    -------
+    tuple[Trace, ...]
+        One or two tries; the last one counts.
+    """
     trace = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step)
-    if not trace.converged and "tangent" in formulation.provides:
-        trace = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step, use_tangent=False)
-    z = trace.z
+    if trace.converged or "tangent" not in formulation.provides:
+        return (trace,)
+    again = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step, use_tangent=False)
+    return trace, again
+
+
+def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -> Solution:
+    """Return the last iterate of Newton's method with its forces and contact points.
+
+    Parameters
+    ----------
+    trace : Trace
+        The trace.
+    formulation : CheckedFormulation
+        The formulation that made it.
+    nodal : bool
+        True if pressures of points are nodal forces (trait `penalty="nodal"`).
+    """
+    scene, interface, z = trace.scene, trace.scene.interface, trace.z
     state = Case(interface, z, scene.penalty, name=scene.name, n_multipliers=len(trace.multipliers))
     pairing = formulation.pair(interface, z)
     forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
     points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
-    return Solution(scene, trace, state, forces, points, subject.traits.penalty == "nodal")
+    return Solution(scene, trace, state, forces, points, nodal)
 
 
 def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:
