@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
-    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly
+    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly, evaluate_both
     from contactverif.contract.interface import Interface, Surface
     from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
@@ -42,7 +42,7 @@ _HOMES = {
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
-    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly"),
+    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
     "contract.property": ("Measurement", "Outcome", "Property", "Quantity", "Verdict"),
     "contract.result": ("Row", "Run"),
@@ -93,6 +93,7 @@ __all__ = [
     "Verdict",
     "block",
     "body_from_mesh",
+    "evaluate_both",
     "judge_case",
     "load_formulation",
     "load_properties",

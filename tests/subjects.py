@@ -29,10 +29,15 @@ def load_property(property_id: str) -> Property:
 
 
 class Changed:
-    """A formulation in which some attributes are replaced, such as `tangent` or `traits`; the others are its own."""
+    """A formulation in which some attributes are replaced, such as `tangent` or `traits`; the others are its own.
+
+    Where residual or tangent are replaced, the formulation does not compute them in one call: those would be the old.
+    """
 
     def __init__(self, inner: Any, **attributes: Any) -> None:
         self.inner = inner
+        if attributes.keys() & {"residual", "tangent"}:
+            self.residual_and_tangent = None
         self.__dict__ |= attributes
 
     def __getattr__(self, name: str) -> Any:

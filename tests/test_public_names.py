@@ -31,7 +31,7 @@ PUBLIC = {
         *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
         # Properties, and runs over them.
         *("Property", "Quantity", "Measurement", "Outcome", "Verdict", "Row", "Run"),
-        *("load_formulation", "load_properties", "judge_case", "verify"),
+        *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify"),
         # Errors.
         *("ContactverifError", "ContractError", "MisuseError"),
     },

@@ -291,8 +291,9 @@ class Formulation(ResidualOnly, Protocol):
     """The whole contract of a contact formulation.
 
     A factory ``make(*, penalty, **options)`` returns an object with these methods. ``residual`` is required;
-    ``traits``, ``pair``, ``tangent`` and ``contact_points`` are optional. A formulation with multipliers has one method
-    more, ``n_multipliers(interface) -> int``. The harness calls ``pair`` at a state, then the other methods with that
+    ``traits``, ``pair``, ``tangent`` and ``contact_points`` are optional. ``residual_and_tangent`` is optional too: it
+    saves time and answers nothing new. A formulation with multipliers has one method more, ``n_multipliers(interface)
+    -> int``. The harness calls ``pair`` at a state, then the other methods with that
     pairing, at the same state or at states around it. The methods keep no state between calls: the same arguments give
     the same answer. All arrays that the harness passes are read-only.
 
@@ -343,6 +344,31 @@ class Formulation(ResidualOnly, Protocol):
         """
         ...
 
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
+        """Return the residual and its derivative at one state, in one sweep over the interface. Optional.
+
+        Newton's method needs both at each iterate, and they share most of their work. A plugin that has this method has
+        ``tangent`` too. The answers may differ from those of the two methods by roundoff; the property ``purity``
+        compares them.
+
+        Parameters
+        ----------
+        interface : Interface
+            The meshes in their reference configuration.
+        pairing : Pairing
+            What ``pair`` returned.
+        z : FloatArray, shape (n_unknowns,)
+            One state: current positions, then multipliers. Never a batch.
+
+        Returns
+        -------
+        residual : FloatArray, shape (n_unknowns,)
+            What ``residual`` returns.
+        tangent : FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
+            What ``tangent`` returns.
+        """
+        ...
+
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return where the formulation looks for contact, and what it finds there. Optional.
 
@@ -361,3 +387,40 @@ class Formulation(ResidualOnly, Protocol):
             Gaps, pressures and places of all contact points, active or not.
         """
         ...
+
+
+def evaluate_both(plugin: Any, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[FloatArray, Any]:
+    """Return residual and tangent of a plugin at one state: in one call where it offers that, else in two.
+
+    Parameters
+    ----------
+    plugin : Any
+        A formulation with a tangent, as its factory returned it or checked.
+    interface : Interface
+        The meshes in their reference configuration.
+    pairing : Pairing | None
+        The frozen pairing; None if the plugin has none.
+    z : FloatArray, shape (n_unknowns,)
+        One state: current positions, then multipliers.
+
+    Returns
+    -------
+    residual : FloatArray, shape (n_unknowns,)
+        The nodal forces, then the constraint rows.
+    tangent : FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
+        The derivative of the residual on the pairing.
+
+    Examples
+    --------
+    >>> from contactverif import evaluate_both, load_formulation, named_case
+    >>> case = named_case("offset-c")
+    >>> formulation = load_formulation("vts-ppt").for_case(case)
+    >>> pairing = formulation.pair(case.interface, case.z)
+    >>> residual, tangent = evaluate_both(formulation, case.interface, pairing, case.z)
+    >>> residual.shape, tangent.shape
+    ((24,), (24, 24))
+    """
+    if callable(in_one_call := getattr(plugin, "residual_and_tangent", None)):
+        residual, tangent = in_one_call(interface, pairing, z)
+        return residual, tangent
+    return plugin.residual(interface, pairing, z), plugin.tangent(interface, pairing, z)

@@ -22,6 +22,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
+FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. Whoever has none lacks nothing.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
 
@@ -45,14 +46,15 @@ class Subject:
     traits : Traits
         The promises of the formulation.
     provides : frozenset[str]
-        The optional parts that the plugin has, among "pair", "tangent" and "contact_points".
+        The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
 
     Raises
     ------
     PluginError
         If the factory raises an exception.
     ContractError
-        If the factory returns an object without ``residual``, or whose ``traits`` are no `Traits`.
+        If the factory returns an object without ``residual``, whose ``traits`` are no `Traits`, or that has
+        ``residual_and_tangent`` but no ``tangent``.
 
     Examples
     --------
@@ -75,8 +77,10 @@ class Subject:
             raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.contract.traits.Traits")
         self.traits: Traits = traits
         self.provides = frozenset(
-            part for part in OPTIONAL_PARTS if callable(_call_plugin(part, getattr, plugin, part, None))
+            part for part in OPTIONAL_PARTS + FAST_PARTS if callable(_call_plugin(part, getattr, plugin, part, None))
         )
+        if "residual_and_tangent" in self.provides and "tangent" not in self.provides:
+            raise ContractError("residual_and_tangent: the plugin has no `tangent`; needed both")
 
     def penalty(self, case: Case) -> float:
         """Return the penalty of a case in the unit that the formulation takes.
@@ -114,7 +118,7 @@ class CheckedFormulation:
     plugin : Any
         The plugin itself, for whoever times it: nothing that it answers is checked.
     provides : frozenset[str]
-        The optional parts that the plugin has, among "pair", "tangent" and "contact_points".
+        The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
 
     Raises
     ------
@@ -182,32 +186,27 @@ class CheckedFormulation:
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         forces = _call_plugin("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
-        if not isinstance(forces, np.ndarray):
-            raise ContractError(f"residual: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
-        forces = np.array(forces)  # A copy, since the plugin may reuse its array; and no subclass with other rules.
-        if forces.shape != z.shape:
-            raise ContractError(f"residual: returned shape {forces.shape}; needed {z.shape}, that of z")
-        if forces.dtype != z.dtype:
-            raise ContractError(f"residual: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
-        if not np.isfinite(forces).all():
-            raise NonFiniteError(f"residual: {_describe_non_finite(forces)}")
-        return forces
+        return _check_forces("residual", forces, z)
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a coo array of scipy.sparse."""
         self._check_size(interface, z)
         tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
-        if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
-            raise ContractError(f"tangent: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
-        if tangent.shape != (z.size, z.size):
-            raise ContractError(f"tangent: returned shape {tangent.shape}; needed {(z.size, z.size)}")
-        if tangent.dtype != np.float64:
-            raise ContractError(f"tangent: returned dtype {tangent.dtype}; needed float64")
-        tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else tangent.tocoo(copy=True)
-        entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
-        if not np.isfinite(entries).all():
-            raise NonFiniteError(f"tangent: {_describe_non_finite(entries)}")
-        return tangent
+        return _check_tangent("tangent", tangent, z.size)
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing | None, z: FloatArray
+    ) -> tuple[FloatArray, Any]:
+        """Return residual (n_unknowns,) and tangent, as `tangent` does, at z (n_unknowns,); one call where possible."""
+        if "residual_and_tangent" not in self.provides:
+            return self.residual(interface, pairing, z), self.tangent(interface, pairing, z)
+        self._check_size(interface, z)
+        verb = "residual_and_tangent"
+        answer = _call_plugin(verb, self.plugin.residual_and_tangent, interface, pairing, freeze(z, np.float64))
+        if not isinstance(answer, tuple) or len(answer) != 2:
+            kind = f"a tuple of {len(answer)}" if isinstance(answer, tuple) else f"a {type(answer).__name__}"
+            raise ContractError(f"{verb}: returned {kind}; needed a tuple (residual, tangent)")
+        return _check_forces(f"{verb}[0]", answer[0], z), _check_tangent(f"{verb}[1]", answer[1], z.size)
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points at one state z (n_unknowns,)."""
@@ -244,6 +243,49 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
         raise
     except BaseException as error:
         raise PluginError(f"{method}: {type(error).__name__}: {error}") from error
+
+
+def _check_forces(verb: str, forces: Any, z: Array) -> Array:
+    """Return a copy of the forces in the shape and dtype of z, or raise an error that begins with the verb."""
+    if not isinstance(forces, np.ndarray):
+        raise ContractError(f"{verb}: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
+    forces = np.array(forces)  # A copy, since the plugin may reuse its array; and no subclass with other rules.
+    if forces.shape != z.shape:
+        raise ContractError(f"{verb}: returned shape {forces.shape}; needed {z.shape}, that of z")
+    if forces.dtype != z.dtype:
+        raise ContractError(f"{verb}: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
+    if not np.isfinite(forces).all():
+        raise NonFiniteError(f"{verb}: {_describe_non_finite(forces)}")
+    return forces
+
+
+def _check_tangent(verb: str, tangent: Any, size: int) -> Any:
+    """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb."""
+    if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
+        raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
+    if tangent.shape != (size, size):
+        raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
+    if tangent.dtype != np.float64:
+        raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
+    tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
+    entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
+    if not np.isfinite(entries).all():
+        raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
+    return tangent
+
+
+def _copy_entries(verb: str, tangent: Any) -> Any:
+    """Return a copy of a sparse matrix as a coo array. Numbers of rows and columns are checked, as scipy does not.
+
+    A plugin that fills the arrays of a compressed matrix itself may number a row or a column that is not there. scipy
+    would read or write outside of its arrays.
+    """
+    try:
+        if tangent.format in ("csr", "csc", "bsr"):
+            tangent.check_format(full_check=True)
+        return sparse.coo_array(tangent, copy=True)  # It checks the numbers of entries in the other formats.
+    except (IndexError, TypeError, ValueError) as error:
+        raise ContractError(f"{verb}: returned a broken {tangent.format} matrix: {error}") from error
 
 
 def _describe_non_finite(values: Array) -> str:

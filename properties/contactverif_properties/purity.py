@@ -15,6 +15,12 @@ turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its ow
 change of the residual from one state to the other over the way between them. A pairing that differs, or an interface
 that was changed, fails in words.
 
+Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a batch
+is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape) as if
+nodes had moved by uX. That changes an entry by uX times the slope of K, the larger of |K|/ℓ and the change of the
+tangent from one state to the other over the way between them. Summing N entries adds uN|K|. The same operations may
+round nothing at all; an exact agreement is not asked.
+
 **Undecided.** Never.
 """
 
@@ -22,7 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
@@ -34,6 +40,7 @@ from contactverif_properties.shared.roundoff import ratio
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
 BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.
+TANGENT_ROUNDINGS = 4 * BATCH_ROUNDINGS  # An entry of a tangent has four factors, each with roundings of its own.
 
 REASON = "The same operations on the same numbers give the same bits."
 REPEATED = Quantity("entries that change in a repeated call", "1", "0", REASON)
@@ -45,6 +52,21 @@ BATCHED = Quantity(
     "1",
     "8u",
     "A batch may round otherwise, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
+)
+IN_ONE_CALL = Quantity(
+    "entries of residual and tangent in one call that change with the order of calls", "1", "0", REASON
+)
+ONE_RESIDUAL = Quantity(
+    "difference of the residual in one call",
+    "1",
+    "8u",
+    "One call may round otherwise, as a batch may. The difference counts over X (k + |R|/ℓ) + N |R|.",
+)
+ONE_TANGENT = Quantity(
+    "difference of the tangent in one call",
+    "1",
+    "32u",
+    "One call may round four factors otherwise, as if nodes had moved by uX. The difference counts over X K' + N |K|.",
 )
 
 
@@ -63,7 +85,8 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     Measurement
         The entries of the residual that change in a repeated call, the entries of residual, tangent and contact points
         that change with the order of calls, and the difference between a batch and a loop, where the formulation takes
-        batches. The batch holds the state and one so near that its pairing is nearly the same.
+        batches. The batch holds the state and one so near that its pairing is nearly the same. Where the formulation
+        computes residual and tangent in one call, its differences from the two calls at these two states.
     """
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
@@ -105,6 +128,15 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         values[BATCHED.name] = compare_batch(state, near, forces, batch)
         tolerances[BATCHED.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+    if "residual_and_tangent" in formulation.provides:
+        values[IN_ONE_CALL.name], tolerances[IN_ONE_CALL.name] = changes.residual_and_tangent, 0.0
+        tangents = np.array([dense(formulation.tangent(interface, pairing, u)) for u in (z, near)])
+        pairs = [formulation.residual_and_tangent(interface, pairing, u) for u in (z, near)]
+        one_call = np.array([residual for residual, _ in pairs])
+        values[ONE_RESIDUAL.name] = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
+        values[ONE_TANGENT.name] = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
+        tolerances[ONE_RESIDUAL.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        tolerances[ONE_TANGENT.name] = TANGENT_ROUNDINGS * UNIT_ROUNDOFF
     if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
@@ -147,6 +179,28 @@ def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> 
     return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 
 
+def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_call: FloatArray) -> float:
+    """Return the largest difference of tangents in one call over what moving the nodes by X would change.
+
+    Parameters
+    ----------
+    case : Case
+        The state z.
+    near : FloatArray, shape (n_unknowns + n_multipliers,)
+        The state nearby.
+    tangents : FloatArray, shape (2, n, n)
+        The tangents of both states on the same pairing; n = n_unknowns + n_multipliers.
+    in_one_call : FloatArray, shape (2, n, n)
+        What was returned together with the residuals.
+    """
+    way = float(np.abs(near - case.z).max())
+    slope = float(np.abs(tangents[1] - tangents[0]).max()) / way if way > 0 else 0.0
+    largest = np.abs(tangents).max(axis=(1, 2))
+    moved = case.largest_coordinate * np.maximum(slope, largest / case.shortest_segment) + case.n_segments * largest
+    differences = np.abs(in_one_call - tangents).max(axis=(1, 2))
+    return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
+
+
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
     """Return all bits of an interface."""
     return interface.nodes.tobytes(), interface.slave.segments.tobytes(), interface.master.segments.tobytes()
@@ -155,8 +209,8 @@ def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
 PURITY = Property(
     id="purity",
     family="invariants",
-    summary="An answer depends on the question alone: repeated, in another order, interleaved, and in a batch.",
-    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED),
+    summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
+    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=any_cases,
     measure=measure_purity,
     promise=lambda traits: True,

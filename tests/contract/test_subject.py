@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints, Pairing, evaluate_both
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
@@ -124,7 +125,10 @@ def test_a_batch_equals_a_loop(dtype: type) -> None:
     assert np.array_equal(answers[True], answers[False])
 
 
-@pytest.mark.parametrize("verb", ["pair", "residual", "tangent", "contact_points"])
+VERBS = ["pair", "residual", "tangent", "residual_and_tangent", "contact_points"]
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_a_plugin_that_raises(verb: str) -> None:
     with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$") as caught:
         answer_to(verb, **{verb: raising})
@@ -133,7 +137,7 @@ def test_a_plugin_that_raises(verb: str) -> None:
     assert not isinstance(caught.value, MisuseError)
 
 
-@pytest.mark.parametrize("verb", ["pair", "residual", "tangent", "contact_points"])
+@pytest.mark.parametrize("verb", VERBS)
 def test_a_plugin_that_writes_to_its_input(verb: str) -> None:
     def writing(interface: Interface, *more: Any) -> Any:
         more[-1][0] = 1.0
@@ -157,6 +161,14 @@ def test_a_plugin_that_writes_to_the_interface_or_the_pairing() -> None:
     for target in (lambda i, p, z: i.nodes, lambda i, p, z: i.slave.segments, lambda i, p, z: p["active"]):
         with pytest.raises(PluginError, match="read-only"):
             answer_to("residual", residual=writing(target))
+
+
+def broken_compressed(format_: str, **arrays: Any) -> Any:
+    """Return a unit matrix of which some arrays were replaced behind scipy's back."""
+    matrix = sparse.eye_array(10).asformat(format_)
+    for name, values in arrays.items():
+        setattr(matrix, name, np.array(values))
+    return matrix
 
 
 NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, -np.inf, Z)
@@ -185,6 +197,55 @@ NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, 
         ("tangent", np.diag(NAN), NonFiniteError, "tangent: nan in 1 of 100 entries"),
         ("tangent", sparse.csr_array(np.diag(INF)), NonFiniteError, "tangent: -inf in 2 of "),
         ("tangent", sparse.coo_matrix(np.diag(NAN)), NonFiniteError, "tangent: nan in 1 of "),
+        (
+            "tangent",
+            broken_compressed("csr", indices=[*range(9), 10]),
+            ContractError,
+            "tangent: returned a broken csr matrix: indices must be < 10",
+        ),
+        (
+            "tangent",
+            broken_compressed("csc", indices=[-1, *range(9)]),
+            ContractError,
+            "broken csc matrix: indices must",
+        ),
+        ("tangent", broken_compressed("csr", indptr=range(10)), ContractError, "broken csr matrix: index pointer size"),
+        ("tangent", broken_compressed("csr", indptr=[0, 2, *range(1, 9), 10]), ContractError, "non-decreasing"),
+        (
+            "tangent",
+            broken_compressed("coo", coords=([0, 12], [1, 1]), data=[1.0, 1.0]),
+            ContractError,
+            "broken coo matrix: axis 0 index 12 exceeds",
+        ),
+        (
+            "residual_and_tangent",
+            Z,
+            ContractError,
+            r"residual_and_tangent: returned a ndarray; needed a tuple \(residual, tangent\)",
+        ),
+        ("residual_and_tangent", (Z,), ContractError, "residual_and_tangent: returned a tuple of 1; needed"),
+        (
+            "residual_and_tangent",
+            (Z[:9], np.eye(10)),
+            ContractError,
+            r"residual_and_tangent\[0\]: returned shape \(9,\); needed \(10,\), that of z",
+        ),
+        ("residual_and_tangent", (Z.astype(complex), np.eye(10)), ContractError, "returned dtype complex128"),
+        ("residual_and_tangent", (NAN, np.eye(10)), NonFiniteError, r"residual_and_tangent\[0\]: nan in 1 of 10"),
+        (
+            "residual_and_tangent",
+            (Z, np.eye(9)),
+            ContractError,
+            r"residual_and_tangent\[1\]: returned shape \(9, 9\); needed \(10, 10\)",
+        ),
+        ("residual_and_tangent", (Z, np.eye(10, dtype=int)), ContractError, "returned dtype int64; needed float64"),
+        ("residual_and_tangent", (Z, np.diag(INF)), NonFiniteError, r"residual_and_tangent\[1\]: -inf in 2 of 100"),
+        (
+            "residual_and_tangent",
+            (Z, broken_compressed("csr", indices=[*range(9), 10])),
+            ContractError,
+            r"residual_and_tangent\[1\]: returned a broken csr matrix: indices must be < 10",
+        ),
         ("contact_points", {}, ContractError, "contact_points: returned a dict; needed ContactPoints"),
         ("contact_points", None, ContractError, "contact_points: returned a NoneType"),
         ("pair", None, ContractError, "pair: returned a NoneType; needed a mapping"),
@@ -196,6 +257,27 @@ NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, 
 def test_a_wrong_answer(verb: str, answer: Any, error: type[ContractError], message: str) -> None:
     with pytest.raises(error, match=message):
         answer_to(verb, **{verb: always(answer)})
+
+
+def test_both_in_one_call_where_the_plugin_offers_it() -> None:
+    def both(interface: Interface, pairing: Pairing, z: Any) -> Any:
+        calls.append(z.shape)
+        return 3 * z, 3 * np.eye(z.size)
+
+    calls: list[Any] = []
+    with_it, without = subject(residual_and_tangent=both), subject()
+    assert with_it.provides == without.provides | {"residual_and_tangent"}
+    for formulation in (with_it.for_case(CASE), with_it.for_case(CASE).plugin):
+        residual, tangent = evaluate_both(formulation, PAIR, None, Z)
+        assert residual.tolist() == (3 * Z).tolist()
+        assert dense(tangent).tolist() == (3 * np.eye(10)).tolist()
+    assert calls == [(10,), (10,)]
+    for formulation in (without.for_case(CASE), without.for_case(CASE).plugin):
+        residual, tangent = evaluate_both(formulation, PAIR, None, Z)
+        assert residual.tolist() == (10 * Z).tolist()
+        assert dense(tangent).tolist() == (10 * np.eye(10)).tolist()
+    with pytest.raises(ContractError, match=r"^residual_and_tangent: the plugin has no `tangent`; needed both$"):
+        subject(residual_and_tangent=both, tangent=None)
 
 
 def test_one_bad_state_of_a_batch() -> None:
@@ -299,6 +381,7 @@ def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:
         lambda: guarded.pair(case.interface, case.z),
         lambda: guarded.residual(case.interface, None, case.z),
         lambda: guarded.tangent(case.interface, None, case.z),
+        lambda: guarded.residual_and_tangent(case.interface, None, case.z),
         lambda: guarded.contact_points(case.interface, None, case.z),
     ):
         with pytest.raises(

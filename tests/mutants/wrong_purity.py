@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from mutate import Mutant, Wrapped
+
+from contactverif.contract.arrays import dense
 
 PURITY = "purity"
 
@@ -92,7 +95,50 @@ def _shares_its_answers(*, penalty: float) -> Any:
     return Wrapped(penalty, residual=residual)
 
 
+class _InOneCall(Wrapped):
+    """A formulation that is right in each method, and wrong where it computes residual and tangent in one call."""
+
+    def __init__(self, penalty: float, change: Callable[[Any, Any], tuple[Any, Any]]) -> None:
+        super().__init__(penalty)
+        self._change = change
+
+    def residual_and_tangent(self, interface: Any, pairing: Any, z: Any) -> tuple[Any, Any]:
+        arguments = interface, pairing, z
+        return self._change(self._inner.residual(*arguments), dense(self._inner.tangent(*arguments)))
+
+
+def _in_one_call(change: Callable[[Any, Any], tuple[Any, Any]]) -> Callable[..., Any]:
+    return lambda *, penalty: _InOneCall(penalty, change)
+
+
+def _without_small_entries(residual: Any, tangent: Any) -> tuple[Any, Any]:
+    """Leave out what is below a millionth of the largest entry, as a pattern does that was made in another state."""
+    return residual, np.where(np.abs(tangent) > 1e-6 * np.abs(tangent).max(), tangent, 0.0)
+
+
+class _LastInOneCall(Wrapped):
+    """Residual and tangent in one call, the tangent at the state of the last residual that was asked alone."""
+
+    last: Any = None
+
+    def residual(self, *arguments: Any) -> Any:
+        self.last = arguments
+        return self._inner.residual(*arguments)
+
+    def residual_and_tangent(self, *arguments: Any) -> tuple[Any, Any]:
+        fits = self.last is not None and self.last[0] is arguments[0]
+        return self._inner.residual(*arguments), self._inner.tangent(*(self.last if fits else arguments))
+
+
 MUTANTS = (
+    Mutant("residual in one call that pulls", PURITY, _in_one_call(lambda residual, tangent: (-residual, tangent))),
+    Mutant(
+        "tangent in one call made symmetric",
+        PURITY,
+        _in_one_call(lambda residual, tangent: (residual, (tangent + tangent.T) / 2)),
+    ),
+    Mutant("tangent in one call without small entries", PURITY, _in_one_call(_without_small_entries)),
+    Mutant("tangent in one call at the state of the last residual", PURITY, lambda *, penalty: _LastInOneCall(penalty)),
     Mutant(
         "tangent at the state of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=2)
     ),

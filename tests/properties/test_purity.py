@@ -9,10 +9,21 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
 
-from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.property import Measurement, Quantity, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.runner import judge_case
-from contactverif_properties.purity import BATCHED, POINTS, PURITY, REORDERED, REPEATED, TANGENT, measure_purity
+from contactverif_properties.purity import (
+    BATCHED,
+    IN_ONE_CALL,
+    ONE_RESIDUAL,
+    ONE_TANGENT,
+    POINTS,
+    PURITY,
+    REORDERED,
+    REPEATED,
+    TANGENT,
+    measure_purity,
+)
 from contactverif_properties.shared.interleaved_calls import renumber
 
 
@@ -46,6 +57,47 @@ def test_a_function_is_pure(batched: bool) -> None:
     assert measurement.values == dict.fromkeys(names, 0) | batch
     assert not measurement.broken
     assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
+
+
+class OneCall(Pure):
+    """Residual and tangent in one call, each changed by a factor."""
+
+    forces, stiffness = 1.0, 1.0
+
+    def residual_and_tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.forces * self.residual(interface, pairing, z), self.stiffness * self.tangent(interface, pairing, z)
+
+
+def test_one_call_for_residual_and_tangent_agrees_with_two_calls() -> None:
+    measurement = measure(OneCall)
+    assert {measurement.values[quantity.name] for quantity in (IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT)} == {0}
+    assert not measure(Pure).values.keys() & {IN_ONE_CALL.name, ONE_RESIDUAL.name, ONE_TANGENT.name}
+
+
+@pytest.mark.parametrize(("part", "quantity"), [("forces", ONE_RESIDUAL), ("stiffness", ONE_TANGENT)])
+def test_one_call_may_round_otherwise_and_is_wrong_beyond(part: str, quantity: Quantity) -> None:
+    class Differs(OneCall):
+        pass
+
+    for factor, verdict in ((1 + 2.0**-52, Verdict.PASS), (1 + 2.0**-42, Verdict.FAIL), (-1.0, Verdict.FAIL)):
+        setattr(Differs, part, factor)
+        assert nonzero_quantities(Differs) == {quantity.name}
+        assert judge_case(PURITY, case(), subject(Differs)).verdict is verdict
+
+
+def test_one_call_that_uses_the_state_of_the_last_residual_is_told() -> None:
+    class Late(OneCall):
+        last: Any = None
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.last = z
+            return super().residual(interface, pairing, z)
+
+        def residual_and_tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            tangent = self.tangent(interface, pairing, z if self.last is None else self.last)
+            return Pure.residual(self, interface, pairing, z), tangent
+
+    assert {IN_ONE_CALL.name, ONE_TANGENT.name} == nonzero_quantities(Late)
 
 
 def test_what_counts_its_calls_is_told_when_asked_again() -> None:

@@ -1,4 +1,4 @@
-"""Calls of residual, tangent and contact points in turn, for states, pairings and interfaces in turn.
+"""Calls of all methods in turn, for states, pairings and interfaces in turn.
 
 Two instances are asked, in two orders. A formulation that remembers something of an earlier call answers differently.
 """
@@ -16,23 +16,24 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import CheckedFormulation
 
+BOTH = "residual_and_tangent"
 # The questions are two states of one interface, 0 and 1, and a state of another interface, 2. The first and the last
 # call before a question, of any method, on its interface or on any, differ between the orders for at least one
 # question. So a memory of such a call shows. The first order ends with its first question again, after contact points.
 _ORDERS = (
     (
-        *(("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1)),
+        *(("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1), (BOTH, 0), (BOTH, 1)),
         *(("contact_points", 0), ("contact_points", 1), ("residual", 0)),
     ),
     (
         *(("contact_points", 1), ("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1)),
-        *(("residual", 0), ("contact_points", 0)),
+        *(("residual", 0), ("contact_points", 0), (BOTH, 1), (BOTH, 0)),
     ),
 )
 # Two pairings of one state, 3 and 4: a memory that looks at the positions alone shows.
 _ORDERS_OF_PAIRINGS = (
-    (("residual", 3), ("residual", 4), ("tangent", 4)),
-    (("tangent", 4), ("residual", 4), ("residual", 3)),
+    (("residual", 3), ("residual", 4), ("tangent", 4), (BOTH, 3), (BOTH, 4)),
+    (("tangent", 4), ("residual", 4), ("residual", 3), (BOTH, 4), (BOTH, 3)),
 )
 
 
@@ -63,7 +64,7 @@ class Changes:
     ----------
     repeated : float
         Entries of the residual that change when an instance is asked the same again.
-    residual, tangent, contact_points : float
+    residual, tangent, contact_points, residual_and_tangent : float
         Entries that change with the order of the questions.
     """
 
@@ -71,6 +72,7 @@ class Changes:
     residual: float
     tangent: float
     contact_points: float
+    residual_and_tangent: float
 
 
 def count_changes(first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]) -> Changes:
@@ -93,7 +95,7 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     for call in calls:
         answer = _ask(first, call[0], questions[call[1]])
         repeated += _count_different(answer, answers.setdefault(call, answer))
-    changed = {"residual": 0.0, "tangent": 0.0, "contact_points": 0.0}
+    changed = {"residual": 0.0, "tangent": 0.0, "contact_points": 0.0, BOTH: 0.0}
     for call in others:
         changed[call[0]] += _count_different(_ask(second, call[0], questions[call[1]]), answers[call])
     return Changes(repeated, **changed)
@@ -104,11 +106,14 @@ def _provides(formulation: CheckedFormulation, method: str) -> bool:
 
 
 def _ask(formulation: CheckedFormulation, method: str, question: Question) -> Array:
-    """Return the residual (n,), the tangent (n, n), or all arrays of the contact points in one (n_entries,)."""
+    """Return the residual (n,), the tangent (n, n), both (1 + n, n), or all arrays of the contact points in one."""
     arguments = question.interface, question.pairing, question.z
     if method == "contact_points":
         points = formulation.contact_points(*arguments)
         return np.concatenate([np.ravel(getattr(points, entry.name)).astype(np.float64) for entry in fields(points)])
+    if method == BOTH:
+        residual, tangent = formulation.residual_and_tangent(*arguments)
+        return np.vstack([residual, dense(tangent)])
     return dense(getattr(formulation, method)(*arguments))
 
 
