@@ -12,14 +12,23 @@ from contactverif import judge_case, load_formulation, load_properties
 (question,) = load_properties(["stability.inf-sup"])
 cases = question.cases(None)
 figure, panels = plt.subplots(1, len(cases), figsize=(10, 4), sharey=True, layout="constrained")
-for name in ("nts-lm", "mortar-lm", "mortar-dual-lm", "vts-ppt-lm", "vts-ppt-lm:n=1", "two-pass/nts-lm"):
+MARKERS = {  # Hollow and of several sizes, since NTS and dual mortar have the same β.
+    "nts-lm": ("o", 10),
+    "mortar-lm": ("s", 6),
+    "mortar-dual-lm": ("+", 8),
+    "vts-ppt-lm": ("^", 6),
+    "vts-ppt-lm:n=1": ("v", 6),
+    "two-pass/nts-lm": ("x", 6),
+}
+for name, (marker, size) in MARKERS.items():
     print(f"{name:16}", end="")
     for case, axes in zip(cases, panels, strict=True):
         series = judge_case(question, case, load_formulation(name)).measurement.series
         share = series["zero eigenvalues"][-1] / series["multipliers"][-1]
         last = series["inf-sup constant"][-2:]
         print(f"{case.name}: {last[1] / last[0]:.2f} of β left, {share:.0%} move nothing", end="   ")
-        axes.loglog(series["slave segment"], series["inf-sup constant"], "o-" if share == 0 else "x--", label=name)
+        style = {"linestyle": "-" if share == 0 else "--", "marker": marker, "markersize": size}
+        axes.loglog(series["slave segment"], series["inf-sup constant"], **style, fillstyle="none", label=name)
         axes.set_xscale("log", base=2)
         axes.set(title=case.name, xlabel="slave segment h")
     print()

@@ -6,24 +6,25 @@ normal. A first plugin often has it the other way round. The harness sees that b
 
 from contactverif import Subject, Traits, load_formulation, load_properties, verify
 
-right = load_formulation("nts-ar")
-
 
 class Negated:
+    """NTS-AR with all signs turned round."""
+
     traits = Traits(penalty="distributed")
 
     def __init__(self, *, penalty):
-        self.inner = right.with_penalty(penalty)
+        self.right = load_formulation("nts-ar").with_penalty(penalty)
 
     def pair(self, interface, z):
-        return self.inner.pair(interface, z)
+        return self.right.pair(interface, z)
 
     def residual(self, interface, pairing, z):
-        return -self.inner.residual(interface, pairing, z)
+        return -self.right.residual(interface, pairing, z)
 
 
-run = verify([Subject("negated", Negated)], load_properties(["balance.*", "unilateral"]), examples=20, seed=1)
-print("forces of the opposite sign:", *run.opposite_signs)
-for row in run.rows:
-    print(f"{row.property_id}: {row.result}", row.reason, sep="\n    " if row.reason else "")
-print("every promise is kept" if run.promises_kept else "the run fails")
+if __name__ == "__main__":
+    run = verify([Subject("negated", Negated)], load_properties(["balance.*", "unilateral"]), examples=20, seed=1)
+    print("forces of the opposite sign:", *run.opposite_signs)
+    for row in run.rows:
+        print(f"{row.property_id}: {row.result}", row.reason, sep="\n    " if row.reason else "")
+    print("every promise is kept" if run.promises_kept else "the run fails")

@@ -31,7 +31,8 @@ for name, axes in zip(("sts", "mortar"), panels, strict=True):
         if power in (1, 2, 6):
             points = formulation.contact_points(scene.interface, formulation.pair(scene.interface, trace.z), trace.z)
             pressure, order = points.pressure / MEAN, np.argsort(points.position[:, 0])
-            axes.plot(points.position[order, 0], pressure[order], "o-", markersize=3, label=f"1e{power} E/h")
+            width = 4.5 / power**0.7  # Softer penalties have wider lines, since those of mortar cover each other.
+            axes.plot(points.position[order, 0], pressure[order], lw=width, marker=".", label=f"1e{power} E/h")
             print(
                 f"{name:6} at 1e{power} E/h: pressures from {pressure.min():.2f} to {pressure.max():.2f} times the mean"
             )

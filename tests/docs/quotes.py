@@ -129,15 +129,30 @@ def mine_classes() -> dict[str, str]:
 def install_mine(folder: Path, source: str) -> None:
     """Write what `pip install` leaves in a folder of a project whose mine.py has this source."""
     project = tomllib.loads((MINE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    name, version = project["name"], project["version"]
+    _install(folder, project["name"], project["version"], project["entry-points"])
+    (folder / "mine.py").write_text(source, encoding="utf-8")
+
+
+def install_example(folder: Path, page: Path) -> None:
+    """Write what `pip install` leaves in a folder of the example whose formulations a page registers, if it does."""
+    settings = tomllib.loads("".join(blocks("toml", page.read_text(encoding="utf-8"))))
+    project = settings.get("project", {})
+    points = project.get("entry-points", {}).get("contactverif.formulations", {})
+    sources = {target.partition(":")[0] for target in points.values()}
+    for source in (path for path in EXAMPLES if path.stem in sources):
+        _install(folder, project["name"], project["version"], project["entry-points"])
+        shutil.copy(source, folder)
+
+
+def _install(folder: Path, name: str, version: str, entry_points: dict[str, dict[str, str]]) -> None:
+    """Write the `dist-info` of a distribution."""
     info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
     info.mkdir(parents=True, exist_ok=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.4\nName: {name}\nVersion: {version}\n", encoding="utf-8")
     lines = []
-    for group, points in project["entry-points"].items():
+    for group, points in entry_points.items():
         lines += [f"[{group}]", *(f"{point} = {target}" for point, target in points.items())]
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    (folder / "mine.py").write_text(source, encoding="utf-8")
 
 
 def call(program: str, *arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -173,6 +188,8 @@ def prepare(page: Path, folder: Path) -> None:
     if page.parent.name == "tutorial":
         names = STEPS.get(page.name, tuple(mine_classes()))
         install_mine(folder / "site", "\n\n\n".join(mine_classes()[name] for name in names))
+    else:
+        install_example(folder / "site", page)
 
 
 def _needed_commands(page: Path) -> list[str]:
