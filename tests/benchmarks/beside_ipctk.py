@@ -1,0 +1,256 @@
+"""Race the kernels against ipctk: search, residual and tangent as CSR, per slave segment, beside the memory bound.
+
+    python tests/benchmarks/beside_ipctk.py                      # 1e3, 1e4 and 1e5 segments, in a minute
+    python tests/benchmarks/beside_ipctk.py --sizes 1e4 1e6 --only vts-ppt --out /tmp/race
+
+`tox -e beside-ipctk` does the same with ipctk installed. ipctk is no requirement of the project.
+
+Both get the same meshes: a wavy slave and a wavy master of 1.3 times as many segments. A penalty needs penetration and
+a barrier a gap, so the slave is pressed in for the ones and lifted for the other, by so much that each slave node has a
+partner. All run on one core, in turns, so that a slow moment of the machine hits all of them; the ratio belongs to one
+turn. Seconds are those of the processor, since other programs may wait for the same core. The memory bound is the time
+to write as many bytes as the tangent has, past the caches. Peak memory is that of a process of its own, above what it
+needs for the mesh; below 1e5 segments it hides in the peak of the imports.
+
+Rule for the next editor: nobody is measured alone, and what is printed is the spread of ratios, not the best of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+os.environ |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+import numpy as np
+from scipy import sparse
+
+from contactverif import Interface, Subject, evaluate_both, load_formulation
+
+OURS = ("vts-ppt", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
+PEER = "ipctk"
+PARTS = ("search", "residual and tangent", "CSR")
+TURNS = 9
+LIFT = 0.5  # What lifts the pressed slave to a gap between 0.2 and 0.35 of a segment.
+BARRIER_REACH = 0.4  # The distance from which ipctk's barrier acts: each node feels one or two partners.
+STREAM_BYTES = 2**27  # Larger than the caches.
+LEAST_FOR_PEAK = 100_000  # Segments.
+SHORTEST_TURN = 0.05  # Seconds: a call that is shorter is repeated within its turn.
+KILO = 1024  # Linux states the peak of a process in these bytes.
+COLUMNS = (
+    "formulation", "segments", "least / µs", "median / µs", "greatest / µs", *(f"{part} / µs" for part in PARTS),
+    "faster than ipctk, least", "faster, median", "faster, greatest", "over memory bound", "peak / bytes",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Racer:
+    """Somebody who is timed: a call that returns (its tangent, its seconds for each part)."""
+
+    name: str
+    call: Callable[[], tuple[Any, tuple[float, ...]]]
+
+
+def wavy(n_slave: int, lift: float = 0.0) -> Interface:
+    """Return a wavy slave above a wavy master of 1.3 times as many segments, pressed in by about 0.2 of a segment."""
+    upper, lower = np.linspace(0, n_slave, n_slave + 1), np.linspace(-0.3, n_slave + 0.4, int(1.3 * n_slave) + 1)
+    slave = np.column_stack([upper, lift - 0.2 - 0.05 * np.cos(upper) ** 2])
+    return Interface.from_chains(slave, np.column_stack([lower, 0.05 * np.sin(lower)])[::-1])
+
+
+def our_racer(name: str, n_slave: int) -> Racer:
+    """Return a formulation of ours as its plugin answers, without the checks of the harness."""
+    interface, subject = wavy(n_slave), load_formulation(name)
+    assert isinstance(subject, Subject), subject
+    plugin, z = subject.with_penalty(10.0).plugin, interface.nodes.ravel()
+
+    def call() -> tuple[Any, tuple[float, ...]]:
+        times = [process_time()]
+        pairing = plugin.pair(interface, z)
+        times.append(process_time())
+        _, tangent = evaluate_both(plugin, interface, pairing, z)
+        times.append(process_time())
+        tangent = sparse.csr_array(tangent)
+        times.append(process_time())
+        return tangent, tuple(np.diff(times))
+
+    return Racer(name, call)
+
+
+def peer_racer(n_slave: int) -> Racer:
+    """Return ipctk: collisions by a bounding volume hierarchy, gradient and Hessian of its barrier."""
+    import ipctk
+
+    ipctk.set_num_threads(1)
+    interface = wavy(n_slave, LIFT)
+    edges = np.asfortranarray(np.vstack([interface.slave.segments, interface.master.segments]), dtype=np.int32)
+    vertices = np.asfortranarray(interface.nodes)
+    mesh, barrier = ipctk.CollisionMesh(vertices, edges), ipctk.BarrierPotential(BARRIER_REACH, 10.0)
+
+    def call() -> tuple[Any, tuple[float, ...]]:
+        times = [process_time()]
+        collisions = ipctk.NormalCollisions()
+        collisions.build(mesh, vertices, BARRIER_REACH, broad_phase=ipctk.LBVH())
+        times.append(process_time())
+        barrier.gradient(collisions, mesh, vertices)
+        hessian = barrier.hessian(collisions, mesh, vertices)  # Compressed columns of a symmetric matrix: its CSR.
+        times.append(process_time())
+        return hessian, (*np.diff(times), 0.0)
+
+    return Racer(PEER, call)
+
+
+def make_racer(name: str, n_slave: int) -> Racer:
+    """Return the racer of that name on that mesh."""
+    return peer_racer(n_slave) if name == PEER else our_racer(name, n_slave)
+
+
+def time_writing(stream: Any) -> float:
+    """Return the seconds that writing a byte takes, in an array that no cache holds."""
+    start = process_time()
+    stream.fill(1.0)
+    return (process_time() - start) / float(stream.nbytes)
+
+
+def race(names: list[str], n_slave: int, turns: int) -> list[dict[str, Any]]:
+    """Return a row of the table for each name, measured in turns."""
+    racers, stream = [make_racer(name, n_slave) for name in names], np.ones(STREAM_BYTES // 8)
+    n_bytes, repeats = [], []
+    for racer in racers:
+        racer.call()  # It compiles.
+        tangent, parts = racer.call()
+        n_bytes.append(tangent.data.nbytes + tangent.indices.nbytes + tangent.indptr.nbytes)
+        repeats.append(max(1, round(SHORTEST_TURN / sum(parts))))
+        del tangent
+    parts_of, bound_of = np.empty((turns, len(racers), len(PARTS))), np.empty((turns, len(racers)))
+    for turn in range(turns):
+        for number, racer in enumerate(racers):
+            parts_of[turn, number] = np.mean([racer.call()[1] for _ in range(repeats[number])], axis=0)
+            bound_of[turn, number] = time_writing(stream) * n_bytes[number]
+    return _rows(names, n_slave, parts_of, bound_of)
+
+
+def _rows(names: list[str], n_slave: int, parts_of: Any, bound_of: Any) -> list[dict[str, Any]]:
+    """Return the rows of times (turns, racers, parts) and memory bounds (turns, racers), all in seconds."""
+    totals = parts_of.sum(axis=2)  # (turns, racers)
+    peer = totals[:, names.index(PEER)]
+    rows = []
+    for number, name in enumerate(names):
+        seconds, micro = totals[:, number], 1e6 / n_slave
+        values = [
+            *(micro * each for each in _spread(seconds)),
+            *(micro * np.median(parts_of[:, number], axis=0)),
+            *_spread(peer / seconds),
+            np.median(seconds / bound_of[:, number]),
+        ]
+        rows.append(dict(zip(COLUMNS, [name, n_slave, *map(float, values)], strict=False)))
+    return rows
+
+
+def _spread(values: Any) -> tuple[float, float, float]:
+    """Return the least, median and greatest value."""
+    return float(values.min()), float(np.median(values)), float(values.max())
+
+
+def peak_memory(name: str, n_slave: int) -> float:
+    """Return the bytes that one evaluation needs at its peak, above the mesh, in a process of its own."""
+    if n_slave < LEAST_FOR_PEAK:
+        return float("nan")
+    command = [sys.executable, __file__, "--peak", name, "--sizes", str(n_slave)]
+    return float(json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout))
+
+
+def _measure_peak(name: str, n_slave: int) -> int:
+    make_racer(name, 10).call()  # It loads the compiled kernels.
+    racer = make_racer(name, n_slave)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    racer.call()
+    return KILO * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+
+
+def exponents(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """Return the exponent of time against segments between the two largest meshes, for each name."""
+    table: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        table.setdefault(row["formulation"], []).append((row["segments"], row["segments"] * row["median / µs"]))
+    slopes = {}
+    for name, points in table.items():
+        if len(points) > 1:
+            (n, t), (m, s) = sorted(points)[-2:]
+            slopes[name] = float(np.log(s / t) / np.log(m / n))
+    return slopes
+
+
+def draw(rows: list[dict[str, Any]], path: Path) -> None:
+    """Draw the cost of a segment against the number of segments, and the memory bound of vts-ppt."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axes = figure.add_subplot()
+    names = list(dict.fromkeys(row["formulation"] for row in rows))
+    for name in names:
+        mine = sorted((row for row in rows if row["formulation"] == name), key=lambda row: row["segments"])
+        n, (low, middle, high) = [row["segments"] for row in mine], ([row[key] for row in mine] for key in COLUMNS[2:5])
+        style = {"color": "black", "linestyle": "--"} if name == PEER else {}
+        (line,) = axes.loglog(n, middle, marker="o", markersize=4, label=name, **style)
+        axes.fill_between(n, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
+        if name == names[0]:
+            bound = [row["median / µs"] / row["over memory bound"] for row in mine]
+            axes.loglog(n, bound, color="gray", linestyle=":", label=f"writing the tangent of {name}")
+    axes.set_xlabel("slave segments N")
+    axes.set_ylabel("search + residual + tangent, µs a slave segment")
+    axes.set_title("Cost of one evaluation, one core (band: least to greatest)", fontsize=10)
+    axes.grid(which="major", alpha=0.3)
+    axes.legend(fontsize=8, ncols=2)
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main() -> None:
+    """Measure, print the table, and write kernels.csv and kernels.svg."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--sizes", nargs="+", type=lambda text: int(float(text)), default=[1000, 10_000, 100_000])
+    parser.add_argument("--only", nargs="+", default=list(OURS), help="formulations")
+    parser.add_argument("--turns", type=int, default=TURNS)
+    parser.add_argument("--out", type=Path, default=Path("reports/bench"))
+    parser.add_argument("--core", type=int, default=0)
+    parser.add_argument("--peak", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[options.core % len(cores)]})  # A process for the peak inherits its one core.
+    if options.peak:
+        print(json.dumps(_measure_peak(options.peak, options.sizes[0])))
+        return
+    rows: list[dict[str, Any]] = []
+    names = [*options.only, PEER]
+    # A process begins with the peak of the one that started it, so this comes while this process is small.
+    peaks = {(name, n): peak_memory(name, n) / n for n in options.sizes for name in names}
+    print("  ".join(COLUMNS))
+    for n_slave in options.sizes:
+        for measured in race(names, n_slave, options.turns):
+            row = measured | {COLUMNS[-1]: peaks[measured["formulation"], n_slave]}
+            rows.append(row)
+            print("  ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
+    print("exponent of the cost:", {name: round(slope, 3) for name, slope in exponents(rows).items()})
+    options.out.mkdir(parents=True, exist_ok=True)
+    with (options.out / "kernels.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(
+            {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
+        )
+    draw(rows, options.out / "kernels.svg")
+
+
+if __name__ == "__main__":
+    main()
