@@ -295,12 +295,16 @@ class System:
         contact = self.transformation.T @ tangent @ self.transformation
         matrix = self.stiffness + contact
         # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
-        sizes = np.full(self.size, np.abs(z[: scene.interface.n_unknowns]).max())
+        largest = np.abs(z[: scene.interface.n_unknowns]).max()
+        sizes = np.full(self.size, largest)
         sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
         # A force along an inclined normal is rounded in both of its components.
         forces = abs(self.transformation).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
         terms = abs(contact) @ sizes + forces
-        terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + self.factor * np.abs(scene.load)
+        # A displacement below uX moves no node. The displacements of a body that nothing presses shrink by 1e-16 in each
+        # iteration, and so do its forces: counted over those displacements alone, they would never be small.
+        displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
+        terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
         self.seconds["tangent"] += perf_counter() - start
         return matrix, ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
 

@@ -117,6 +117,22 @@ def test_a_piecewise_linear_problem_is_finite() -> None:
     assert measurement.values["final iterations"] <= 1
 
 
+def test_a_body_that_nothing_presses_any_more_comes_to_rest() -> None:
+    """Its displacements shrink by 1e-16 in each iteration, and so do the forces that roundoff leaves on them."""
+    scene = two_blocks(
+        Rectangle([0.1, 1.2, 2.2, 3.2, 4.1], [0, 1]),
+        Rectangle([-1, 0, 7], [-1, 0]),
+        penalty=64.0,
+        approach=0.0625,
+        tilt=0.125,
+    )
+    half_passes = load_subject("mortar-two-half-pass")
+    outcome = judge_case(NEWTON_HISTORY, scene.case(), half_passes)
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+    trace = solve(scene, half_passes.for_case(scene.case()))
+    assert 0 < np.abs(trace.u[-1][scene.slices[1]]).max() < 1e-32
+
+
 def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
     case = load_scene_case("example-1bis:pressure=300,penalty=1e4")
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Springs, case, over_a_node, subject
+from strangers import NearbyOnly, TurnedFrame
 from subjects import load_property, load_subject, with_promises
 from test_straight_slaves import RIGHT_ONES
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
@@ -44,6 +45,34 @@ def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id
     for state in cases_of(property_id):
         outcome = judge_case(load_property(property_id), state, STRANGERS[name])
         assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), outcome.reason
+
+
+def ring_in_ring(slave: list[tuple[float, float]], master: list[tuple[float, float]]) -> Case:
+    """Return two closed chains, whose numbers `renumbering` lets go round."""
+    sides = [np.arange(len(slave)), len(slave) + np.arange(len(master))]
+    segments = [np.column_stack([side, np.roll(side, -1)]) for side in sides]
+    nodes = np.array([*slave, *master])
+    interface = Interface(nodes, Surface(segments[0]), Surface(segments[1]))
+    return Case(interface, nodes.reshape(-1), penalty=1.0, seed=0, kind=CLOSED)
+
+
+# In the normal cone of a vertex both segments are equally near. Here a point penetrates one of them, and not the other.
+@pytest.mark.parametrize(
+    ("stranger", "slave", "master"),
+    [
+        (
+            TurnedFrame,
+            [(5.22, 0.03), (1.64, 4.95), (-4.15, 3.07), (-4.15, -3.02), (1.64, -4.9)],
+            [(-2.06, -3.43), (-1.92, 3.51), (4, 0)],
+        ),
+        (NearbyOnly, [(5.5, 0), (-2.625, 4.75), (-2.625, -4.625)], [(0, -4), (0.125, 4), (4, 0)]),
+    ],
+)
+def test_a_point_tied_to_a_segment_that_it_penetrates_and_one_that_it_does_not_accuses_nobody(
+    stranger: Any, slave: list[tuple[float, float]], master: list[tuple[float, float]]
+) -> None:
+    outcome = judge_case(RENUMBERING, ring_in_ring(slave, master), Subject("stranger", stranger))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 class NodalSprings(CentredSprings):

@@ -168,7 +168,8 @@ def _explain(first: Answer, second: Answer, failures: dict[str, float]) -> str:
         reach = COORDINATE_ROUNDING * answer.case.largest_coordinate
         if reason := explain_by_kink(answer.case, answer.formulation, answer.pairing, reach, failures):
             return reason
-    return _find_tie(first)
+    # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
+    return _find_tie(first) or _find_tie(second)
 
 
 def _find_tie(answer: Answer) -> str:

@@ -1,0 +1,58 @@
+"""Tables that the studies of this folder fill a line at a time, and that they continue after a stop."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable
+from multiprocessing import get_context
+from pathlib import Path
+
+FOLDER = Path(__file__).parents[2] / "reports" / "trust"
+
+
+def read(name: str) -> list[dict[str, str]]:
+    """Return the lines of a table in `reports/trust`, none where it is missing."""
+    file = FOLDER / name
+    if not file.exists():
+        return []
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def fill(
+    name: str, heads: Iterable[str], keys: Iterable[str], cells: Callable[[str], list[str]], processes: int = 1
+) -> None:
+    """Write a table with a line for each key: the key, then its cells.
+
+    Lines that are there stay as they are, if the table has the same heads. Delete the file to begin anew.
+
+    Parameters
+    ----------
+    name : str
+        The file's name in `reports/trust`.
+    heads : Iterable[str]
+        The heads of the columns. The first is that of the key.
+    keys : Iterable[str]
+        The keys in the order of the table.
+    cells : Callable[[str], list[str]]
+        A function of a module, which returns the cells of a key.
+    processes : int
+        The number of processes that share the keys.
+    """
+    heads, keys = list(heads), list(keys)
+    lines = {row[heads[0]]: [row[head] for head in heads] for row in read(name) if list(row) == heads}
+    lines = {key: line for key, line in lines.items() if key in keys}
+    _write(name, heads, lines, keys)
+    missing = [key for key in keys if key not in lines]
+    with get_context("spawn").Pool(processes) as pool:
+        for number, (key, line) in enumerate(zip(missing, pool.imap(cells, missing), strict=True), 1):
+            lines[key] = [key, *line]
+            _write(name, heads, lines, keys)
+            print(f"{number} of {len(missing)}: {key}", flush=True)
+
+
+def _write(name: str, heads: list[str], lines: dict[str, list[str]], keys: list[str]) -> None:
+    with (FOLDER / name).open("w", encoding="utf-8", newline="") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(heads)
+        table.writerows(lines[key] for key in keys if key in lines)
