@@ -245,25 +245,64 @@ class System:
         self.seconds["pair"] += perf_counter() - start
         return pairing
 
+    def forces(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+        """Return the residual of the formulation alone, (n_unknowns + n_multipliers,), at the unknowns u (n,)."""
+        start = perf_counter()
+        forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        self.seconds["residual"] += perf_counter() - start
+        return forces
+
+    def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
+        """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
+        start, z = perf_counter(), self.state(u)
+        if self._asks_tangent:
+            tangent = self.formulation.tangent(self.scene.interface, pairing, z)
+        else:
+            tangent = self.differences(pairing, z)
+        self.seconds["tangent"] += perf_counter() - start
+        return tangent
+
+    def forces_and_tangent(
+        self, u: FloatArray, pairing: Pairing | None, *, later: bool = False
+    ) -> tuple[FloatArray, Any]:
+        """Return `forces` and `tangent` at the unknowns u (n,), in one call where the formulation offers that.
+
+        The time of one call counts as that of the tangent, which is the larger part. With `later`, the tangent is None:
+        it may not be needed.
+        """
+        if later:
+            return self.forces(u, pairing), None
+        if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
+            return self.forces(u, pairing), self.tangent(u, pairing)
+        start = perf_counter()
+        both = self.formulation.residual_and_tangent(self.scene.interface, pairing, self.state(u))
+        self.seconds["tangent"] += perf_counter() - start
+        return both
+
+    @property
+    def _asks_tangent(self) -> bool:
+        return self.use_tangent and "tangent" in self.formulation.provides
+
     def residual(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
         """Return the residual (n,) at the unknowns u (n,): forces out of balance, then constraint rows."""
-        start = perf_counter()
-        n_free = self.scene.n_free
-        forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        return self.balance(u, self.forces(u, pairing))
+
+    def balance(self, u: FloatArray, forces: FloatArray) -> FloatArray:
+        """Return the residual (n,) at the unknowns u (n,) where the formulation returns these forces."""
+        start, n_free = perf_counter(), self.scene.n_free
         residual: FloatArray = self.transformation.T @ forces
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
         self.seconds["residual"] += perf_counter() - start
         return residual
 
-    def is_balanced(self, residual: FloatArray, u: FloatArray, pairing: Pairing | None, tolerance: float) -> bool:
+    def is_balanced(self, residual: FloatArray, forces: FloatArray, tolerance: float) -> bool:
         """Return whether a residual (n,) is at most `tolerance` of the largest contact force; False with multipliers.
 
-        Without any contact force nothing is balanced.
+        Without any contact force nothing is balanced. `forces` are those of the formulation at the same unknowns.
         """
         if self.n_multipliers or tolerance == 0:
             return False
-        contact = self.transformation.T @ self.formulation.residual(self.scene.interface, pairing, self.state(u))
-        largest = float(np.abs(contact).max(initial=0.0))
+        largest = float(np.abs(self.transformation.T @ forces).max(initial=0.0))
         return bool(largest > 0 and np.abs(residual).max(initial=0.0) <= tolerance * largest)
 
     def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
@@ -285,12 +324,15 @@ class System:
         floor : FloatArray, shape (n,)
             The effect of the roundoff of positions and forces on each entry of the residual.
         """
+        return self.assemble(u, pairing, *self.forces_and_tangent(u, pairing))
+
+    def assemble(
+        self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
+    ) -> tuple[Any, FloatArray]:
+        """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u (n,); None asks for that."""
+        tangent = self.tangent(u, pairing) if tangent is None else tangent
         start = perf_counter()
         scene, n_free, z = self.scene, self.scene.n_free, self.state(u)
-        if self.use_tangent and "tangent" in self.formulation.provides:
-            tangent = self.formulation.tangent(scene.interface, pairing, z)
-        else:
-            tangent = self.differences(pairing, z)
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
         contact = self.transformation.T @ tangent @ self.transformation
         matrix = self.stiffness + contact
@@ -299,10 +341,9 @@ class System:
         sizes = np.full(self.size, largest)
         sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
         # A force along an inclined normal is rounded in both of its components.
-        forces = abs(self.transformation).T @ np.abs(self.formulation.residual(scene.interface, pairing, z))
-        terms = abs(contact) @ sizes + forces
-        # A displacement below uX moves no node. The displacements of a body that nothing presses shrink by 1e-16 in each
-        # iteration, and so do its forces: counted over those displacements alone, they would never be small.
+        terms = abs(contact) @ sizes + abs(self.transformation).T @ np.abs(forces)
+        # A displacement below uX moves no node. The displacements of a body that nothing presses shrink by 1e-16 in
+        # each iteration, and so do its forces: counted over those displacements alone, they would never be small.
         displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
         terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
         self.seconds["tangent"] += perf_counter() - start
@@ -418,11 +459,13 @@ def _load_step(
         if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= DIVERGENCE_FACTOR * size):
             return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
-        residual = system.residual(u, pairing)
-        if iteration and system.is_balanced(residual, u, pairing, tolerance):
+        share = tolerance if iteration else 0.0
+        forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0)  # The last iterate needs no tangent.
+        residual = system.balance(u, forces)
+        if system.is_balanced(residual, forces, share):
             record.add(u, system.factor, residual, floor, 1.0, _count_changes(pairing, before))
             return End.CONVERGED, u
-        matrix, floor = system.matrix(u, pairing)
+        matrix, floor = system.assemble(u, pairing, forces, tangent)
         comparable = linear.scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
         record.add(u, system.factor, residual, floor, comparable, _count_changes(pairing, before))
         end = _end(record, first, n_free)

@@ -335,6 +335,7 @@ class Wrapped:
         self.traits = inner.traits
         for name in ("pair", "residual", "tangent"):
             setattr(self, name, parts.get(name, getattr(inner, name)))
+        self.residual_and_tangent = parts.get("residual_and_tangent")
 
 
 def wrap_formulation(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
@@ -411,6 +412,45 @@ def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
     with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$"):
         solve(scene, wrap_formulation("vts-ppt-basic", scene, **{verb: third_time}))
     assert calls == 3
+
+
+@pytest.mark.parametrize("in_one_call", [True, False])
+def test_each_iterate_asks_once_for_the_residual_and_once_for_the_tangent(in_one_call: bool) -> None:
+    scene, calls = catalogue.make_scene("c", penalty=1e4, lowered=0.0), []
+    plugin = subject("vts-ppt-basic")._make(penalty=1e4)
+
+    def count(*names: str) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            calls.extend(names)
+            answers = tuple(getattr(plugin, name)(*arguments) for name in names)
+            return answers if len(names) > 1 else answers[0]
+
+        return call
+
+    parts = {"residual": count("residual"), "tangent": count("tangent")}
+    if in_one_call:
+        parts = {name: lambda *_: pytest.fail("one call is enough") for name in parts}
+        parts["residual_and_tangent"] = count("residual", "tangent")
+    trace, reference = (
+        solve(scene, wrap_formulation("vts-ppt-basic", scene, **parts)),
+        solve_named("vts-ppt-basic", scene),
+    )
+    assert calls == ["residual", "tangent"] * len(trace.u)
+    assert np.array_equal(trace.u, reference.u)
+    assert trace.n_iterations == reference.n_iterations > 1
+
+
+def test_no_tangent_where_forces_balance_already() -> None:
+    scene, calls = catalogue.make_scene("c", penalty=1e4, lowered=0.0), []
+    plugin = subject("vts-ppt-basic")._make(penalty=1e4)
+
+    def tangent(*arguments: Any) -> Any:
+        calls.append("tangent")
+        return plugin.tangent(*arguments)
+
+    trace = solve(scene, wrap_formulation("vts-ppt-basic", scene, tangent=tangent), tolerance=1e-6)
+    assert trace.converged
+    assert len(calls) == trace.n_iterations == len(trace.u) - 1
 
 
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
