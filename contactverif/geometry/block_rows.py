@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 
 NumberArray = NDArray[np.int32]
 AnyIntArray = NDArray[Any]  # int32 or int64
@@ -60,121 +60,121 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> spars
         Its columns are ascending in each row. They are int32 where scipy numbers entries so, else int64.
     """
     size = 2 * n_nodes + n_multipliers
-    nodes, starts, first_row = couplings
-    members, member_starts = _couplings_of_columns(n_nodes + n_multipliers, nodes, starts, first_row)
-    indptr = _row_starts(n_nodes, size, nodes, starts, first_row, members, member_starts)
-    n_entries = int(indptr[-1])
+    begins, ends, columns = _columns_of_rows(n_nodes + n_multipliers, *couplings)
+    n_entries = _count_entries(n_nodes, begins, ends, columns)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
-    indices = np.empty(n_entries, dtype=number)
-    _write_columns(indices, n_nodes, indptr, nodes, starts, first_row, members, member_starts)
-    matrix = sparse.csr_array((np.zeros(n_entries), indices, indptr.astype(number)), shape=(size, size))
+    indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
+    _write_pattern(indptr, indices, n_nodes, begins, ends, columns)
+    matrix = sparse.csr_array((np.zeros(n_entries), indices, indptr), shape=(size, size))
     matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
     return matrix
 
 
 @compile_kernel
-def _couplings_of_columns(
+def _columns_of_rows(
     n_numbers: int, nodes: NumberArray, starts: IntArray, first_row: IntArray
-) -> tuple[NumberArray, IntArray]:
-    """Return the couplings in which each node or multiplier occurs, one node after the other, and where each begins."""
-    member_starts = np.zeros(n_numbers + 1, dtype=np.int64)
-    for place in range(len(nodes)):
-        member_starts[nodes[place] + 1] += 1
+) -> tuple[IntArray, IntArray, NumberArray]:
+    """Return the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
+
+    Columns are visited in ascending order, so they are sorted as they come, and one that comes twice was the last.
+    """
+    begins, member_starts = np.zeros(n_numbers + 1, dtype=np.int64), np.zeros(n_numbers + 1, dtype=np.int64)
+    for coupling in range(len(first_row)):
+        start, stop = starts[coupling], starts[coupling + 1]
+        for place in range(start, stop):
+            member_starts[nodes[place] + 1] += 1
+        for place in range(first_row[coupling], stop):
+            begins[nodes[place] + 1] += stop - start
     for number in range(n_numbers):
         member_starts[number + 1] += member_starts[number]
+        begins[number + 1] += begins[number]
+
     members, ends = np.empty(len(nodes), dtype=np.int32), member_starts[:-1].copy()
     for coupling in range(len(first_row)):
         for place in range(starts[coupling], starts[coupling + 1]):
-            number = nodes[place]
-            members[ends[number]] = coupling
-            ends[number] += 1
-    return members, member_starts
+            members[ends[nodes[place]]] = coupling
+            ends[nodes[place]] += 1
 
-
-@compile_kernel
-def _row_starts(
-    n_nodes: int,
-    size: int,
-    nodes: NumberArray,
-    starts: IntArray,
-    first_row: IntArray,
-    members: NumberArray,
-    member_starts: IntArray,
-) -> IntArray:
-    """Return where the entries of each row begin (size + 1,)."""
-    n_numbers = len(member_starts) - 1
-    last_column = np.full(n_numbers, -1, dtype=np.int32)  # The last column that each row has met.
-    indptr = np.zeros(size + 1, dtype=np.int64)
+    columns, ends = np.empty(begins[-1], dtype=np.int32), begins[:-1].copy()
     for column in range(n_numbers):
-        width = 2 if column < n_nodes else 1
         for member in range(member_starts[column], member_starts[column + 1]):
             coupling = members[member]
             for place in range(first_row[coupling], starts[coupling + 1]):
                 row = nodes[place]
-                if last_column[row] != column:
-                    last_column[row] = column
-                    indptr[_first_unknown(row, n_nodes) + 1] += width
-    for row in range(n_nodes):  # both rows of a node have the same columns
-        indptr[2 * row + 2] = indptr[2 * row + 1]
-    for unknown in range(size):
-        indptr[unknown + 1] += indptr[unknown]
-    return indptr
+                end = ends[row]
+                if end == begins[row] or columns[end - 1] != column:
+                    columns[end] = column
+                    ends[row] = end + 1
+    return begins, ends, columns
 
 
 @compile_kernel
-def _write_columns(
-    indices: AnyIntArray,
-    n_nodes: int,
-    indptr: IntArray,
-    nodes: NumberArray,
-    starts: IntArray,
-    first_row: IntArray,
-    members: NumberArray,
-    member_starts: IntArray,
+def _count_entries(n_nodes: int, begins: IntArray, ends: IntArray, columns: NumberArray) -> int:
+    """Return the number of entries in the rows of all nodes and multipliers."""
+    n_entries = 0
+    for row in range(len(ends)):
+        width = _width(n_nodes, begins[row], ends[row], columns)
+        n_entries += 2 * width if row < n_nodes else width
+    return n_entries
+
+
+@compile_kernel
+def _width(n_nodes: int, begin: int, end: int, columns: NumberArray) -> int:
+    """Return how many unknowns the nodes and multipliers columns[begin:end] have."""
+    width = 2 * (end - begin)
+    while end > begin and columns[end - 1] >= n_nodes:
+        width -= 1
+        end -= 1
+    return width
+
+
+@compile_kernel
+def _write_pattern(
+    indptr: AnyIntArray, indices: AnyIntArray, n_nodes: int, begins: IntArray, ends: IntArray, columns: NumberArray
 ) -> None:
-    """Write the columns of all rows. Columns are met in ascending order, so they are sorted as they stand."""
-    n_numbers = len(member_starts) - 1
-    last_column = np.full(n_numbers, -1, dtype=np.int32)
-    ends = np.empty(n_numbers, dtype=np.int64)  # The place of the next column of each row.
-    for row in range(n_numbers):
-        ends[row] = indptr[_first_unknown(row, n_nodes)]
-    for column in range(n_numbers):
-        unknown = _first_unknown(column, n_nodes)
-        for member in range(member_starts[column], member_starts[column + 1]):
-            coupling = members[member]
-            for place in range(first_row[coupling], starts[coupling + 1]):
-                row = nodes[place]
-                if last_column[row] == column:
-                    continue
-                last_column[row] = column
-                first = _first_unknown(row, n_nodes)
-                at, width = ends[row], indptr[first + 1] - indptr[first]
-                ends[row] += 2 if column < n_nodes else 1
-                for _ in range(2 if row < n_nodes else 1):
-                    indices[at] = unknown
-                    if column < n_nodes:
-                        indices[at + 1] = unknown + 1
-                    at += width
+    """Write the starts of all rows of unknowns, and their columns."""
+    at, unknown = 0, 0
+    indptr[0] = 0
+    for row in range(len(ends)):
+        for _ in range(2 if row < n_nodes else 1):
+            for place in range(begins[row], ends[row]):
+                column = columns[place]
+                if column < n_nodes:
+                    indices[at], indices[at + 1] = 2 * column, 2 * column + 1
+                    at += 2
+                else:
+                    indices[at] = n_nodes + column
+                    at += 1
+            unknown += 1
+            indptr[unknown] = at
 
 
-@compile_kernel
-def _first_unknown(number: int, n_nodes: int) -> int:
-    """Return the first unknown of a node, or the unknown of a multiplier."""
-    return 2 * number if number < n_nodes else n_nodes + number
+@compile_inline
+def find_node(indices: AnyIntArray, first: int, last: int, column: int) -> int:
+    """Return the place of the first column of a node among indices[first:last], the columns of a row; it must be there.
 
-
-@compile_kernel
-def find_place(indices: AnyIntArray, first: int, last: int, column: int) -> int:
-    """Return where a column stands among the ascending columns indices[first:last] of a row; it must be there."""
-    count = last - first
+    Columns of nodes come in pairs, before those of multipliers. So every second column is enough.
+    """
+    count = (last - first + 1) >> 1
     while count > 1:
-        half = count // 2
-        first += half if indices[first + half] <= column else 0
+        half = count >> 1
+        first += 2 * half if indices[first + 2 * half] <= column else 0
         count -= half
     return first
 
 
 @compile_kernel
+def find_entry(indices: AnyIntArray, first: int, last: int, column: int) -> int:
+    """Return the place of a column among indices[first:last], the ascending columns of a row; it must be there."""
+    count = last - first
+    while count > 1:
+        half = count >> 1
+        first += half if indices[first + half] <= column else 0
+        count -= half
+    return first
+
+
+@compile_inline
 def add_block(
     indptr: IntArray,
     indices: AnyIntArray,
@@ -188,7 +188,7 @@ def add_block(
 ) -> None:
     """Add the block ((xx, xy), (yx, yy)) to the rows of the node `row` and the columns of the node `column`."""
     first, second = indptr[2 * row], indptr[2 * row + 1]
-    place = find_place(indices, first, second, 2 * column)
+    place = find_node(indices, first, second, 2 * column)
     data[place] += xx
     data[place + 1] += xy
     place += second - first
@@ -196,23 +196,23 @@ def add_block(
     data[place + 1] += yy
 
 
-@compile_kernel
+@compile_inline
 def add_row(
     indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, unknown: int, column: int, x: float, y: float
 ) -> None:
     """Add (x, y) to the row of the multiplier with this unknown and the columns of the node `column`."""
-    place = find_place(indices, indptr[unknown], indptr[unknown + 1], 2 * column)
+    place = find_node(indices, indptr[unknown], indptr[unknown + 1], 2 * column)
     data[place] += x
     data[place + 1] += y
 
 
-@compile_kernel
+@compile_inline
 def add_column(
     indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, unknown: int, x: float, y: float
 ) -> None:
     """Add (x, y) to the rows of the node `row` and the column of the multiplier with this unknown."""
     first, second = indptr[2 * row], indptr[2 * row + 1]
-    place = find_place(indices, first, second, unknown)
+    place = find_entry(indices, first, second, unknown)
     data[place] += x
     data[place + second - first] += y
 
@@ -220,4 +220,4 @@ def add_column(
 @compile_kernel
 def add_entry(indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, column: int, value: float) -> None:
     """Add a number to one entry, whose row and column are unknowns."""
-    data[find_place(indices, indptr[row], indptr[row + 1], column)] += value
+    data[find_entry(indices, indptr[row], indptr[row + 1], column)] += value

@@ -29,6 +29,14 @@ def compile_kernel(function: Kernel) -> Kernel:
     return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
 
 
+def compile_inline(function: Kernel) -> Kernel:
+    """Compile a function as `compile_kernel` does, and put its code wherever a kernel calls it.
+
+    A call that hands on an array costs two atomic operations. Use this for what a loop calls for each point.
+    """
+    return cast(Kernel, numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
+
+
 def python_function(function: Kernel) -> Kernel:
     """Return the Python function behind a compiled one, or the function itself if it is not compiled."""
     return cast(Kernel, getattr(function, "py_func", function))

@@ -1,14 +1,15 @@
 """The exact tangent of VTS-PPT: the derivative of `box3.residual`, as Appendix A of the paper derives it.
 
-A Δ of a number is an array (n_local, 2): what the number gains for each displacement of each local node. Every Δ of a
-virtual slave node depends on the first `N_CORE` local nodes at most. Only the Δ of a master segment's part depend on
-its nodes f and m, too.
+A Δ of a number belongs to one node at a time, a column of the tangent: it is the vector of what the number gains for a
+displacement of that node along x and along y. Every Δ of a virtual slave node is zero but for its first `N_CORE` local
+nodes. Only the Δ of a master segment's part belong to its nodes f and m, too.
 
 Rules for the next editor:
 
 1. What is frozen in the pairing has no Δ.
 2. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `eq6` says why.
-3. Entries of one place add up, so the order of entries does not matter; their number does (`_count_entries`).
+3. `list_couplings` says which nodes feel which. `add_tangent` writes no other block.
+4. Nothing is allocated for a point: vectors and named tuples of numbers are free, arrays are not.
 
 Source: Zavarise & De Lorenzis (2009), Eqs. 8–11, A1–A28.
 """
@@ -20,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_column, add_entry, add_row
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
 from contactverif_nts.box3 import (
     BALANCED,
@@ -34,38 +36,101 @@ from contactverif_nts.box3 import (
     virtual_slave_node,
 )
 from contactverif_nts.eq6 import Fields
+from contactverif_nts.turned_force import ZERO, add_turned_force, plus, times
 from contactverif_nts.walk import NOT_CUT
 
-# Local nodes: A, B, 1, 2; where the area is cut, the nodes of the segment of the frame and the two that cut; f, m.
-A, B, NODE_1, NODE_2, FRAME_1, FRAME_2, CUT_P, CUT_Q, F, M = range(10)
-N_UNCUT, N_CORE, N_LOCAL = 4, 8, 10
-NO_MULTIPLIER = -1
+# Local nodes: where the area is cut, the nodes of the segment of the frame and the two that cut; 1, 2, A, B; f, m.
+FRAME_1, FRAME_2, CUT_P, CUT_Q, NODE_1, NODE_2, A, B, F, M = range(10)
+N_CORE, N_LOCAL = 8, 10
 
 
-class Local(NamedTuple):
-    """The numbers that all entries of one virtual slave node share."""
+class Cut(NamedTuple):
+    """An end of an area of competence, c = c_P or c_Q, that a master node cuts in the frame of a master segment."""
 
-    n_core: int  # N_UNCUT, or N_CORE where the area is cut
-    unknown: int  # row and column of the multiplier, or NO_MULTIPLIER
+    by: int  # CUT_P or CUT_Q, the local node that cuts, or NOT_CUT
+    c: float
+    l_12: float
     t: Vector
     normal: Vector
+    half: float  # t·(x_B − x_A)/2, what s gains for each unit of c
+    lever: float  # (x_c − x_e)·n
+
+
+class Gains(NamedTuple):
+    """What the numbers of a virtual slave node gain for a displacement of one node."""
+
+    c_p: Vector
+    c_q: Vector
+    omega: Vector
+    g: Vector
+    xi: Vector
+    l_ab: Vector
+
+
+class Lever(NamedTuple):
+    """What all derivatives of one virtual slave node share."""
+
+    xi: float
+    per_length: float  # 1/l of the master segment
+    t_ab: Vector  # the tangent of the slave segment, or zero where its length is that of the reference configuration
+    along: float  # t·(x_B − x_A)/2
+    across: float  # n·(x_B − x_A)/2
+    p_cut: Cut
+    q_cut: Cut
+
+
+class Force(NamedTuple):
+    """The force of a virtual slave node, negative where it presses."""
+
+    stiffness: float  # the penalty, or 1 for a multiplier: the pressure is −stiffness × e
+    e: float  # the gap, or −λ
+    l_ab: float
+    share: float  # (c_P − c_Q)/2
+    size: float  # l_AB × share, the force of a unit pressure
+    f_v: float  # F_V = stiffness × e × size
+    is_spring: bool  # e is the gap, not a multiplier
 
 
 class Pressure(NamedTuple):
-    """The pressure on the master segments of one virtual slave node, negative where it presses."""
+    """The pressure on the master segments of a virtual slave node, negative where it presses."""
 
-    size: float
-    by_multiplier: float  # its derivative by the multiplier, sign reversed
+    is_balanced: bool
+    s: float  # S = ΣW
+    size: float  # F_V/S, or stiffness × e
+    unit: float  # its derivative by the multiplier, sign reversed
+
+
+class Part(NamedTuple):
+    """The part [a, b] of one master segment f m under an area of competence (Box 3)."""
+
+    length: float  # L_j
+    per_length: float  # 1/L_j
+    rise: float  # (x_m − x_f)·n
+    a: float
+    b: float
+    a_moves: bool  # a is where P projects, else it is fixed
+    b_moves: bool
+    a_lever: float  # (x_P − (1−a)x_f − a x_m)·n
+    b_lever: float
 
 
 @compile_kernel
-def tangent(
-    x: FloatArray, multipliers: FloatArray, surfaces: Fields, areas: Fields, options: Fields
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """Compute the derivative of `residual` at one state, as rows, columns and values; entries of one place add up.
+def add_tangent(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    x: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    areas: Fields,
+    options: Fields,
+) -> None:
+    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`.
 
     Parameters
     ----------
+    indptr, indices, data : AnyIntArray, AnyIntArray, FloatArray
+        The matrix in compressed rows.
     x : FloatArray, shape (n_nodes, 2)
         Positions.
     multipliers : FloatArray, shape (n_multipliers,)
@@ -81,272 +146,378 @@ def tangent(
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     n, transmission, current_area, penalty = options
     has_multipliers = len(multipliers) > 0
-    n_entries = _count_entries(neighbours, first, last, cutting, active, has_multipliers)
-    index, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
-    nodes, gains = np.empty(N_LOCAL, dtype=np.int64), np.empty((7, N_CORE, 2))
-    d_cp, d_cq, d_omega, d_g, d_xi, d_l, d_pressure = gains
+    nodes = np.empty(N_LOCAL, dtype=np.int32)
     for i in range(len(active)):
-        unknown = x.size + i if has_multipliers else NO_MULTIPLIER
+        unknown = x.size + i  # row and column of the multiplier
         if not active[i]:
             if has_multipliers:
-                index[0, place], index[1, place] = unknown, unknown
-                values[place] = segment_length(reference, slave, i // n) / n
-                place += 1
+                add_entry(indptr, indices, data, unknown, unknown, segment_length(reference, slave, i // n) / n)
             continue
         area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
-        n_core = _fill_nodes(nodes, slave[i // n], master, area)
+        begin = _fill_nodes(nodes, slave, master, i // n, area)
         x_a, x_b, x_1, x_2 = node(x, nodes[A]), node(x, nodes[B]), node(x, nodes[NODE_1]), node(x, nodes[NODE_2])
         c_p, c_q = area_of_competence(x, slave, master, n, i, area.frame, area.cut_p, area.cut_q)
         l_ab = length_of_area(x_a, x_b, node(reference, nodes[A]), node(reference, nodes[B]), current_area)
         v = virtual_slave_node(x_a, x_b, x_1, x_2, c_p, c_q)
-        _fill_gains(gains, x, nodes, area, v, current_area)
-        at = Local(n_core, unknown, v.t, v.normal)
-
-        c, d_c, share = v.c, (d_cp + d_cq) / 2, (v.c_p - v.c_q) / 2
-        stiffness, e, d_e = penalty, v.g, d_g  # the pressure is −stiffness × e
-        if has_multipliers:
-            stiffness, e, d_e = 1.0, -multipliers[i], np.zeros((N_CORE, 2))
-            d_row = -(share * (l_ab * d_g + v.g * d_l) + v.g * l_ab * (d_cp - d_cq) / 2)
-            place = _add_constraint(index, values, place, nodes, at, d_row)
-        size = l_ab * share  # the force of a unit pressure
+        at = _lever(x, nodes, v, area, current_area)
+        stiffness, e = (1.0, -multipliers[i]) if has_multipliers else (penalty, v.g)
+        share = (v.c_p - v.c_q) / 2
         f_v = stiffness * e * l_ab * share
-        d_f = stiffness * share * (l_ab * d_e + e * d_l) + stiffness * e * l_ab * (d_cp - d_cq) / 2
-        d_fa, d_fb = (1 - c) / 2 * d_f - f_v / 2 * d_c, (1 + c) / 2 * d_f + f_v / 2 * d_c
-        place = _add_force(index, values, place, nodes, at, A, (1 - c) / 2 * f_v, d_fa, d_omega, (1 - c) / 2 * size)
-        place = _add_force(index, values, place, nodes, at, B, (1 + c) / 2 * f_v, d_fb, d_omega, (1 + c) / 2 * size)
-        if area.first == area.last:
-            xi = dot(v.d, v.t) / v.l_12
-            d_f1, d_f2 = -(1 - xi) * d_f + f_v * d_xi, -xi * d_f - f_v * d_xi
-            f_1, size_1 = -(1 - xi) * f_v, -(1 - xi) * size
-            place = _add_force(index, values, place, nodes, at, NODE_1, f_1, d_f1, d_omega, size_1)
-            place = _add_force(index, values, place, nodes, at, NODE_2, -xi * f_v, d_f2, d_omega, -xi * size)
+        force = Force(stiffness, e, l_ab, share, l_ab * share, f_v, not has_multipliers)
+        _add_slave_rows(indptr, indices, data, nodes, begin, v, at, force)
+        if has_multipliers:
+            _add_constraint(indptr, indices, data, nodes, begin, unknown, v, at, force)
+        if area.first == area.last:  # IF only one segment is involved THEN Eq. 6
+            _add_eq6_rows(indptr, indices, data, nodes, begin, unknown, v, at, force)
             continue
-        pressure = Pressure(stiffness * e, 1.0)
-        d_pressure[:] = stiffness * d_e
+        s = sum_of_parts(v)  # ELSE assembly of all the involved segments
+        pressure = Pressure(False, s, stiffness * e, 1.0)
         if transmission == BALANCED:
-            s, d_s = _sum_of_parts(v, d_cp, d_cq, d_omega)
-            pressure = Pressure(f_v / s, size / s)
-            d_pressure[:] = d_f / s - f_v * d_s / (s * s)
-        place = _add_segments(index, values, place, nodes, at, x, master, neighbours, area, v, gains, pressure)
-    return index[0], index[1], values
+            pressure = Pressure(True, s, f_v / s, l_ab * share / s)
+        j = area.first
+        while True:
+            nodes[F], nodes[M] = master[j, 0], master[j, 1]
+            part = _part(node(x, nodes[F]), node(x, nodes[M]), v, area, j)
+            _add_segment_rows(indptr, indices, data, nodes, begin, unknown, v, at, force, pressure, part)
+            if j == area.last:
+                break
+            j = neighbours[j, 1]
 
 
-@compile_kernel
-def _fill_nodes(nodes: IntArray, ab: IntArray, master: IntArray, area: Area) -> int:
-    """Write the local nodes of a virtual slave node, except f and m, into `nodes`; return how many there are."""
-    nodes[A], nodes[B] = ab
+@compile_inline
+def _add_slave_rows(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    v: VirtualSlaveNode,
+    at: Lever,
+    force: Force,
+) -> None:
+    """Add Δ of the forces on A and B, (1 ∓ c)/2 F_V n."""
+    c, f_v = v.c, force.f_v
+    for k in range(begin, N_CORE):
+        d = _gains(k, v, at)
+        d_f, d_c = _gain_of_force(d, force), times(0.5, plus(d.c_p, d.c_q))
+        d_fa = plus(times((1 - c) / 2, d_f), times(-f_v / 2, d_c))
+        d_fb = plus(times((1 + c) / 2, d_f), times(f_v / 2, d_c))
+        add_turned_force(indptr, indices, data, nodes[A], nodes[k], v.normal, v.t, (1 - c) / 2 * f_v, d_fa, d.omega)
+        add_turned_force(indptr, indices, data, nodes[B], nodes[k], v.normal, v.t, (1 + c) / 2 * f_v, d_fb, d.omega)
+
+
+@compile_inline
+def _add_eq6_rows(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    unknown: int,
+    v: VirtualSlaveNode,
+    at: Lever,
+    force: Force,
+) -> None:
+    """Add Δ of the forces on the nodes of one master segment, −(1−ξ) F_V n and −ξ F_V n."""
+    xi, f_v = at.xi, force.f_v
+    f_1, f_2 = -(1 - xi) * f_v, -xi * f_v
+    for k in range(begin, N_CORE):
+        d = _gains(k, v, at)
+        d_f = _gain_of_force(d, force)
+        d_f1, d_f2 = plus(times(-(1 - xi), d_f), times(f_v, d.xi)), plus(times(-xi, d_f), times(-f_v, d.xi))
+        add_turned_force(indptr, indices, data, nodes[NODE_1], nodes[k], v.normal, v.t, f_1, d_f1, d.omega)
+        add_turned_force(indptr, indices, data, nodes[NODE_2], nodes[k], v.normal, v.t, f_2, d_f2, d.omega)
+    if not force.is_spring:
+        _add_push(indptr, indices, data, nodes[NODE_1], unknown, (1 - xi) * force.size, v.normal)
+        _add_push(indptr, indices, data, nodes[NODE_2], unknown, xi * force.size, v.normal)
+
+
+@compile_inline
+def _add_segment_rows(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    unknown: int,
+    v: VirtualSlaveNode,
+    at: Lever,
+    force: Force,
+    pressure: Pressure,
+    part: Part,
+) -> None:
+    """Add Δ of the forces on the nodes f and m of one of several master segments, −pressure × W n (Box 3)."""
+    p, s = pressure.size, pressure.s
+    w_f, w_m = _shares(part)
+    for k in range(begin, N_LOCAL):
+        d = _gains(k, v, at)
+        d_p = times(force.stiffness, d.g) if force.is_spring else ZERO
+        if pressure.is_balanced:
+            d_s = _gain_of_sum(k, d, v, at)
+            d_p = plus(times(1 / s, _gain_of_force(d, force)), times(-force.f_v / (s * s), d_s))
+        d_wf, d_wm = _gains_of_shares(k, d, v, at, part)
+        d_ff, d_fm = plus(times(-w_f, d_p), times(-p, d_wf)), plus(times(-w_m, d_p), times(-p, d_wm))
+        add_turned_force(indptr, indices, data, nodes[F], nodes[k], v.normal, v.t, -p * w_f, d_ff, d.omega)
+        add_turned_force(indptr, indices, data, nodes[M], nodes[k], v.normal, v.t, -p * w_m, d_fm, d.omega)
+    if not force.is_spring:
+        _add_push(indptr, indices, data, nodes[F], unknown, pressure.unit * w_f, v.normal)
+        _add_push(indptr, indices, data, nodes[M], unknown, pressure.unit * w_m, v.normal)
+
+
+@compile_inline
+def _add_constraint(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    unknown: int,
+    v: VirtualSlaveNode,
+    at: Lever,
+    force: Force,
+) -> None:
+    """Add Δ of the constraint −g × size, and what a unit of the multiplier pushes A and B with: −size n."""
+    for k in range(begin, N_CORE):
+        d = _gains(k, v, at)
+        d_size = plus(times(force.share, d.l_ab), times(force.l_ab / 2, minus(d.c_p, d.c_q)))
+        d_row = plus(times(-force.size, d.g), times(-v.g, d_size))
+        add_row(indptr, indices, data, unknown, nodes[k], d_row[0], d_row[1])
+    _add_push(indptr, indices, data, nodes[A], unknown, -(1 - v.c) / 2 * force.size, v.normal)
+    _add_push(indptr, indices, data, nodes[B], unknown, -(1 + v.c) / 2 * force.size, v.normal)
+
+
+@compile_inline
+def _fill_nodes(nodes: NumberArray, slave: IntArray, master: IntArray, segment: int, area: Area) -> int:
+    """Write the local nodes of a virtual slave node, except f and m, into `nodes`; return the first one."""
+    nodes[A], nodes[B] = slave[segment, 0], slave[segment, 1]
     nodes[NODE_1], nodes[NODE_2] = master[area.master, 0], master[area.master, 1]
     if area.frame == NOT_CUT:
-        return N_UNCUT
+        return NODE_1
     nodes[FRAME_1], nodes[FRAME_2] = master[area.frame, 0], master[area.frame, 1]
     nodes[CUT_P] = nodes[FRAME_1] if area.cut_p == NOT_CUT else area.cut_p
     nodes[CUT_Q] = nodes[FRAME_2] if area.cut_q == NOT_CUT else area.cut_q
-    return N_CORE
+    return FRAME_1
 
 
 @compile_kernel
-def _fill_gains(
-    gains: FloatArray, x: FloatArray, nodes: IntArray, area: Area, v: VirtualSlaveNode, current_area: bool
-) -> None:
-    """Write Δc_P, Δc_Q, Δω, Δg, Δξ and Δl_AB of V into `gains` (7, N_CORE, 2); the last Δ, of the pressure, is zero."""
-    gains[:] = 0.0
-    d_cp, d_cq, d_omega, d_g, d_xi, d_l, _ = gains
-    if area.cut_p != NOT_CUT:
-        _add_cut(d_cp, x, nodes, CUT_P, v.c_p)
-    if area.cut_q != NOT_CUT:
-        _add_cut(d_cq, x, nodes, CUT_Q, v.c_q)
-    d_c = (d_cp + d_cq) / 2
-    ab, xi = minus(v.x_b, v.x_a), dot(v.d, v.t) / v.l_12
-    for i in range(2):
-        d_omega[NODE_1, i] = -v.normal[i] / v.l_12  # ω = n·(Δx2 − Δx1)/l
-        d_omega[NODE_2, i] = v.normal[i] / v.l_12
-        for k, shape in ((A, (1 - v.c) / 2), (B, (1 + v.c) / 2), (NODE_1, -(1 - xi)), (NODE_2, -xi)):
-            d_g[k, i] = shape * v.normal[i]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
-            d_xi[k, i] = shape * v.t[i] / v.l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
-    d_g += dot(ab, v.normal) / 2 * d_c  # Δx_V gains (x_B − x_A)/2 Δc_V
-    d_xi += dot(ab, v.t) / 2 * d_c / v.l_12 + v.g * d_omega / v.l_12
-    if current_area:
-        _, t_ab, _ = frame(v.x_a, v.x_b)
-        for i in range(2):  # Δl_AB = t_AB·(Δx_B − Δx_A)
-            d_l[A, i], d_l[B, i] = -t_ab[i], t_ab[i]
+def _cut(x: FloatArray, nodes: NumberArray, by: int, v: VirtualSlaveNode, c: float) -> Cut:
+    """Return the cut of the end c of an area by the local node `by`, or one that is none where `by` is NOT_CUT."""
+    if by == NOT_CUT:
+        return Cut(by, c, 1.0, ZERO, ZERO, 1.0, 0.0)
+    l_12, t, normal = frame(node(x, nodes[FRAME_1]), node(x, nodes[FRAME_2]))
+    half = dot(minus(v.x_b, v.x_a), t) / 2
+    lever = dot(arm(node(x, nodes[by]), PointOnSegment(v.x_a, v.x_b, c)), normal)
+    return Cut(by, c, l_12, t, normal, half, lever)
 
 
-@compile_kernel
-def _add_cut(d_c: FloatArray, x: FloatArray, nodes: IntArray, cutting_node: int, c: float) -> None:
-    """Add Δ of the cut end c = c_P or c_Q, in the frame of the segment that cuts.
+@compile_inline
+def _gain_of_cut(k: int, cut: Cut) -> Vector:
+    """Return Δc of a cut end for a displacement of the local node k.
 
     Δc = −[t·(Δx_c − Δx_e) + ((x_c − x_e)·n) ω] / (t·(x_B − x_A)/2), e the cutting node, Δx_c at fixed c.
     """
-    x_a, x_b, x_e = node(x, nodes[A]), node(x, nodes[B]), node(x, nodes[cutting_node])
-    l_12, t, normal = frame(node(x, nodes[FRAME_1]), node(x, nodes[FRAME_2]))
-    half = dot(minus(x_b, x_a), t) / 2
-    lever = dot(arm(x_e, PointOnSegment(x_a, x_b, c)), normal)
-    for i in range(2):
-        d_c[A, i] -= (1 - c) / 2 * t[i] / half
-        d_c[B, i] -= (1 + c) / 2 * t[i] / half
-        d_c[cutting_node, i] += t[i] / half
-        d_c[FRAME_1, i] += lever * normal[i] / l_12 / half
-        d_c[FRAME_2, i] -= lever * normal[i] / l_12 / half
+    along, turning = 0.0, 0.0
+    if cut.by == NOT_CUT:
+        return ZERO
+    if k == A:
+        along = -(1 - cut.c) / 2
+    elif k == B:
+        along = -(1 + cut.c) / 2
+    elif k == cut.by:
+        along = 1.0
+    elif k == FRAME_1:
+        turning = cut.lever / cut.l_12
+    elif k == FRAME_2:
+        turning = -cut.lever / cut.l_12
+    return times(1 / cut.half, plus(times(along, cut.t), times(turning, cut.normal)))
 
 
-@compile_kernel
-def _sum_of_parts(
-    v: VirtualSlaveNode, d_cp: FloatArray, d_cq: FloatArray, d_omega: FloatArray
-) -> tuple[float, FloatArray]:
-    """Return S = ΣW = s(Q) − s(P) and ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω."""
-    pq = from_p_to_q(v)
+@compile_inline
+def _lever(x: FloatArray, nodes: NumberArray, v: VirtualSlaveNode, area: Area, current_area: bool) -> Lever:
+    """Return what all derivatives of a virtual slave node share."""
+    ab, per_length = minus(v.x_b, v.x_a), 1 / v.l_12
+    _, t_ab, _ = frame(v.x_a, v.x_b)
+    t_ab = t_ab if current_area else ZERO
+    p_cut = _cut(x, nodes, NOT_CUT if area.cut_p == NOT_CUT else CUT_P, v, v.c_p)
+    q_cut = _cut(x, nodes, NOT_CUT if area.cut_q == NOT_CUT else CUT_Q, v, v.c_q)
+    xi = dot(v.d, v.t) / v.l_12
+    return Lever(xi, per_length, t_ab, dot(ab, v.t) / 2, dot(ab, v.normal) / 2, p_cut, q_cut)
+
+
+@compile_inline
+def _gains(k: int, v: VirtualSlaveNode, at: Lever) -> Gains:
+    """Return Δc_P, Δc_Q, Δω, Δg, Δξ and Δl_AB of V for a displacement of the local node k."""
+    c_p, c_q = _gain_of_cut(k, at.p_cut), _gain_of_cut(k, at.q_cut)
+    d_c = times(0.5, plus(c_p, c_q))  # Δx_V gains (x_B − x_A)/2 Δc_V where the area is cut
+    omega, l_ab, shape = ZERO, ZERO, 0.0
+    if k == NODE_1:
+        shape, omega = -(1 - at.xi), times(-at.per_length, v.normal)  # ω = n·(Δx2 − Δx1)/l
+    elif k == NODE_2:
+        shape, omega = -at.xi, times(at.per_length, v.normal)
+    elif k == A:
+        shape, l_ab = (1 - v.c) / 2, times(-1.0, at.t_ab)  # Δl_AB = t_AB·(Δx_B − Δx_A)
+    elif k == B:
+        shape, l_ab = (1 + v.c) / 2, at.t_ab
+    g = plus(times(shape, v.normal), times(at.across, d_c))  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
+    s = plus(times(shape, v.t), times(at.along, d_c))
+    d_xi = times(at.per_length, plus(s, times(v.g, omega)))  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
+    return Gains(c_p, c_q, omega, g, d_xi, l_ab)
+
+
+@compile_inline
+def _gain_of_force(d: Gains, force: Force) -> Vector:
+    """Return ΔF_V = stiffness × (size Δe + e share Δl_AB + e l_AB (Δc_P − Δc_Q)/2)."""
+    by_e = times(force.size, d.g) if force.is_spring else ZERO
+    by_size = plus(times(force.share, d.l_ab), times(force.l_ab / 2, minus(d.c_p, d.c_q)))
+    return times(force.stiffness, plus(by_e, times(force.e, by_size)))
+
+
+@compile_inline
+def _gain_of_sum(k: int, d: Gains, v: VirtualSlaveNode, at: Lever) -> Vector:
+    """Return ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω, where S = ΣW = s(Q) − s(P)."""
     share = (v.c_p - v.c_q) / 2
-    d_s = dot(pq, v.normal) * d_omega + dot(minus(v.x_b, v.x_a), v.t) / 2 * (d_cq - d_cp)
-    for i in range(2):
-        d_s[A, i] += share * v.t[i]
-        d_s[B, i] -= share * v.t[i]
-    return sum_of_parts(v), d_s
+    along = share if k == A else (-share if k == B else 0.0)
+    d_s = plus(times(along, v.t), times(dot(from_p_to_q(v), v.normal), d.omega))
+    return plus(d_s, times(at.along, minus(d.c_q, d.c_p)))
 
 
-@compile_kernel
-def _add_segments(
-    index: IntArray,
-    values: FloatArray,
-    place: int,
-    nodes: IntArray,
-    at: Local,
-    x: FloatArray,
-    master: IntArray,
-    neighbours: IntArray,
-    area: Area,
-    v: VirtualSlaveNode,
-    gains: FloatArray,
-    pressure: Pressure,
-) -> int:
-    """Enter Δ of −pressure × W n for all involved master segments; return the next place."""
-    d_cp, d_cq, d_omega, _, _, _, d_pressure = gains
-    p, unit = pressure
-    d_p = np.zeros((N_LOCAL, 2))
-    d_p[:N_CORE] = d_pressure
-    j = area.first
-    while True:
-        nodes[F], nodes[M] = master[j, 0], master[j, 1]
-        x_f, x_m = node(x, nodes[F]), node(x, nodes[M])
-        length = dot(minus(x_m, x_f), v.t)
-        d_length, d_a, d_b = np.zeros((3, N_LOCAL, 2))
-        d_length[:N_CORE] = dot(minus(x_m, x_f), v.normal) * d_omega  # ΔL_j = t·(Δx_m − Δx_f) + ((x_m − x_f)·n) ω
-        for i in range(2):
-            d_length[F, i] -= v.t[i]
-            d_length[M, i] += v.t[i]
-        a, b = 0.0, 1.0
-        if j == area.first:
-            a = _end_of_part(d_a, v, v.p, d_cp, area.clip_p, x_f, x_m, d_omega)
-        if j == area.last:
-            b = _end_of_part(d_b, v, v.q, d_cq, area.clip_q, x_f, x_m, d_omega)
-        w_m = length * (b * b - a * a) / 2
-        w_f = length * ((b - a) - (b * b - a * a) / 2)
-        d_wm = length * (b * d_b - a * d_a) + (b * b - a * a) / 2 * d_length
-        d_wf = length * (d_b - d_a - (b * d_b - a * d_a)) + ((b - a) - (b * b - a * a) / 2) * d_length
-        d_ff, d_fm = -(w_f * d_p + p * d_wf), -(w_m * d_p + p * d_wm)
-        place = _add_force(index, values, place, nodes, at, F, -p * w_f, d_ff, d_omega, -unit * w_f)
-        place = _add_force(index, values, place, nodes, at, M, -p * w_m, d_fm, d_omega, -unit * w_m)
-        if j == area.last:
-            return place
-        j = neighbours[j, 1]
+@compile_inline
+def _part(x_f: Vector, x_m: Vector, v: VirtualSlaveNode, area: Area, j: int) -> Part:
+    """Return the part of master segment j with the nodes f and m, and what its derivative needs."""
+    fm = minus(x_m, x_f)
+    length, rise = dot(fm, v.t), dot(fm, v.normal)
+    a, b, a_lever, b_lever = 0.0, 1.0, 0.0, 0.0
+    a_moves, b_moves = j == area.first and area.clip_p == NOT_CUT, j == area.last and area.clip_q == NOT_CUT
+    if a_moves:
+        fp = arm(x_f, v.p)
+        a = dot(fp, v.t) / length
+        a_lever = dot(fp, v.normal) - a * rise
+    elif j == area.first:
+        a = float(area.clip_p)
+    if b_moves:
+        fq = arm(x_f, v.q)
+        b = dot(fq, v.t) / length
+        b_lever = dot(fq, v.normal) - b * rise
+    elif j == area.last:
+        b = float(area.clip_q)
+    return Part(length, 1 / length, rise, a, b, a_moves, b_moves, a_lever, b_lever)
 
 
-@compile_kernel
-def _end_of_part(
-    d_end: FloatArray,
-    v: VirtualSlaveNode,
-    p: PointOnSegment,
-    d_c_end: FloatArray,
-    clip: int,
-    x_f: Vector,
-    x_m: Vector,
-    d_omega: FloatArray,
-) -> float:
-    """Return where the end p of the area lies on the master segment f m, a of P or b of Q, and add its Δ to `d_end`.
+@compile_inline
+def _shares(part: Part) -> tuple[float, float]:
+    """Return W_f and W_m of a part (Eq. 9)."""
+    half = (part.b * part.b - part.a * part.a) / 2
+    return part.length * ((part.b - part.a) - half), part.length * half
 
-    L_j Δa = t·(Δx_P − (1−a)Δx_f − aΔx_m) + ((x_P − (1−a)x_f − a x_m)·n) ω, likewise b with Q. A clipped end is fixed.
+
+@compile_inline
+def _gains_of_shares(k: int, d: Gains, v: VirtualSlaveNode, at: Lever, part: Part) -> tuple[Vector, Vector]:
+    """Return ΔW_f and ΔW_m of a part for a displacement of the local node k (A13–A27)."""
+    length, a, b = part.length, part.a, part.b
+    sign = 1 if k == M else (-1 if k == F else 0)
+    d_length = plus(times(sign, v.t), times(part.rise, d.omega))  # ΔL_j = t·(Δx_m − Δx_f) + ((x_m − x_f)·n) ω
+    d_a, d_b = ZERO, ZERO
+    if part.a_moves:
+        d_a = times(part.per_length, _gain_of_end(k, d, v.t, at.along, v.c_p, d.c_p, a, part.a_lever))
+    if part.b_moves:
+        d_b = times(part.per_length, _gain_of_end(k, d, v.t, at.along, v.c_q, d.c_q, b, part.b_lever))
+    moment = minus(times(b, d_b), times(a, d_a))  # b Δb − a Δa
+    half = (b * b - a * a) / 2
+    d_wm = plus(times(length, moment), times(half, d_length))
+    d_wf = plus(times(length, minus(minus(d_b, d_a), moment)), times((b - a) - half, d_length))
+    return d_wf, d_wm
+
+
+@compile_inline
+def _gain_of_end(k: int, d: Gains, t: Vector, along: float, c: float, d_c: Vector, end: float, lever: float) -> Vector:
+    """Return L_j Δa of the end P at c = c_P, or L_j Δb of Q.
+
+    L_j Δa = t·(Δx_P − (1−a)Δx_f − aΔx_m) + ((x_P − (1−a)x_f − a x_m)·n) ω.
     """
-    if clip != NOT_CUT:
-        return float(clip)
-    fm, fp = minus(x_m, x_f), arm(x_f, p)
-    length = dot(fm, v.t)
-    end = dot(fp, v.t) / length
-    lever = dot(fp, v.normal) - end * dot(fm, v.normal)
-    d_end[:N_CORE] += (lever * d_omega + dot(minus(v.x_b, v.x_a), v.t) / 2 * d_c_end) / length
-    for i in range(2):
-        d_end[A, i] += (1 - p.c) / 2 * v.t[i] / length
-        d_end[B, i] += (1 + p.c) / 2 * v.t[i] / length
-        d_end[F, i] -= (1 - end) * v.t[i] / length
-        d_end[M, i] -= end * v.t[i] / length
-    return end
+    shape = 0.0
+    if k == A:
+        shape = (1 - c) / 2
+    elif k == B:
+        shape = (1 + c) / 2
+    elif k == F:
+        shape = -(1 - end)
+    elif k == M:
+        shape = -end
+    s = plus(times(shape, t), times(along, d_c))
+    return plus(s, times(lever, d.omega))
+
+
+@compile_inline
+def _add_push(
+    indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, unknown: int, size: float, normal: Vector
+) -> None:
+    """Add the force size × n on the node `row` to the column of a multiplier."""
+    add_column(indptr, indices, data, row, unknown, size * normal[0], size * normal[1])
 
 
 @compile_kernel
-def _add_constraint(
-    index: IntArray, values: FloatArray, place: int, nodes: IntArray, at: Local, d_row: FloatArray
-) -> int:
-    """Enter Δ of the constraint of a multiplier as one row; return the next place."""
-    for column in range(at.n_core):
-        for j in range(2):
-            index[0, place], index[1, place], values[place] = at.unknown, 2 * nodes[column] + j, d_row[column, j]
-            place += 1
-    return place
+def list_couplings(
+    surfaces: Fields, areas: Fields, n: int, first_multiplier: int
+) -> tuple[NumberArray, IntArray, IntArray]:
+    """List which nodes feel which, as the fields of `Couplings`.
 
-
-@compile_kernel
-def _add_force(
-    index: IntArray,
-    values: FloatArray,
-    place: int,
-    nodes: IntArray,
-    at: Local,
-    k: int,
-    force: float,
-    d_force: FloatArray,
-    d_omega: FloatArray,
-    size: float,
-) -> int:
-    """Enter Δ(force n) = n Δforce + force Δn as two rows, those of local node k; return the next place.
-
-    Δn = −t ω. A multiplier adds its column: a unit of it pushes with −size n.
+    The slave's forces, and on one segment all, depend on the core nodes. Those of a further master segment depend on
+    its own nodes, too. The number of the first multiplier is −1 for a penalty.
     """
-    for i in range(2):
-        for column in range(len(d_force)):
-            if at.n_core <= column < N_CORE:
-                continue
-            for j in range(2):
-                value = at.normal[i] * d_force[column, j]
-                if column < N_CORE:
-                    value -= force * at.t[i] * d_omega[column, j]
-                index[0, place] = 2 * nodes[k] + i
-                index[1, place] = 2 * nodes[column] + j
-                values[place] = value
-                place += 1
-        if at.unknown != NO_MULTIPLIER:
-            index[0, place], index[1, place], values[place] = 2 * nodes[k] + i, at.unknown, -size * at.normal[i]
-            place += 1
-    return place
-
-
-@compile_kernel
-def _count_entries(
-    neighbours: IntArray, first: IntArray, last: IntArray, cutting: IntArray, active: BoolArray, has_multipliers: bool
-) -> int:
-    """Return how many entries the tangent has."""
-    n_entries, more = 0, 2 if has_multipliers else 0  # a node's entries in the column of a multiplier
+    _, slave, master, neighbours = surfaces
+    partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
+    n_couplings, n_entries = _count_couplings(neighbours, first, last, cutting, active, first_multiplier >= 0)
+    listed = np.empty(n_entries, dtype=np.int32)
+    starts, first_row = np.empty(n_couplings + 1, dtype=np.int64), np.empty(n_couplings, dtype=np.int64)
+    nodes = np.empty(N_LOCAL, dtype=np.int32)
+    coupling, place, starts[0] = 0, 0, 0
     for i in range(len(active)):
         if not active[i]:
-            n_entries += more // 2
+            if first_multiplier >= 0:
+                first_row[coupling], listed[place] = place, first_multiplier + i
+                coupling, place = coupling + 1, place + 1
+                starts[coupling] = place
             continue
-        n_core = N_UNCUT if cutting[i] == NOT_CUT else N_CORE
-        n_entries += more * n_core
+        area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
+        begin = _fill_nodes(nodes, slave, master, i // n, area)
+        is_one, j = area.first == area.last, area.first
+        rows, end = NODE_1 if is_one else A, N_CORE
+        while True:
+            for k in range(begin, end):
+                if k == rows:
+                    first_row[coupling] = place
+                listed[place] = nodes[k]
+                place += 1
+            if first_multiplier >= 0:
+                listed[place] = first_multiplier + i
+                place += 1
+            coupling += 1
+            starts[coupling] = place
+            if is_one or (rows == F and j == area.last):
+                break
+            j = neighbours[j, 1] if rows == F else j
+            nodes[F], nodes[M], rows, end = master[j, 0], master[j, 1], F, N_LOCAL
+    return listed, starts, first_row
+
+
+@compile_kernel
+def _count_couplings(
+    neighbours: IntArray, first: IntArray, last: IntArray, cutting: IntArray, active: BoolArray, has_multipliers: bool
+) -> tuple[int, int]:
+    """Return how many couplings there are, and how many entries they have together."""
+    n_couplings, n_entries, more = 0, 0, 1 if has_multipliers else 0
+    for i in range(len(active)):
+        if not active[i]:
+            n_couplings, n_entries = n_couplings + more, n_entries + more
+            continue
+        n_core = N_CORE - NODE_1 if cutting[i] == NOT_CUT else N_CORE
+        n_couplings, n_entries = n_couplings + 1, n_entries + n_core + more
         if first[i] == last[i]:
-            n_entries += 4 * (4 * n_core + more)
             continue
-        n_entries += 2 * (4 * n_core + more)
         j = first[i]
         while True:
-            n_entries += 2 * (4 * (n_core + 2) + more)
+            n_couplings, n_entries = n_couplings + 1, n_entries + n_core + 2 + more
             if j == last[i]:
                 break
             j = neighbours[j, 1]
-    return n_entries
+    return n_couplings, n_entries

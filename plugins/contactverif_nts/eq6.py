@@ -12,13 +12,14 @@ row never vanishes. Arrays of multipliers without columns mean a penalty.
 
 Rules for the next editor:
 
-1. `pair` makes all decisions and returns integers and booleans. `residual` and `tangent` decide nothing.
+1. `pair` makes all decisions and returns integers and booleans. `residual` decides nothing.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
 3. A kernel gets the fields of `Surfaces`, `Points` and `Options` as plain tuples and unpacks them in its first lines.
    numba reads a plain tuple in half the time of a named one, and an array that is read through a tuple inside a loop
    costs two atomic operations each time. Named tuples of numbers, such as `Contact`, are free.
+4. `eq6_tangent` differentiates this file line by line. Change both.
 
-Source: Zavarise & De Lorenzis (2009), Eq. 6, Eqs. A1–A12.
+Source: Zavarise & De Lorenzis (2009), Eq. 6.
 """
 
 from __future__ import annotations
@@ -45,10 +46,6 @@ from contactverif.geometry.projection import (
 
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # The area of a point: 1, or lengths in one of two configurations.
 AREAS = {"current": CURRENT, "reference": REFERENCE}  # The words of the option `area`.
-
-A, B, NODE_1, NODE_2, OTHER_A, OTHER_B = range(6)  # Local nodes; the last two belong to the other slave segment.
-N_LOCAL = 6
-ENTRIES = 4 * 2 * N_LOCAL * 2  # The entries of one point in the tangent: rows of A, B, 1 and 2.
 
 Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
 
@@ -168,15 +165,15 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, opt
             s, weight = segment[i], weights[slot[i]]
             if not active[i]:
                 if has_multipliers:
-                    area_0 = 1.0 if area_from == NODAL else weight * _length(reference, slave, s, other[i])
+                    area_0 = 1.0 if area_from == NODAL else weight * area_length(reference, slave, s, other[i])
                     rows[state, i] = multipliers[state, i] * area_0
                 continue
-            v = _contact(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
+            v = contact_at(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
             area = 1 + 0 * v.g  # has the type of x
             if area_from == CURRENT:
-                area = weight * _length(now, slave, s, other[i])
+                area = weight * area_length(now, slave, s, other[i])
             elif area_from == REFERENCE:
-                area = area * (weight * _length(reference, slave, s, other[i]))
+                area = area * (weight * area_length(reference, slave, s, other[i]))
             f = penalty * v.g * area
             if has_multipliers:
                 f = -multipliers[state, i] * area
@@ -196,7 +193,7 @@ def push(forces: Array, number: int, size: float, direction: Vector) -> None:
 
 
 @compile_kernel
-def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
+def contact_at(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
     """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
     x_1, x_2 = node(x, node_1), node(x, node_2)
     l_12, t, normal = frame(x_1, x_2)
@@ -207,167 +204,10 @@ def _contact(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Co
 
 
 @compile_kernel
-def _length(x: Array, slave: IntArray, segment: int, other: int) -> float:
+def area_length(x: Array, slave: IntArray, segment: int, other: int) -> float:
     """Return the length of a slave segment, plus that of the other one at a slave node where there is one."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
     if other >= 0:
         more, _, _ = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
         length += more
     return length
-
-
-@compile_kernel
-def tangent(
-    x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """Compute the derivative of `residual` at one state, as rows, columns and values; entries of one place add up.
-
-    A Δ of a number is an array (n_local, 2): what the number gains for each displacement of each local node.
-
-    Parameters
-    ----------
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    multipliers : FloatArray, shape (n_multipliers,)
-        Multipliers λ, empty for a penalty.
-    surfaces, points, options : Fields
-        The fields of `Surfaces`, `Points` and `Options`.
-
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Eqs. A1–A12.
-    """
-    reference, slave, master, _ = surfaces
-    segment, other, slot, partner, active = points
-    places, weights, area_from, penalty = options
-    has_multipliers = len(multipliers) > 0
-    n_entries = _count_entries(active, has_multipliers)
-    index, values, place = np.empty((2, n_entries), dtype=np.int64), np.empty(n_entries), 0
-    nodes, gains = np.empty(N_LOCAL, dtype=np.int64), np.empty((4, N_LOCAL, 2))
-    d_omega, d_g, d_xi, d_area = gains
-    for i in range(len(active)):
-        s, weight, unknown = segment[i], weights[slot[i]], x.size + i  # `unknown`: row and column of the multiplier
-        if not active[i]:
-            if has_multipliers:
-                index[0, place], index[1, place] = unknown, unknown
-                values[place] = 1.0 if area_from == NODAL else weight * _length(reference, slave, s, other[i])
-                place += 1
-            continue
-        v = _contact(x, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], places[slot[i]])
-        _fill_gains(gains, nodes, v)
-        area = 1.0
-        if area_from == REFERENCE:
-            area = weight * _length(reference, slave, s, other[i])
-        elif area_from == CURRENT:
-            area = weight * _length(x, slave, s, other[i])
-            _add_stretch(d_area, A, x, v.a, v.b, weight)  # Δl_AB = t_AB·(Δx_B − Δx_A)
-            if other[i] >= 0:
-                nodes[OTHER_A], nodes[OTHER_B] = slave[other[i], 0], slave[other[i], 1]
-                _add_stretch(d_area, OTHER_A, x, nodes[OTHER_A], nodes[OTHER_B], weight)
-        if has_multipliers:
-            f, d_f = -multipliers[i] * area, -multipliers[i] * d_area
-            d_row = -(area * d_g + v.g * d_area)
-            place = _add_constraint(index, values, place, unknown, nodes, v, area, d_row)
-        else:
-            f = penalty * v.g * area
-            d_f = penalty * (area * d_g + v.g * d_area)
-        place = _add_forces(index, values, place, nodes, v, f, d_f, d_omega, d_xi)
-    return index[0], index[1], values
-
-
-@compile_kernel
-def _count_entries(active: BoolArray, has_multipliers: bool) -> int:
-    """Return how many entries the tangent has."""
-    n_active = np.sum(active)
-    n_entries = ENTRIES * n_active
-    if has_multipliers:
-        n_entries += (4 + N_LOCAL) * 2 * n_active + len(active) - n_active
-    return int(n_entries)
-
-
-@compile_kernel
-def _fill_gains(gains: FloatArray, nodes: IntArray, v: Contact) -> None:
-    """Write Δω, Δg, Δξ and zeros for Δ of the area into `gains` (4, n_local, 2), and the local nodes into `nodes`."""
-    nodes[A], nodes[B], nodes[NODE_1], nodes[NODE_2] = v.a, v.b, v.node_1, v.node_2
-    nodes[OTHER_A], nodes[OTHER_B] = v.a, v.b
-    gains[:] = 0.0
-    d_omega, d_g, d_xi = gains[0], gains[1], gains[2]
-    shape = _shapes(v)
-    for j in range(2):
-        d_omega[NODE_1, j] = -v.normal[j] / v.l_12  # ω = n·(Δx2 − Δx1)/l
-        d_omega[NODE_2, j] = v.normal[j] / v.l_12
-        for k in range(4):
-            d_g[k, j] = shape[k] * v.normal[j]  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
-            d_xi[k, j] = shape[k] * v.t[j] / v.l_12  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
-    d_xi += v.g * d_omega / v.l_12
-
-
-@compile_kernel
-def _shapes(v: Contact) -> tuple[float, float, float, float]:
-    """Return by how much Δx of A, B, 1 and 2 counts in Δx_V − (1−ξ)Δx1 − ξΔx2."""
-    return (1 - v.c) / 2, (1 + v.c) / 2, -(1 - v.xi), -v.xi
-
-
-@compile_kernel
-def _add_stretch(d_area: FloatArray, first: int, x: FloatArray, a: int, b: int, weight: float) -> None:
-    """Add weight × Δl_ab to the Δ of an area; a and b are the local nodes `first` and `first` + 1."""
-    _, t, _ = frame(node(x, a), node(x, b))
-    for j in range(2):
-        d_area[first, j] -= weight * t[j]
-        d_area[first + 1, j] += weight * t[j]
-
-
-@compile_kernel
-def _add_constraint(
-    index: IntArray,
-    values: FloatArray,
-    place: int,
-    unknown: int,
-    nodes: IntArray,
-    v: Contact,
-    area: float,
-    d_row: FloatArray,
-) -> int:
-    """Enter the row of a multiplier, Δ of −area × g, and its column, the forces −area × n; return the next place."""
-    shape = _shapes(v)
-    for column in range(N_LOCAL):
-        for j in range(2):
-            index[0, place], index[1, place] = unknown, 2 * nodes[column] + j
-            values[place] = d_row[column, j]
-            place += 1
-    for k in range(4):
-        for j in range(2):
-            index[0, place], index[1, place] = 2 * nodes[k] + j, unknown
-            values[place] = -area * shape[k] * v.normal[j]
-            place += 1
-    return place
-
-
-@compile_kernel
-def _add_forces(
-    index: IntArray,
-    values: FloatArray,
-    place: int,
-    nodes: IntArray,
-    v: Contact,
-    f: float,
-    d_f: FloatArray,
-    d_omega: FloatArray,
-    d_xi: FloatArray,
-) -> int:
-    """Enter Δ of the forces on A, B, 1 and 2, with Δn = −t ω; return the next place."""
-    shape = _shapes(v)
-    for k in range(4):
-        for i in range(2):
-            for column in range(N_LOCAL):
-                for j in range(2):
-                    value = shape[k] * (d_f[column, j] * v.normal[i] - f * v.t[i] * d_omega[column, j])
-                    if k == NODE_1:
-                        value += d_xi[column, j] * f * v.normal[i]
-                    elif k == NODE_2:
-                        value -= d_xi[column, j] * f * v.normal[i]
-                    index[0, place] = 2 * nodes[k] + i
-                    index[1, place] = 2 * nodes[column] + j
-                    values[place] = value
-                    place += 1
-    return place

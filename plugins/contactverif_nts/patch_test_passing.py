@@ -30,6 +30,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
+from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import box3, box3_tangent, walk
@@ -128,13 +129,18 @@ class PatchTestPassing:
         forces, rows = box3.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual; that of Eq. 6 alone where the preset is not consistent."""
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
         x, multipliers = split_state(interface, z)
-        rows, columns, values = box3_tangent.tangent(x, multipliers, *self._arguments(interface, pairing, z))
-        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+        surfaces, areas, options = self._arguments(interface, pairing, z)
+        first_multiplier = interface.n_nodes if len(multipliers) else -1
+        couplings = box3_tangent.list_couplings(surfaces, areas, self.n, first_multiplier)
+        matrix = zero_matrix(interface.n_nodes, len(multipliers), Couplings(*couplings))
+        rows = matrix.indptr, matrix.indices, matrix.data
+        box3_tangent.add_tangent(*rows, x, multipliers, surfaces, areas, options)
+        return matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return each virtual slave node with its gap, its pressure and the ends Q, P of its area of competence.

@@ -36,9 +36,10 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
+from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
-from contactverif_nts import eq6, force_tables
+from contactverif_nts import eq6, eq6_tangent, force_tables
 from contactverif_nts.eq6 import AREAS, Fields
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
@@ -93,11 +94,16 @@ class PointContact:
         forces, rows = eq6.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
         x, multipliers = split_state(interface, z)
-        rows, columns, values = eq6.tangent(x, multipliers, *self._arguments(interface, pairing, z))
-        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+        surfaces, points, options = self._arguments(interface, pairing, z)
+        first_multiplier = interface.n_nodes if len(multipliers) else -1
+        couplings = eq6_tangent.list_couplings(surfaces, points, self.c, self.area_from, first_multiplier)
+        matrix = zero_matrix(interface.n_nodes, len(multipliers), Couplings(*couplings))
+        rows = matrix.indptr, matrix.indices, matrix.data
+        eq6_tangent.add_tangent(*rows, x, multipliers, surfaces, points, options)
+        return matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the points with their gaps and pressures.

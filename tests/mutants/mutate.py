@@ -21,6 +21,8 @@ PACKAGE = "contactverif_nts"
 MODULES = (
     "force_tables",
     "eq6",
+    "turned_force",
+    "eq6_tangent",
     "walk",
     "box3",
     "box3_tangent",
@@ -54,7 +56,7 @@ def changed_line(module: str, old: str, new: str, *, factory: str, nth: int = 0,
     package.__path__ = []
     sys.modules[copy] = package
     for name, source in sources.items():
-        source = source.replace(PACKAGE, copy).replace("\n@compile_kernel\n", "\n")
+        source = source.replace(PACKAGE, copy).replace("\n@compile_kernel\n", "\n").replace("\n@compile_inline\n", "\n")
         part = types.ModuleType(f"{copy}.{name}")
         sys.modules[f"{copy}.{name}"] = part
         setattr(package, name, part)

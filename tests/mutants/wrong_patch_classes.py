@@ -20,9 +20,9 @@ NODAL, PUBLISHED = "patch.flat.nodal", "patch.flat.published"
 SMALL = "1e-12"  # The relative size of graded mistakes.
 
 _PLACES = "c = -1 + (2 * np.arange(n) + 1) / n"
-_AREA = "area = weight * _length(now, slave, s, other[i])"
+_AREA = "area = weight * area_length(now, slave, s, other[i])"
 _FORCE = "f = penalty * v.g * area"
-_POINT = "v = _contact(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], {})"
+_POINT = "v = contact_at(now, slave[s, 0], slave[s, 1], master[partner[i], 0], master[partner[i], 1], {})"
 _SHALLOW = "-v.g.real < 1e-4 * v.l_12.real"
 # Where a master node lies between the two points of a segment, and not in the middle of it, they move apart.
 _MOVED = "\n            ".join(
@@ -61,7 +61,7 @@ def _line(name: str, caught_by: str, old: str, new: str, factory: str, module: s
 
 MUTANTS = (
     _line("mean area of competence at every slave node", NORMAL, _AREA,
-          "area = sum([_length(now, slave, k, -1) for k in range(len(slave))]) / len(active)", "nts_ar"),
+          "area = sum([area_length(now, slave, k, -1) for k in range(len(slave))]) / len(active)", "nts_ar"),
     _line(f"area of competence at a free end off by {SMALL}", NORMAL, _AREA,
           f"{_AREA} * (1 + {SMALL} * (other[i] < 0))", "nts_ar"),
     Mutant("reported pressure of VTS-ME with the wrong sign", NORMAL,

@@ -1,0 +1,60 @@
+"""Vectors of derivatives, and the block of a force that turns with the normal of its master segment.
+
+Source: Zavarise & De Lorenzis (2009), Eqs. A1–A6.
+"""
+
+from __future__ import annotations
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.geometry.block_rows import AnyIntArray, add_block
+from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.projection import Vector
+
+ZERO = (0.0, 0.0)
+
+
+@compile_kernel
+def times(factor: float, a: Vector) -> Vector:
+    """Return factor × a."""
+    return factor * a[0], factor * a[1]
+
+
+@compile_kernel
+def plus(a: Vector, b: Vector) -> Vector:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1]
+
+
+@compile_inline
+def add_turned_force(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    row: int,
+    column: int,
+    normal: Vector,
+    t: Vector,
+    force: float,
+    d_force: Vector,
+    omega: Vector,
+) -> None:
+    """Add Δ(force n) = n Δforce + force Δn, with Δn = −t ω, to the rows of one node and the columns of another.
+
+    Parameters
+    ----------
+    indptr, indices, data : AnyIntArray, AnyIntArray, FloatArray
+        The matrix in compressed rows.
+    row, column : int
+        The node on which the force acts, and the node that is displaced.
+    normal, t : Vector
+        Normal and tangent of the master segment.
+    force : float
+        The force along the normal.
+    d_force, omega : Vector
+        What the force and the angle of the master segment gain for a displacement of the node `column`.
+    """
+    xx = normal[0] * d_force[0] - force * t[0] * omega[0]
+    xy = normal[0] * d_force[1] - force * t[0] * omega[1]
+    yx = normal[1] * d_force[0] - force * t[1] * omega[0]
+    yy = normal[1] * d_force[1] - force * t[1] * omega[1]
+    add_block(indptr, indices, data, row, column, xx, xy, yx, yy)
