@@ -78,23 +78,7 @@ def _columns_of_rows(
 
     Columns are visited in ascending order, so they are sorted as they come, and one that comes twice was the last.
     """
-    begins, member_starts = np.zeros(n_numbers + 1, dtype=np.int64), np.zeros(n_numbers + 1, dtype=np.int64)
-    for coupling in range(len(first_row)):
-        start, stop = starts[coupling], starts[coupling + 1]
-        for place in range(start, stop):
-            member_starts[nodes[place] + 1] += 1
-        for place in range(first_row[coupling], stop):
-            begins[nodes[place] + 1] += stop - start
-    for number in range(n_numbers):
-        member_starts[number + 1] += member_starts[number]
-        begins[number + 1] += begins[number]
-
-    members, ends = np.empty(len(nodes), dtype=np.int32), member_starts[:-1].copy()
-    for coupling in range(len(first_row)):
-        for place in range(starts[coupling], starts[coupling + 1]):
-            members[ends[nodes[place]]] = coupling
-            ends[nodes[place]] += 1
-
+    begins, member_starts, members = _couplings_of_columns(n_numbers, nodes, starts, first_row)
     columns, ends = np.empty(begins[-1], dtype=np.int32), begins[:-1].copy()
     for column in range(n_numbers):
         for member in range(member_starts[column], member_starts[column + 1]):
@@ -106,6 +90,29 @@ def _columns_of_rows(
                     columns[end] = column
                     ends[row] = end + 1
     return begins, ends, columns
+
+
+@compile_kernel
+def _couplings_of_columns(
+    n_numbers: int, nodes: NumberArray, starts: IntArray, first_row: IntArray
+) -> tuple[IntArray, IntArray, NumberArray]:
+    """Return room for the columns of each row, and the couplings of each column with the place where they begin."""
+    begins, member_starts = np.zeros(n_numbers + 1, dtype=np.int64), np.zeros(n_numbers + 1, dtype=np.int64)
+    for coupling in range(len(first_row)):
+        start, stop = starts[coupling], starts[coupling + 1]
+        for place in range(start, stop):
+            member_starts[nodes[place] + 1] += 1
+        for place in range(first_row[coupling], stop):
+            begins[nodes[place] + 1] += stop - start
+    for number in range(n_numbers):
+        member_starts[number + 1] += member_starts[number]
+        begins[number + 1] += begins[number]
+    members, ends = np.empty(len(nodes), dtype=np.int32), member_starts[:-1].copy()
+    for coupling in range(len(first_row)):
+        for place in range(starts[coupling], starts[coupling + 1]):
+            members[ends[nodes[place]]] = coupling
+            ends[nodes[place]] += 1
+    return begins, member_starts, members
 
 
 @compile_kernel

@@ -42,6 +42,7 @@ from contactverif_nts.walk import NOT_CUT
 # Local nodes: where the area is cut, the nodes of the segment of the frame and the two that cut; 1, 2, A, B; f, m.
 FRAME_1, FRAME_2, CUT_P, CUT_Q, NODE_1, NODE_2, A, B, F, M = range(10)
 N_CORE, N_LOCAL = 8, 10
+NO_MULTIPLIER = -1
 
 
 class Cut(NamedTuple):
@@ -57,7 +58,7 @@ class Cut(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """What the numbers of a virtual slave node gain for a displacement of one node."""
+    """Vectors by which the numbers of a virtual slave node grow for a displacement of one node."""
 
     c_p: Vector
     c_q: Vector
@@ -68,7 +69,7 @@ class Gains(NamedTuple):
 
 
 class Lever(NamedTuple):
-    """What all derivatives of one virtual slave node share."""
+    """Numbers that all derivatives of one virtual slave node share."""
 
     xi: float
     per_length: float  # 1/l of the master segment
@@ -472,32 +473,40 @@ def list_couplings(
     nodes = np.empty(N_LOCAL, dtype=np.int32)
     coupling, place, starts[0] = 0, 0, 0
     for i in range(len(active)):
+        multiplier = first_multiplier + i if first_multiplier >= 0 else NO_MULTIPLIER
         if not active[i]:
-            if first_multiplier >= 0:
-                first_row[coupling], listed[place] = place, first_multiplier + i
-                coupling, place = coupling + 1, place + 1
-                starts[coupling] = place
+            if multiplier != NO_MULTIPLIER:
+                first_row[coupling] = place
+                place = _append(listed, place, nodes, 0, 0, multiplier)
+                starts[coupling + 1], coupling = place, coupling + 1
             continue
         area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
-        begin = _fill_nodes(nodes, slave, master, i // n, area)
-        is_one, j = area.first == area.last, area.first
-        rows, end = NODE_1 if is_one else A, N_CORE
-        while True:
-            for k in range(begin, end):
-                if k == rows:
-                    first_row[coupling] = place
-                listed[place] = nodes[k]
-                place += 1
-            if first_multiplier >= 0:
-                listed[place] = first_multiplier + i
-                place += 1
-            coupling += 1
-            starts[coupling] = place
-            if is_one or (rows == F and j == area.last):
+        begin, is_one = _fill_nodes(nodes, slave, master, i // n, area), area.first == area.last
+        first_row[coupling] = place + (NODE_1 if is_one else A) - begin
+        place = _append(listed, place, nodes, begin, N_CORE, multiplier)
+        starts[coupling + 1], coupling = place, coupling + 1
+        j = area.first
+        while not is_one:
+            nodes[F], nodes[M] = master[j, 0], master[j, 1]
+            first_row[coupling] = place + F - begin
+            place = _append(listed, place, nodes, begin, N_LOCAL, multiplier)
+            starts[coupling + 1], coupling = place, coupling + 1
+            if j == area.last:
                 break
-            j = neighbours[j, 1] if rows == F else j
-            nodes[F], nodes[M], rows, end = master[j, 0], master[j, 1], F, N_LOCAL
+            j = neighbours[j, 1]
     return listed, starts, first_row
+
+
+@compile_inline
+def _append(listed: NumberArray, place: int, nodes: NumberArray, begin: int, end: int, multiplier: int) -> int:
+    """Append the local nodes from begin to end and the multiplier to the list; return the next place."""
+    for k in range(begin, end):
+        listed[place] = nodes[k]
+        place += 1
+    if multiplier != NO_MULTIPLIER:
+        listed[place] = multiplier
+        place += 1
+    return place
 
 
 @compile_kernel

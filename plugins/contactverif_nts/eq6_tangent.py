@@ -31,12 +31,23 @@ N_LOCAL = 6
 
 
 class Gains(NamedTuple):
-    """What the numbers of a point gain for a displacement of one node."""
+    """Vectors by which the numbers of a point grow for a displacement of one node."""
 
     omega: Vector
     g: Vector
     xi: Vector
     area: Vector
+
+
+class Force(NamedTuple):
+    """The force F of a point, negative where it presses: F = stiffness × e × area."""
+
+    f: float
+    stiffness: float  # the penalty, or 1 for a multiplier
+    e: float  # the gap, or −λ
+    area: float
+    t_ab: Vector  # weight × tangent of the slave segment; zero where no current length counts
+    t_other: Vector  # the same of the other slave segment
 
 
 @compile_kernel
@@ -89,26 +100,61 @@ def add_tangent(
             t_ab = times(weight, frame(node(x, nodes[A]), node(x, nodes[B]))[1])
             if begin == OTHER_A:
                 t_other = times(weight, frame(node(x, nodes[OTHER_A]), node(x, nodes[OTHER_B]))[1])
-        f = -multipliers[i] * area if has_multipliers else penalty * v.g * area
-        for k in range(begin, N_LOCAL):
-            d = _gains(k, v, t_ab, t_other)
-            d_f = times(penalty, plus(times(area, d.g), times(v.g, d.area)))
-            if has_multipliers:
-                d_f = times(-multipliers[i], d.area)
-                d_row = times(-1.0, plus(times(area, d.g), times(v.g, d.area)))
-                add_row(indptr, indices, data, unknown, nodes[k], d_row[0], d_row[1])
-            for row in range(first_row, N_LOCAL):
-                share = _share(row, v)
-                d_size = times(share, d_f)
-                if row == NODE_1:
-                    d_size = plus(d_size, times(f, d.xi))
-                elif row == NODE_2:
-                    d_size = plus(d_size, times(-f, d.xi))
-                add_turned_force(indptr, indices, data, nodes[row], nodes[k], v.normal, v.t, share * f, d_size, d.omega)
-        if has_multipliers:  # a unit of it pushes with −area × n
-            for row in range(first_row, N_LOCAL):
-                size = -area * _share(row, v)
-                add_column(indptr, indices, data, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
+        force = Force(penalty * v.g * area, penalty, v.g, area, t_ab, t_other)
+        if has_multipliers:
+            force = Force(-multipliers[i] * area, 1.0, -multipliers[i], area, t_ab, t_other)
+            _add_constraint(indptr, indices, data, nodes, begin, first_row, unknown, v, force)
+        _add_forces(indptr, indices, data, nodes, begin, first_row, v, force, not has_multipliers)
+
+
+@compile_inline
+def _add_forces(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    first_row: int,
+    v: Contact,
+    force: Force,
+    is_spring: bool,
+) -> None:
+    """Add Δ of the forces on A, B, 1 and 2, share × F n."""
+    f = force.f
+    for k in range(begin, N_LOCAL):
+        d = _gains(k, v, force)
+        by_e = times(force.area, d.g) if is_spring else ZERO
+        d_f = times(force.stiffness, plus(by_e, times(force.e, d.area)))
+        for row in range(first_row, N_LOCAL):
+            share = _share(row, v)
+            d_size = times(share, d_f)
+            if row == NODE_1:
+                d_size = plus(d_size, times(f, d.xi))
+            elif row == NODE_2:
+                d_size = plus(d_size, times(-f, d.xi))
+            add_turned_force(indptr, indices, data, nodes[row], nodes[k], v.normal, v.t, share * f, d_size, d.omega)
+
+
+@compile_inline
+def _add_constraint(
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+    nodes: NumberArray,
+    begin: int,
+    first_row: int,
+    unknown: int,
+    v: Contact,
+    force: Force,
+) -> None:
+    """Add Δ of the constraint −area × g, and what a unit of the multiplier pushes with: −area n."""
+    for k in range(begin, N_LOCAL):
+        d = _gains(k, v, force)
+        d_row = times(-1.0, plus(times(force.area, d.g), times(v.g, d.area)))
+        add_row(indptr, indices, data, unknown, nodes[k], d_row[0], d_row[1])
+    for row in range(first_row, N_LOCAL):
+        size = -force.area * _share(row, v)
+        add_column(indptr, indices, data, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
 
 
 @compile_inline
@@ -140,20 +186,17 @@ def _share(row: int, v: Contact) -> float:
 
 
 @compile_inline
-def _gains(k: int, v: Contact, t_ab: Vector, t_other: Vector) -> Gains:
-    """Return Δω, Δg, Δξ and Δ of the area for a displacement of the local node k.
-
-    The vectors t_ab and t_other are weight × tangent of both slave segments: Δl_AB = t_AB·(Δx_B − Δx_A).
-    """
+def _gains(k: int, v: Contact, force: Force) -> Gains:
+    """Return Δω, Δg, Δξ and Δ of the area for a displacement of the local node k."""
     shape, omega, area = _share(k, v), ZERO, ZERO
     if k == NODE_1:
         omega = times(-1 / v.l_12, v.normal)  # ω = n·(Δx2 − Δx1)/l
     elif k == NODE_2:
         omega = times(1 / v.l_12, v.normal)
     elif k in (A, B):
-        area = times(1.0 if k == B else -1.0, t_ab)
+        area = times(1.0 if k == B else -1.0, force.t_ab)  # Δl_AB = t_AB·(Δx_B − Δx_A)
     else:
-        area = times(1.0 if k == OTHER_B else -1.0, t_other)
+        area = times(1.0 if k == OTHER_B else -1.0, force.t_other)
     g = times(shape, v.normal)  # Δg = n·(Δx_V − (1−ξ)Δx1 − ξΔx2)
     xi = times(1 / v.l_12, plus(times(shape, v.t), times(v.g, omega)))  # l Δξ = t·(Δx_V − (1−ξ)Δx1 − ξΔx2) + g ω
     return Gains(omega, g, xi, area)

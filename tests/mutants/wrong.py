@@ -322,7 +322,7 @@ MUTANTS = (
     line("Δc of a cut end missing", TANGENT, "box3_tangent",
          "    elif k == cut.by:\n        along = 1.0\n", ""),
     line("Δl of the neighbour missing in NTS-AR", TANGENT, "eq6_tangent",
-         "area = times(1.0 if k == OTHER_B else -1.0, t_other)", "pass", factory="nts_ar"),
+         "area = times(1.0 if k == OTHER_B else -1.0, force.t_other)", "pass", factory="nts_ar"),
     line("one entry of the tangent off by 1e-3", TANGENT, "box3_tangent",
          "d_f, d_c = _gain_of_force(d, force),",
          "d_f, d_c = times(1 + 1e-3 * (k == A), _gain_of_force(d, force)),"),
