@@ -248,13 +248,18 @@ def _check_chains(segments: IntArray) -> None:
 
 def _neighbours(segments: IntArray) -> IntArray:
     """Return the previous and the next segment of each segment (n_segments, 2), −1 at a free end."""
-    starting = {int(first): index for index, first in enumerate(segments[:, 0])}
-    ending = {int(second): index for index, second in enumerate(segments[:, 1])}
-    return np.array([[ending.get(int(first), -1), starting.get(int(second), -1)] for first, second in segments])
+    numbers, ends = np.unique(segments, return_inverse=True)
+    first, second = ends.reshape(segments.shape).T  # node numbers without gaps
+    starting, ending = (np.full(len(numbers), -1) for _ in range(2))
+    starting[first] = ending[second] = np.arange(len(segments))
+    return np.column_stack([ending[first], starting[second]])
 
 
 def _chain_order(neighbours: IntArray) -> IntArray:
     """Return open chains first, each from its free end; then closed chains, each from its lowest segment."""
+    numbers = np.arange(len(neighbours))
+    if ((neighbours[:, 1] == numbers + 1) | (neighbours[:, 1] < 0)).all():
+        return numbers  # Open chains, numbered as they run.
     following = neighbours[:, 1].tolist()
     visited = [False] * len(following)
     order = []
@@ -273,6 +278,9 @@ def _check_positions(name: str, surface: Surface, used: IntArray, nodes: FloatAr
     zero = np.flatnonzero((ends[:, 0] == ends[:, 1]).all(axis=1))
     if len(zero):
         raise MisuseError(name, f"segment {zero[0]} of zero length", "two different end positions")
+    along_x = nodes[used][np.lexsort(nodes[used].T[::-1])]
+    if not (along_x[1:] == along_x[:-1]).all(axis=1).any():
+        return
     _, first, counts = np.unique(nodes[used], axis=0, return_index=True, return_counts=True)
     if counts.max() > 1:
         place = nodes[used[first[np.argmax(counts)]]]

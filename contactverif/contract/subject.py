@@ -249,14 +249,14 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
     """Return a copy of the forces in the shape and dtype of z, or raise an error that begins with the verb."""
     if not isinstance(forces, np.ndarray):
         raise ContractError(f"{verb}: returned a {type(forces).__name__}; needed an array of shape {z.shape}")
-    forces = np.array(forces)  # A copy, since the plugin may reuse its array; and no subclass with other rules.
-    if forces.shape != z.shape:
-        raise ContractError(f"{verb}: returned shape {forces.shape}; needed {z.shape}, that of z")
-    if forces.dtype != z.dtype:
-        raise ContractError(f"{verb}: returned dtype {forces.dtype}; needed {z.dtype}, that of z")
-    if not np.isfinite(forces).all():
-        raise NonFiniteError(f"{verb}: {_describe_non_finite(forces)}")
-    return forces
+    copy: Array = np.array(forces)  # The plugin may reuse its array; and a subclass may have other rules.
+    if copy.shape != z.shape:
+        raise ContractError(f"{verb}: returned shape {copy.shape}; needed {z.shape}, that of z")
+    if copy.dtype != z.dtype:
+        raise ContractError(f"{verb}: returned dtype {copy.dtype}; needed {z.dtype}, that of z")
+    if not np.isfinite(copy).all():
+        raise NonFiniteError(f"{verb}: {_describe_non_finite(copy)}")
+    return copy
 
 
 def _check_tangent(verb: str, tangent: Any, size: int) -> Any:

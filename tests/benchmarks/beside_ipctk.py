@@ -215,6 +215,18 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
+def write(rows: list[dict[str, Any]], folder: Path) -> None:
+    """Write kernels.csv and kernels.svg."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "kernels.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(
+            {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
+        )
+    draw(rows, folder / "kernels.svg")
+
+
 def main() -> None:
     """Measure, print the table, and write kernels.csv and kernels.svg."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -241,15 +253,8 @@ def main() -> None:
             row = measured | {COLUMNS[-1]: peaks[measured["formulation"], n_slave]}
             rows.append(row)
             print("  ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
+        write(rows, options.out)  # After each size, so that a race that is stopped leaves what it measured.
     print("exponent of the cost:", {name: round(slope, 3) for name, slope in exponents(rows).items()})
-    options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "kernels.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(
-            {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
-        )
-    draw(rows, options.out / "kernels.svg")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -179,3 +180,36 @@ def test_an_error_says_argument_found_and_needed() -> None:
     assert (error.argument, error.found) == ("slave", "segment 0 of zero length")
     assert str(error) == f"slave: found {error.found}; needed {error.needed}"
     assert isinstance(error, ValueError)
+
+
+def walk_by_hand(segments: list[list[int]]) -> tuple[list[list[int]], list[int]]:
+    """Return neighbours and order of chains as the definitions say, segment by segment."""
+    starting = {first: number for number, (first, _) in enumerate(segments)}
+    ending = {second: number for number, (_, second) in enumerate(segments)}
+    neighbours = [[ending.get(first, -1), starting.get(second, -1)] for first, second in segments]
+    order: list[int] = []
+    for number in [number for number, (before, _) in enumerate(neighbours) if before < 0] + list(range(len(segments))):
+        while number >= 0 and number not in order:
+            order.append(number)
+            number = neighbours[number][1]
+    return neighbours, order
+
+
+def test_neighbours_and_chains_of_any_numbering_are_those_of_a_walk() -> None:
+    random = np.random.default_rng(1)
+    for trial in range(200):
+        segments, n_nodes = [], 0
+        for _ in range(random.integers(1, 4)):
+            length, closed = int(random.integers(2, 6)), bool(random.integers(2))
+            nodes = [*range(n_nodes, n_nodes + length), *([n_nodes] if closed else [])]
+            segments += [list(pair) for pair in pairwise(nodes)]
+            n_nodes += length
+        if trial % 2:  # Numbers in any order, with gaps.
+            numbers = random.permutation(3 * n_nodes)[:n_nodes]
+            segments = [
+                [int(numbers[node]) for node in segments[number]] for number in random.permutation(len(segments))
+            ]
+        surface, (neighbours, order) = Surface(segments), walk_by_hand(segments)
+        assert surface.neighbours.tolist() == neighbours
+        assert surface.chain_order.tolist() == order
+        assert surface.neighbours.dtype == surface.chain_order.dtype == np.int64
