@@ -10,6 +10,7 @@ from pathlib import Path
 PAGES = {
     "reports/README.md": "reference/report.md",
     "reports/stability/README.md": "reference/stability.md",
+    "reports/trust/README.md": "reference/trust.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "DECISIONS.md": "project/decisions.md",
     "CHANGELOG.md": "project/changelog.md",

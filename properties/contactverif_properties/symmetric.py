@@ -125,4 +125,5 @@ SYMMETRIC = Property(
     measure=measure_symmetry,
     promise=lambda traits: traits.symmetric,
     applicable=refuse_barrier,
+    usual_undecided=0.02,  # Without a pairing a loop may cross kinks unseen; formulations with one have 0.
 )

@@ -24,12 +24,17 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     ids = list(dict.fromkeys([*next(iter(rows.values()), {}), *(json.loads(cell)[1] for cell in cells)]))
     matrix = {}
     for name, intended, number in map(json.loads, dict.fromkeys(cells)):
-        row = {question: int(rows.get(name, {}).get(question) or 0) for question in ids}
+        row = {question: _as_number(rows.get(name, {}).get(question, "")) for question in ids}
         matrix[name] = intended, row | {intended: number}
     terminalreporter.section("kill matrix")
     heading = f"the first of {EXAMPLES} cases that caught the mutant, in brackets; all others from {FILE.name}"
     for line in (heading, *as_lines(matrix)):
         terminalreporter.write_line(line)
+
+
+def _as_number(cell: str) -> int:
+    """Return the number of the first case, 0 where none catches the mutant or the property was not asked."""
+    return int(cell) if cell.isdigit() else 0
 
 
 def _kept_rows() -> dict[str, dict[str, str]]:

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, Springs, case, over_a_node, subject
+from subjects import load_subject
 
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.run.runner import judge_case
 from contactverif_properties.objectivity import OBJECTIVITY, measure_objectivity
@@ -55,6 +58,27 @@ def test_a_tangent_that_does_not_turn_is_found_where_the_forces_do() -> None:
     outcome = judge_case(OBJECTIVITY, case(seed=1), subject(Axis))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith("error of the tangent after a rotation")
+
+
+def test_springs_that_act_twice_need_half_of_the_penetration() -> None:
+    """Rounding the positions to uX changes the tangent of the second pass by 2e-13 of its largest entry."""
+    slave = [
+        [7.390291733840329, -32.31565181091557], [6.733405329071609, -33.06556981419655],
+        [6.379941614663333, -33.45025869749288], [5.477573664406958, -34.638675966512764],
+        [4.348309906428491, -35.66821908057746],
+    ]  # fmt: skip
+    master = [
+        [3.572631344377263, -36.95121432282958], [4.432995998903832, -35.72248625639609],
+        [5.006572435254878, -34.9033342121071], [5.418906036420292, -35.18618419930046],
+        [6.279270690946862, -33.95745613286697], [7.426423563648954, -32.31915204428899], [8.0, -31.5],
+    ]  # fmt: skip
+    interface = Interface.from_chains(slave, master)
+    state = Case(interface, interface.nodes.reshape(-1), penalty=512.0, seed=1882)
+    outcome = judge_case(OBJECTIVITY, state, load_subject("two-pass/mortar"))
+    assert outcome.verdict is Verdict.PASS, outcome.reason
+    assert outcome.measurement is not None
+    name = "error of the tangent after a rotation"
+    assert outcome.measurement.values[name] > 0.55 * outcome.measurement.tolerances[name]
 
 
 class Nearest(Handmade):

@@ -13,15 +13,13 @@ from __future__ import annotations
 import sys
 
 from killing import OTHERS, caught_at, properties
-from tables import fill
+from tables import SURVIVES, UNKNOWN, fill
 from wrong import MUTANTS, SURVIVORS
 
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 
 FILE = "kills.csv"
-SURVIVES = "survives: "
-NOT_ASKED = "-"
 NAMED = {mutant.name: mutant for mutant in MUTANTS} | {SURVIVES + mutant.name: mutant for mutant in SURVIVORS}
 # Cases of properties that are not meant to catch the mutant, where they are not OTHERS: these take seconds each.
 SLOW = {
@@ -45,7 +43,7 @@ def cells(name: str) -> list[str]:
     for question in sorted(properties(), key=lambda question: question.id in SLOW):
         intended = question.id == mutant.caught_by
         if question.id in SLOW and not intended and sum(map(bool, row.values())) > 1:
-            row[question.id] = NOT_ASKED
+            row[question.id] = UNKNOWN
         else:
             row[question.id] = str(caught_at(question, subject, None if intended else examples(question)) or "")
     return [mutant.caught_by, *(row[question.id] for question in properties())]

@@ -2,51 +2,52 @@
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
+from collections import defaultdict
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from tables import COMMITS, FOLDER, SURVIVES, UNKNOWN, read
 
-FOLDER = Path(__file__).parents[2] / "reports" / "trust"
-SURVIVES = "survives: "
+PAGE, FIGURE = "README.md", "kills.svg"
+COUNTS = ("cases", "accusations", "undecided", "idle")
 
 INTRODUCTION = """# Trust
 
-A verifier must catch what is wrong, and never accuse what is right. `tox -e trust` measures both, and wrote this page.
+A verifier must catch what is wrong, and never accuse what is right. `tox -e trust` measures both and wrote this page
+from the tables beside it: {commits}.
 
 """
 CAMPAIGN = """## Nobody who is right is accused
 
 {cases:,} random cases over {formulations} formulations that are right, with seeds {seeds}: {accusations} accusations.
-*Nearest* is the largest number over its tolerance in a case that passes, and the formulation that came so near. *Idle*
-cases have nothing in contact. The named cases of finite lists are the same for every seed; the tests run them all.
+An accusation is a failure of what a formulation promises, a crash, or a breach of the contract. *Nearest* is the
+largest number over its tolerance in a case that passes, and the formulation that came so near.
+In *idle* cases nothing is in contact. The named cases of finite lists are the same for every seed; the tests run them.
 
 """
 KILLS = """## Who catches whom
 
-{mutants} formulations are wrong on purpose. Each row of the figure is one of them, each column a property: dark where
-it is the one that is meant to catch it, light where it does so too. {survivors} more survive, and wait for a property.
+{mutants} formulations are wrong on purpose, and each is caught. A row of the figure is one of them, a column a
+property: dark where the property is the one that is meant to catch it, light where it does so too.
+{survivors} more survives.
 
-![Mutants against properties](kills.svg)
+![Wrong formulations against properties](kills.svg)
 
-The table counts the mutants that each property is meant to catch, those that it catches, and those that no other
-property catches. Properties with random cases had 20 of them, those with bodies and those with finite lists one.
+*Meant* counts the wrong formulations that a property is meant to catch, *catches* those that it catches, and *alone*
+those that no other property catches. *Least shared* names, where that is none, a wrong formulation that few
+others catch, and who they are. Properties that are not meant to catch one get 20 random cases, or one where bodies are
+solved or a list is finite. Slow ones are asked only where at most one other property catches it.
 
 """
 SMALLEST = """## How small an error is caught
 
 An error of a kind and a relative size was planted in a formulation that is right. The table has the smallest size, a
-power of ten, that each property caught; where a cell is empty, it does not look at that.
+power of ten down to 1e-15, that each property caught. Where a cell is empty, the property does not look at that.
 
 """
 
-
-def read(name: str) -> list[dict[str, str]]:
-    """Return the lines of a table that is kept beside the page."""
-    with (FOLDER / name).open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
+Row = dict[str, str]
 
 
 def table(heads: list[str], rows: list[list[str]]) -> str:
@@ -55,49 +56,94 @@ def table(heads: list[str], rows: list[list[str]]) -> str:
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
 
 
+def campaign_counts() -> dict[str, dict[str, int]]:
+    """Return {property: {count: number}} over all seeds."""
+    counts: dict[str, dict[str, int]] = defaultdict(lambda: dict.fromkeys(COUNTS, 0))
+    for row in read("campaign.csv"):
+        for name in COUNTS:
+            counts[row["seed/property"].partition("/")[2]][name] += int(row[name])
+    return dict(counts)
+
+
+def nearest_margins() -> dict[str, tuple[float, str]]:
+    """Return {property: (largest number over its tolerance in a case that passes, its formulation)}."""
+    margins: dict[str, tuple[float, str]] = {}
+    for row in read("campaign.csv"):
+        name = row["seed/property"].partition("/")[2]
+        margins[name] = max(margins.get(name, (0.0, "")), (float(row["nearest"]), row["formulation"]))
+    return margins
+
+
+def is_kill(cell: str) -> bool:
+    """Return whether a cell of the kill matrix says that the property catches the mutant."""
+    return cell not in ("", UNKNOWN)
+
+
+def kill_rows() -> tuple[list[str], list[Row], list[Row]]:
+    """Return the ids of the properties, the rows of the mutants that are caught, and those of the survivors."""
+    rows = read("kills.csv")
+    ids = [name for name in rows[0] if name not in ("mutant", "caught by")]
+    survivors = [row for row in rows if row["mutant"].startswith(SURVIVES)]
+    return ids, [row for row in rows if row not in survivors], survivors
+
+
+def catchers(row: Row, ids: list[str]) -> list[str]:
+    """Return the properties that catch the mutant of a row."""
+    return [name for name in ids if is_kill(row[name])]
+
+
+def caught_alone() -> dict[str, list[str]]:
+    """Return {property: the mutants that no other property catches}."""
+    ids, rows, _ = kill_rows()
+    return {name: [row["mutant"] for row in rows if catchers(row, ids) == [name]] for name in ids}
+
+
+def least_shared(name: str) -> tuple[str, list[str]]:
+    """Return the mutant of a property that fewest others catch, and those others."""
+    ids, rows, _ = kill_rows()
+    candidates = [row for row in rows if is_kill(row[name])]
+    row = min(candidates, key=lambda row: len(catchers(row, ids)))
+    return row["mutant"], [other for other in catchers(row, ids) if other != name]
+
+
 def campaign() -> str:
     """Return the part about formulations that are right."""
-    rows = read("campaign.csv")
+    rows, counts, margins = read("campaign.csv"), campaign_counts(), nearest_margins()
     text = CAMPAIGN.format(
-        cases=sum(int(row["cases"]) for row in rows),
+        cases=sum(count["cases"] for count in counts.values()),
         formulations=max(int(row["formulations"]) for row in rows),
-        seeds=rows[0]["seeds"].replace(" ", ", "),
-        accusations=sum(int(row["accusations"]) for row in rows) or "no",
+        seeds=" and ".join(dict.fromkeys(row["seed/property"].partition("/")[0] for row in rows)),
+        accusations=sum(count["accusations"] for count in counts.values()) or "no",
     )
     lines = [
         [
-            f"`{row['property']}`",
-            row["cases"],
-            row["accusations"],
-            *(f"{int(row[share]) / max(int(row['cases']), 1):.1%}" for share in ("undecided", "idle")),
-            f"{float(row['nearest']):.2g}",
-            f"`{row['formulation']}`" if row["formulation"] else "",
+            f"`{name}`",
+            str(count["cases"]),
+            str(count["accusations"]),
+            *(f"{count[share] / count['cases']:.1%}" for share in ("undecided", "idle")),
+            f"{margins[name][0]:.2g}",
+            f"`{margins[name][1]}`" if margins[name][1] else "",
         ]
-        for row in rows
+        for name, count in counts.items()
     ]
     return text + table(["property", "cases", "accused", "undecided", "idle", "nearest", "by"], lines)
 
 
-def caught_by_property() -> dict[str, tuple[int, int, int]]:
-    """Return {property: mutants it is meant to catch, mutants it catches, mutants that it alone catches}."""
-    rows = [row for row in read("kills.csv") if not row["mutant"].startswith(SURVIVES)]
-    ids = [name for name in rows[0] if name not in ("mutant", "caught by")]
-    return {
-        name: (
-            sum(row["caught by"] == name for row in rows),
-            sum(bool(row[name]) for row in rows),
-            sum(bool(row[name]) and not any(row[other] for other in ids if other != name) for row in rows),
-        )
-        for name in ids
-    }
-
-
 def kills() -> str:
     """Return the part about formulations that are wrong."""
-    survivors = sum(row["mutant"].startswith(SURVIVES) for row in read("kills.csv"))
-    text = KILLS.format(mutants=len(read("kills.csv")) - survivors, survivors=survivors)
-    lines = [[f"`{name}`", *map(str, counts)] for name, counts in caught_by_property().items()]
-    return text + table(["property", "meant to catch", "catches", "alone"], lines)
+    ids, rows, survivors = kill_rows()
+    alone, lines = caught_alone(), []
+    for name in ids:
+        n_intended = sum(row["caught by"] == name for row in rows)
+        catches = sum(is_kill(row[name]) for row in rows)
+        shared = ""
+        if not alone[name]:
+            mutant, others = least_shared(name)
+            rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
+            shared = f"{mutant}: {', '.join(f'`{other}`' for other in others[:3])}{rest}"
+        lines.append([f"`{name}`", str(n_intended), str(catches), str(len(alone[name])), shared])
+    text = KILLS.format(mutants=len(rows), survivors=len(survivors))
+    return text + table(["property", "meant", "catches", "alone", "least shared"], lines)
 
 
 def smallest() -> str:
@@ -114,15 +160,15 @@ def smallest() -> str:
 
 def page() -> str:
     """Return the whole page."""
-    return INTRODUCTION + "\n".join([campaign(), kills(), smallest()])
+    commits = ", ".join(f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS))
+    return INTRODUCTION.format(commits=commits) + "\n".join([campaign(), kills(), smallest()])
 
 
 def draw() -> None:
     """Draw the kill matrix."""
-    rows = [row for row in read("kills.csv") if not row["mutant"].startswith(SURVIVES)]
-    ids = [name for name in rows[0] if name not in ("mutant", "caught by")]
+    ids, rows, _ = kill_rows()
     rows.sort(key=lambda row: ids.index(row["caught by"]))
-    shades = np.array([[(row["caught by"] == name) + 0.45 * bool(row[name]) for name in ids] for row in rows])
+    shades = np.array([[(row["caught by"] == name) + 0.45 * is_kill(row[name]) for name in ids] for row in rows])
     mpl.rcParams.update({"svg.hashsalt": "contactverif", "svg.fonttype": "none"})
     figure, axes = plt.subplots(figsize=(0.16 * len(ids) + 1, 0.045 * len(rows) + 2.4), layout="constrained")
     axes.imshow(np.minimum(shades, 1), cmap="Blues", vmin=0, vmax=1.15, aspect="auto", interpolation="nearest")
@@ -131,9 +177,9 @@ def draw() -> None:
     axes.set_ylabel(f"{len(rows)} wrong formulations")
     for side in axes.spines.values():
         side.set_visible(False)
-    figure.savefig(FOLDER / "kills.svg", metadata={"Date": None})
+    figure.savefig(FOLDER / FIGURE, metadata={"Date": None})
 
 
 if __name__ == "__main__":
-    (FOLDER / "README.md").write_text(page(), encoding="utf-8")
+    (FOLDER / PAGE).write_text(page(), encoding="utf-8")
     draw()

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import csv
+import subprocess
 from collections.abc import Callable, Iterable
 from multiprocessing import get_context
 from pathlib import Path
 
 FOLDER = Path(__file__).parents[2] / "reports" / "trust"
+COMMITS = "commits.csv"  # {table: commit}
+SURVIVES = "survives: "  # Before the name of a mutant that no property is meant to catch.
+UNKNOWN = "-"  # The cell of a property that was not asked.
 
 
 def read(name: str) -> list[dict[str, str]]:
@@ -44,11 +48,20 @@ def fill(
     lines = {key: line for key, line in lines.items() if key in keys}
     _write(name, heads, lines, keys)
     missing = [key for key in keys if key not in lines]
+    if missing:
+        _keep_commit(name)
     with get_context("spawn").Pool(processes) as pool:
         for number, (key, line) in enumerate(zip(missing, pool.imap(cells, missing), strict=True), 1):
             lines[key] = [key, *line]
             _write(name, heads, lines, keys)
             print(f"{number} of {len(missing)}: {key}", flush=True)
+
+
+def _keep_commit(name: str) -> None:
+    """Note with which commit a table was filled last."""
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], check=True, capture_output=True, text=True).stdout
+    commits = {row["table"]: [row["table"], row["commit"]] for row in read(COMMITS)} | {name: [name, commit.strip()]}
+    _write(COMMITS, ["table", "commit"], commits, sorted(commits))
 
 
 def _write(name: str, heads: list[str], lines: dict[str, list[str]], keys: list[str]) -> None:
