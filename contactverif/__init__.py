@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
     from contactverif.contract.traits import Traits
-    from contactverif.mechanics.bulk import body_from_mesh
+    from contactverif.mechanics.mesh_bodies import body_from_mesh
     from contactverif.mechanics.newton import End, Trace, solve
     from contactverif.mechanics.scene import Scene
     from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
@@ -48,7 +48,7 @@ _HOMES = {
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
     "contract.traits": ("Traits",),
-    "mechanics.bulk": ("body_from_mesh",),
+    "mechanics.mesh_bodies": ("body_from_mesh",),
     "mechanics.newton": ("End", "Trace", "solve"),
     "mechanics.scene": ("Scene",),
     "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),

@@ -100,12 +100,17 @@ def solve_for_accuracy(
     interface = scene.interface
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
     formulation = subject.for_case(guess)
-    trace = solve_in_tries(scene, formulation, start, step)[-1]
+    trace = solve_in_tries(scene, formulation, start, step, keep_matrix=True)[-1]
     return solution_of(trace, formulation, nodal=subject.traits.penalty == "nodal")
 
 
 def solve_in_tries(
-    scene: Scene, formulation: CheckedFormulation, start: FloatArray | None = None, step: float | None = None
+    scene: Scene,
+    formulation: CheckedFormulation,
+    start: FloatArray | None = None,
+    step: float | None = None,
+    *,
+    keep_matrix: bool = False,
 ) -> tuple[Trace, ...]:
     """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
 
@@ -119,17 +124,30 @@ def solve_in_tries(
         The first iterate; by default the first guess of the scene.
     step : float | None
         The step of differences, as in `solve_for_accuracy`.
+    keep_matrix : bool
+        True saves matrices, for whoever asks for the solution and not for Newton's method, see `solve`.
 
     Returns
     -------
     tuple[Trace, ...]
         One or two tries; the last one counts.
     """
-    trace = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step)
-    if trace.converged or "tangent" not in formulation.provides:
-        return (trace,)
-    again = solve(scene, formulation, start=start, tolerance=BALANCED, difference_step=step, use_tangent=False)
-    return trace, again
+    ways = (True, False) if "tangent" in formulation.provides else (True,)
+    traces = []
+    for use_tangent in ways:
+        trace = solve(
+            scene,
+            formulation,
+            start=start,
+            tolerance=BALANCED,
+            difference_step=step,
+            use_tangent=use_tangent,
+            keep_matrix=keep_matrix,
+        )
+        traces.append(trace)
+        if trace.converged:
+            break
+    return tuple(traces)
 
 
 def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -> Solution:

@@ -8,10 +8,10 @@ Rule for the next editor: the stiffness knows nothing of any contact formulation
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import skfem
@@ -20,11 +20,12 @@ from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 from skfem.quadrature import get_quadrature
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, dense
+from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
 CACHE_SIZE = 512  # Number of condensed bodies that are remembered: penalties and formulations of one run share them.
+SHARED_SIZE = 64  # Number of factorised meshes that are remembered: loads, places and penalties share them.
 DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is factorised as fast as a sparse one.
 # A pivot below this share of its diagonal entry is zero: a loose part leaves less than 1e2 u, a long thin bar 1e6 u.
 _PIVOT_FLOOR = 2.0**-40
@@ -170,7 +171,8 @@ def free_on_contact(body: Body) -> IntArray:
 def condense(body: Body) -> CondensedBody:
     """Condense a body onto the free components of its contact boundary.
 
-    The answer is remembered, so that a body is condensed once.
+    The answer is remembered, so that a body is condensed once. Bodies that differ in their loads, their imposed
+    displacements or their place alone share one factorisation.
 
     Parameters
     ----------
@@ -187,48 +189,118 @@ def condense(body: Body) -> CondensedBody:
     MisuseError
         If a part of the body is held neither by a support nor by the contact boundary.
     """
+    imposed = body.imposed.reshape(-1)
+    if body.rigid:
+        none, unknowns = np.zeros((0, 0)), free_on_contact(body)
+        interior = np.zeros(0, np.int64)
+        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
+    matrices = _factorise(_ElasticPart.of_body(body))
+    forces = body.load.reshape(-1)
+    if imposed.any():
+        forces = forces - matrices.whole @ imposed
+    response = matrices.solve(forces[matrices.interior])
+    particular = imposed.copy()
+    particular[matrices.interior] = response
+    return CondensedBody(
+        body,
+        matrices.unknowns,
+        matrices.condensed,
+        forces[matrices.unknowns] - matrices.across.T @ response,
+        matrices.interior,
+        particular,
+        matrices.influence,
+        matrices.gradients,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Matrices:
+    """The matrices that follow from mesh, material and supports of an elastic body; loads have no part in them.
+
+    Attributes
+    ----------
+    unknowns, interior : IntArray, shapes (n,) and (n_interior,)
+        The free components on the contact boundary, and all others that are free.
+    whole : FloatArray or scipy.sparse array, shape (2 n_nodes, 2 n_nodes)
+        The stiffness matrix.
+    across : FloatArray or scipy.sparse array, shape (n_interior, n)
+        The part of it that couples the interior with the unknowns.
+    solve : Callable[[FloatArray], FloatArray]
+        Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
+    influence : FloatArray, shape (n_interior, n)
+        The effect of the unknowns on the interior.
+    condensed : FloatArray, shape (n, n)
+        The condensed stiffness, symmetric.
+    gradients : FloatArray, shape (n_cells, n_points, n_corners, 2)
+        The gradients of the shape functions.
+    """
+
+    unknowns: IntArray
+    interior: IntArray
+    whole: Any
+    across: Any
+    solve: Callable[[FloatArray], FloatArray]
+    influence: FloatArray
+    condensed: FloatArray
+    gradients: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class _ElasticPart:
+    """An elastic body seen without its loads and its place: equal ones have the same matrices, bit by bit."""
+
+    key: tuple[object, ...]
+    body: Body = field(compare=False)
+
+    @classmethod
+    def of_body(cls, body: Body) -> _ElasticPart:
+        """Return the part, with all that the matrices depend on: the shape of each cell, material and supports."""
+        corners = body.nodes[body.cells] - body.nodes[body.cells[:, :1]]
+        arrays = (corners, body.cells, body.fixed, body.contact_nodes, body.axis)
+        return cls((body.cells.shape, body.young, body.poisson, *(array.tobytes() for array in arrays)), body)
+
+
+@lru_cache(maxsize=SHARED_SIZE)
+def _factorise(part: _ElasticPart) -> _Matrices:
+    """Assemble and factorise an elastic body."""
+    body = part.body
     unknowns = free_on_contact(body)
     free = ~body.fixed.reshape(-1)
     free[unknowns] = False
     interior = np.flatnonzero(free)
-    imposed = body.imposed.reshape(-1)
-    if body.rigid:
-        none = np.zeros((0, 0))
-        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
-    matrix, gradients = assemble_stiffness(body)
-    forces = body.load.reshape(-1) - matrix @ imposed
-    across = matrix[interior][:, unknowns]
-    responses = _solve_interior(body, matrix[interior][:, interior], np.column_stack([dense(across), forces[interior]]))
-    influence, response = -responses[:, :-1], responses[:, -1]
-    particular = imposed.copy()
-    particular[interior] = response
-    condensed = dense(matrix[unknowns][:, unknowns]) + across.T @ influence
-    load = forces[unknowns] - across.T @ response
-    return CondensedBody(
-        body, unknowns, (condensed + condensed.T) / 2, load, interior, particular, influence, gradients
-    )
+    whole, gradients = assemble_stiffness(body)
+    inner = whole[interior]
+    across, solve = inner[:, unknowns], _interior_solver(body, inner[:, interior])
+    influence = -solve(dense(across))
+    condensed = dense(whole[unknowns][:, unknowns]) + across.T @ influence
+    return _Matrices(unknowns, interior, whole, across, solve, influence, (condensed + condensed.T) / 2, gradients)
 
 
-def _solve_interior(body: Body, matrix: Any, right: FloatArray) -> FloatArray:
-    """Return the displacements of the interior (n_interior, n_right) under the forces `right`."""
-    if not len(right):
-        return right
+def forget_condensed() -> None:
+    """Let go of all condensed bodies and their factors."""
+    condense.cache_clear()
+    _factorise.cache_clear()
+
+
+def _interior_solver(body: Body, matrix: Any) -> Callable[[FloatArray], FloatArray]:
+    """Factorise the stiffness (n_interior, n_interior) of the interior; return what solves for given forces."""
+    if not matrix.shape[0]:
+        return lambda forces: forces
     if sparse.issparse(matrix):
         try:
             factors = splu(matrix.tocsc())
         except RuntimeError:  # The matrix is exactly singular.
             raise _loose_part_error(body) from None
         pivots = np.abs(factors.U.diagonal()[factors.perm_c])
-        answer: FloatArray = factors.solve(right)
+        solve: Callable[[FloatArray], FloatArray] = factors.solve
     else:
         factor, info = lapack.dpotrf(matrix, lower=1)
         if info != 0:
             raise _loose_part_error(body)
-        pivots = factor.diagonal() ** 2
-        answer, _ = lapack.dpotrs(factor, right, lower=1)
+        pivots, solve = factor.diagonal() ** 2, lambda forces: lapack.dpotrs(factor, forces, lower=1)[0]
     if not (pivots > _PIVOT_FLOOR * matrix.diagonal()).all():
         raise _loose_part_error(body)
-    return answer
+    return solve
 
 
 def _loose_part_error(body: Body) -> MisuseError:
@@ -256,143 +328,11 @@ def loose_modes(body: Body) -> list[str]:
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     pressed = [np.einsum("ec,ecm->em", normals, modes[body.contact[:, end]]) for end in (0, 1)]
     resisted = np.concatenate([modes[body.fixed], *pressed])
-    _, sizes, motions = np.linalg.svd(resisted, full_matrices=True)
+    # The triangle of QR has the same singular values, and at most three rows however many supports there are.
+    _, sizes, motions = np.linalg.svd(np.linalg.qr(resisted, mode="r"), full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])
     # Motions are numbers without dimension, of order 1: resistance below the floor is roundoff.
     free = motions[sizes <= _RESISTANCE_FLOOR * max(sizes.max(), 1.0)]
     return [
         words for words, part in zip(_MOTIONS, free.T, strict=True) if len(free) and np.abs(part).max() > _MOTION_FLOOR
     ]
-
-
-def body_from_mesh(
-    mesh: Any,
-    *,
-    contact: str,
-    supports: Mapping[str, Literal["along", "across", "both"]],
-    young: float = 1.0,
-    poisson: float = 0.0,
-    displacements: Mapping[str, tuple[float, float]] | None = None,
-    pressures: Mapping[str, float] | None = None,
-    name: str = "mesh",
-) -> Body:
-    """Return a body from a scikit-fem mesh of first-order triangles or quadrilaterals with named boundaries.
-
-    Parameters
-    ----------
-    mesh : skfem.MeshTri or skfem.MeshQuad
-        The mesh. ``mesh.with_boundaries({name: function})`` names its boundaries.
-    contact : str
-        The boundary that may touch something.
-    supports : Mapping[str, Literal['along', 'across', 'both']]
-        The components that are fixed on each supported boundary: "along" the x-axis, "across" it, or "both".
-    young : float
-        Young's modulus E > 0, force per length squared.
-    poisson : float
-        Poisson's ratio, −1 < ν < 1/2.
-    displacements : Mapping[str, tuple[float, float]] | None
-        The displacement (along, across), a length each, of each supported boundary that moves.
-    pressures : Mapping[str, float] | None
-        The pressure on each loaded boundary, force per length, positive towards the body.
-    name : str
-        The name of the body in messages and drawings.
-
-    Returns
-    -------
-    Body
-        The body on the nodes and cells of the mesh; its axes are x and y.
-
-    Raises
-    ------
-    MisuseError
-        If the mesh has no such boundary, a displacement is imposed where nothing is fixed, or as `Body` does.
-
-    Examples
-    --------
-    >>> import numpy as np, skfem
-    >>> from contactverif import body_from_mesh
-    >>> mesh = skfem.MeshTri().refined(2).with_boundaries({"low": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
-    >>> body = body_from_mesh(mesh, contact="low", supports={"top": "both"}, displacements={"top": (0.0, -0.1)})
-    >>> len(body.contact), body.fixed.sum()
-    (4, np.int64(10))
-    """
-    if getattr(mesh, "elem", None) not in (skfem.ElementTriP1, skfem.ElementQuad1):
-        raise MisuseError("mesh", f"a {type(mesh).__name__}", "a MeshTri or a MeshQuad of first order")
-    if not isinstance(supports, Mapping):
-        raise MisuseError("supports", f"a {type(supports).__name__}", "{boundary: 'along', 'across' or 'both'}")
-    displacements, pressures = displacements or {}, pressures or {}
-    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
-    cells = np.where((_signed_areas(points[cells]) < 0)[:, None], cells[:, ::-1], cells)
-    edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *pressures])}
-    fixed, imposed = _supports(points, edges, supports, displacements)
-    load = _loads(points, edges, pressures)
-    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
-
-
-def _supports(
-    points: FloatArray,
-    edges: Mapping[str, IntArray],
-    supports: Mapping[str, str],
-    displacements: Mapping[str, tuple[float, float]],
-) -> tuple[BoolArray, FloatArray]:
-    """Return which components are fixed, and the displacements imposed there, both (n_nodes, 2)."""
-    fixed, imposed = np.zeros(points.shape, bool), np.zeros(points.shape)
-    for tag, direction in supports.items():
-        components = {"along": [0], "across": [1], "both": [0, 1]}.get(direction)
-        if components is None:
-            raise MisuseError(f"supports[{tag!r}]", repr(direction), "'along', 'across' or 'both'")
-        nodes = np.unique(edges[tag])
-        displacement = _check_displacement(tag, displacements.get(tag, (0.0, 0.0)), components)
-        for component in components:
-            fixed[nodes, component] = True
-            imposed[nodes, component] = displacement[component]
-    if unsupported := set(displacements) - set(supports):
-        needed = "a boundary that supports name"
-        raise MisuseError(f"displacements[{min(unsupported)!r}]", "no supports there", needed)
-    return fixed, imposed
-
-
-def _loads(points: FloatArray, edges: Mapping[str, IntArray], pressures: Mapping[str, float]) -> FloatArray:
-    """Return the nodal forces (n_nodes, 2) of pressures on boundaries."""
-    load = np.zeros(points.shape)
-    for tag, pressure in pressures.items():
-        if np.ndim(pressure) != 0 or np.asarray(pressure).dtype.kind not in "fiu":
-            raise MisuseError(f"pressures[{tag!r}]", repr(pressure), "a number")
-        first, second = edges[tag].T
-        along = points[second] - points[first]
-        for end in (first, second):
-            np.add.at(load, end, pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]]))
-    return load
-
-
-def _check_displacement(tag: str, values: Any, components: list[int]) -> FloatArray:
-    """Return the displacement (2,) of a boundary, checked: 0 where nothing is fixed."""
-    try:
-        displacement = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        displacement = np.zeros(0)
-    if displacement.shape != (2,):
-        raise MisuseError(f"displacements[{tag!r}]", repr(values), "two numbers, along and across")
-    if displacement[[component for component in (0, 1) if component not in components]].any():
-        raise MisuseError(f"displacements[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
-    return displacement
-
-
-def _signed_areas(corners: FloatArray) -> FloatArray:
-    following = np.roll(corners, -1, axis=1)
-    areas: FloatArray = (corners[..., 0] * following[..., 1] - corners[..., 1] * following[..., 0]).sum(axis=1) / 2
-    return areas
-
-
-def _edges(mesh: Any, cells: IntArray, tag: str) -> IntArray:
-    """Return the edges (n, 2) of a named boundary, each with its cell on the left."""
-    tags = getattr(mesh, "boundaries", None) or {}
-    if tag not in tags:
-        needed = f"one of {', '.join(sorted(tags))}" if tags else "a mesh with named boundaries (mesh.with_boundaries)"
-        raise MisuseError("mesh", f"no boundary {tag!r}", needed)
-    if not len(tags[tag]):
-        raise MisuseError("mesh", f"no edges on boundary {tag!r}", "a boundary that has some")
-    wanted = {tuple(sorted(edge)) for edge in np.asarray(mesh.facets).T[np.asarray(tags[tag])].tolist()}
-    following = np.roll(cells, -1, axis=1)
-    every = np.stack([cells, following], axis=-1).reshape(-1, 2).tolist()
-    return np.array([edge for edge in every if tuple(sorted(edge)) in wanted], dtype=np.int64).reshape(-1, 2)

@@ -33,6 +33,7 @@ STAGNATION_ITERATIONS = 4  # Newton's method stagnates if the residual has not d
 NEAR_CONVERGENCE = 1e3
 # Newton has diverged once the residual exceeds the first one, or the iterate the size of the interface, by this factor.
 DIVERGENCE_FACTOR = 1e8
+KEPT_FALL = 16.0  # A matrix may be kept while each iteration makes the residual at least this many times smaller.
 
 TIMED_PARTS = ("pair", "residual", "tangent", "solve")
 
@@ -330,24 +331,48 @@ class System:
         self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
     ) -> tuple[Any, FloatArray]:
         """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u (n,); None asks for that."""
-        tangent = self.tangent(u, pairing) if tangent is None else tangent
+        contact = self.contact_stiffness(self.tangent(u, pairing) if tangent is None else tangent)
+        return self.stiffness + contact, self.floor(u, contact, forces)
+
+    def contact_stiffness(self, tangent: Any) -> Any:
+        """Return the derivative (n, n) of the contact forces on the unknowns, dense if the stiffness is."""
         start = perf_counter()
-        scene, n_free, z = self.scene, self.scene.n_free, self.state(u)
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
         contact = self.transformation.T @ tangent @ self.transformation
-        matrix = self.stiffness + contact
+        self.seconds["tangent"] += perf_counter() - start
+        return contact
+
+    def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
+        """Return the part of the residual (n,) that roundoff of positions and forces alone may cause.
+
+        Parameters
+        ----------
+        u : FloatArray, shape (n,)
+            The unknowns.
+        contact : FloatArray or scipy.sparse array, shape (n, n)
+            The derivative of the contact forces there, or nearby.
+        forces : FloatArray, shape (n_unknowns + n_multipliers,)
+            The contact forces.
+        """
+        start = perf_counter()
+        scene, n_free = self.scene, self.scene.n_free
         # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
-        largest = np.abs(z[: scene.interface.n_unknowns]).max()
+        largest = np.abs(scene.positions(u[:n_free], self.factor)).max()
         sizes = np.full(self.size, largest)
         sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
         # A force along an inclined normal is rounded in both of its components.
         terms = abs(contact) @ sizes + abs(self.transformation).T @ np.abs(forces)
-        # A displacement below uX moves no node. The displacements of a body that nothing presses shrink by 1e-16 in
-        # each iteration, and so do its forces: counted over those displacements alone, they would never be small.
+        # A displacement below uX moves no node. Displacements of a body that nothing presses shrink by 1e-16 in each
+        # iteration, and so do its forces: counted over those displacements alone, they would never be small.
         displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
         terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
         self.seconds["tangent"] += perf_counter() - start
-        return matrix, ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
+        floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
+        return floor
+
+    def row_factors(self, matrix: Any) -> FloatArray | float:
+        """Return the factors (n,) that make constraint rows comparable with forces; 1 without multipliers."""
+        return linear.scale_factors(matrix, self.scene.n_free)[0] if self.n_multipliers else 1.0
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
@@ -386,6 +411,7 @@ def solve(
     use_tangent: bool = True,
     tolerance: float = 0.0,
     difference_step: float | None = None,
+    keep_matrix: bool = False,
 ) -> Trace:
     """Solve a scene by Newton's method with full steps.
 
@@ -411,6 +437,10 @@ def solve(
         does not apply to multipliers.
     difference_step : float | None
         The step of differences in positions, a length; None for the one that suits smooth residuals.
+    keep_matrix : bool
+        True keeps the matrix while each iteration makes the residual `KEPT_FALL` times smaller: for whoever asks for
+        the solution alone. The same residual decides about convergence. It does not apply to multipliers, since the
+        matrix says which of them are active.
 
     Returns
     -------
@@ -432,6 +462,7 @@ def solve(
         if number < 1:
             raise MisuseError(name, f"{number}", "at least 1")
     system, record = System(scene, formulation, use_tangent=use_tangent, difference_step=difference_step), _Record()
+    keep_matrix = keep_matrix and not system.n_multipliers
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
         behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""
@@ -442,32 +473,37 @@ def solve(
     end = End.CONVERGED
     for number in range(1, load_steps + 1):
         system.factor = number / load_steps
-        end, u = _load_step(system, record, u, iterations, tolerance)
+        end, u = _load_step(system, record, u, iterations, tolerance, keep_matrix)
         if end is not End.CONVERGED:
             break
     return record.trace(scene, end, system.seconds)
 
 
 def _load_step(
-    system: System, record: _Record, u: FloatArray, iterations: int, tolerance: float
+    system: System, record: _Record, u: FloatArray, iterations: int, tolerance: float, keep_matrix: bool
 ) -> tuple[End, FloatArray]:
     """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
     first, before, n_free = len(record.u), None, system.scene.n_free
+    contact: Any = None
     floor = np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
-        if not (np.isfinite(u).all() and np.abs(u[:n_free]).max(initial=0.0) <= DIVERGENCE_FACTOR * size):
+        if not _is_near(u[:n_free], u, size):
             return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
         share = tolerance if iteration else 0.0
-        forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0)  # The last iterate needs no tangent.
+        # The last iterate needs no tangent, nor does one that keeps the matrix.
+        forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0 or keep_matrix)
         residual = system.balance(u, forces)
+        changes = _count_changes(pairing, before)
         if system.is_balanced(residual, forces, share):
-            record.add(u, system.factor, residual, floor, 1.0, _count_changes(pairing, before))
+            record.add(u, system.factor, residual, floor, 1.0, changes)
             return End.CONVERGED, u
-        matrix, floor = system.assemble(u, pairing, forces, tangent)
-        comparable = linear.scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
-        record.add(u, system.factor, residual, floor, comparable, _count_changes(pairing, before))
+        if not (keep_matrix and _falls_fast(record, first, residual, floor)):
+            contact = system.contact_stiffness(system.tangent(u, pairing) if tangent is None else tangent)
+        matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
+        comparable = system.row_factors(matrix)
+        record.add(u, system.factor, residual, floor, comparable, changes)
         end = _end(record, first, n_free)
         if end is not None:
             return end, u
@@ -480,6 +516,23 @@ def _load_step(
         record.energies[-1] = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
     raise AssertionError("the loop returns")
+
+
+def _is_near(q: FloatArray, u: FloatArray, size: float) -> bool:
+    """Return whether the unknowns u are finite, and the displacements q no longer than the interface many times."""
+    return bool(np.isfinite(u).all() and np.abs(q).max(initial=0.0) <= DIVERGENCE_FACTOR * size)
+
+
+def _falls_fast(record: _Record, first: int, residual: FloatArray, floor: FloatArray) -> bool:
+    """Return whether a residual (n,) is small enough against the last one of this load step to keep the matrix."""
+    return len(record.u) > first and _largest_rounding(residual, floor) <= record.roundings[-1] / KEPT_FALL
+
+
+def _largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
+    """Return the largest ratio of an entry of the residual (n,) to what roundoff may cause in it."""
+    with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
+        roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
+    return float(roundings.max(initial=0.0))
 
 
 @dataclass(slots=True)
@@ -503,9 +556,7 @@ class _Record:
         self.factors.append(factor)
         self.residuals.append(float(np.abs(comparable * residual).max(initial=0.0)))
         self.floors.append(float((comparable * floor).max(initial=0.0)))
-        with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
-            roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
-        self.roundings.append(float(roundings.max(initial=0.0)))
+        self.roundings.append(_largest_rounding(residual, floor))
         self.changes.append(changes)
         self.energies.append(np.nan)
         self.conditions.append(np.nan)

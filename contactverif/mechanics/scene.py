@@ -10,9 +10,10 @@ nothing of it is visited while contact is solved. A case that holds a scene give
 from __future__ import annotations
 
 import itertools
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg, sparse
@@ -22,7 +23,15 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
-from contactverif.mechanics.bulk import CACHE_SIZE, DENSE_LIMIT, CondensedBody, condense, free_on_contact, loose_modes
+from contactverif.mechanics.bulk import (
+    CACHE_SIZE,
+    DENSE_LIMIT,
+    CondensedBody,
+    condense,
+    forget_condensed,
+    free_on_contact,
+    loose_modes,
+)
 
 _BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodies.
 
@@ -301,7 +310,11 @@ class Scene:
         """
         arrays = {_BODIES + name: values for name, values in _pack(self).items()}
         z = self.positions(self.start)
-        return Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
+        case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
+        is_slave = np.isin(np.arange(len(self.bodies)), self.slave).astype(np.float64)
+        if all(body.name == _body_name(is_slave, index) for index, body in enumerate(self.bodies)):
+            _ORIGINS.remember(case, self)
+        return case
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""
@@ -320,9 +333,41 @@ def has_bodies(case: Case) -> bool:
     return f"{_BODIES}nodes" in case.parameters
 
 
-@lru_cache(maxsize=CACHE_SIZE)
+class _Origins:
+    """The scenes of the last cases, so that a scene that has just been made is not made again from its case."""
+
+    def __init__(self) -> None:
+        self._scenes: OrderedDict[Case, Scene] = OrderedDict()  # By identity: cases have no other equality.
+
+    def remember(self, case: Case, scene: Scene) -> None:
+        """Keep the scene of a case, and let go of the oldest one if there are too many."""
+        self._scenes[case] = scene
+        if len(self._scenes) > CACHE_SIZE:
+            self._scenes.popitem(last=False)
+
+    def find(self, case: Case) -> Scene | None:
+        """Return the scene of a case; None if it is not there."""
+        return self._scenes.get(case)
+
+    def forget(self) -> None:
+        """Let go of all scenes."""
+        self._scenes.clear()
+
+
+_ORIGINS = _Origins()
+
+
+def forget_bodies() -> None:
+    """Let go of all scenes and condensed bodies, for whoever times how long they take."""
+    _ORIGINS.forget()
+    forget_condensed()
+
+
 def scene_of(case: Case) -> Scene:
     """Return the scene of a case that `Scene.case` made.
+
+    The last cases have their scenes still, with whatever is condensed of them. Any other case, such as a stored one,
+    gives the same scene to the last bit.
 
     Parameters
     ----------
@@ -339,6 +384,8 @@ def scene_of(case: Case) -> Scene:
     MisuseError
         If the case holds no bodies.
     """
+    if (scene := _ORIGINS.find(case)) is not None:
+        return scene
     if not has_bodies(case):
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")
     packed = {
@@ -346,7 +393,9 @@ def scene_of(case: Case) -> Scene:
     }
     facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
     bodies, slave, master = _unpack(packed)
-    return Scene(bodies, slave, master, case.penalty, facts, case.name)
+    scene = Scene(bodies, slave, master, case.penalty, facts, case.name)
+    _ORIGINS.remember(case, scene)
+    return scene
 
 
 def _box_in_reach(body: Body) -> tuple[FloatArray, FloatArray]:

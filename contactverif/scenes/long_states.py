@@ -19,7 +19,6 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 
-N_SEGMENTS = 200  # The number of segments of the longer side.
 FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
 _DEPTH = 1 / 16  # The mean penetration over the shortest segment.
@@ -54,17 +53,15 @@ def long_states() -> tuple[Case, ...]:
     Returns
     -------
     tuple[Case, ...]
-        Cases with names (``"wave-200"``); the number is that of the segments of the longer side.
+        Cases with names (``"wave-110"``); the number is that of the segments of the longer side.
     """
-    even, some, few = _places(1, N_SEGMENTS), _places(2, 170), _places(3, 4)
     parts = {
-        "flat-200": [_open(even, some, _flat)],
-        "wave-200": [_open(even, some, _wave)],
-        "graded-200": [_open(_grade_places(4), _places(5, 120), _flat)],
-        "many-on-few-200": [_open(even, few, _flat)],
-        "few-on-many-200": [_open(few, even, _flat)],
-        "three-chains-180": [_open(_places(6 + k, 60), _places(9 + k, 50), _flat, along=1.5 * k) for k in range(3)],
-        "ring-160": [_ring(_places(12, 160), _places(13, 130))],
+        "wave-110": [_open(_places(2, 80), _places(13, 110), _wave)],
+        "graded-110": [_open(_grade_places(4, 110), _places(5, 60), _flat)],
+        "many-on-few-104": [_open(_places(1, 104), _places(3, 4), _flat)],
+        "few-on-many-200": [_open(_places(3, 4), _places(1, 200), _flat)],
+        "three-chains-108": [_open(_places(6 + k, 36), _places(9 + k, 12), _flat, along=1.5 * k) for k in range(3)],
+        "ring-104": [_ring(_places(12, 30), _places(13, 104))],
     }
     return tuple(_case(name, group, turn=0.5 + number) for number, (name, group) in enumerate(parts.items()))
 
@@ -76,10 +73,10 @@ def _places(seed: int, count: int) -> FloatArray:
     return places
 
 
-def _grade_places(seed: int) -> FloatArray:
-    """Return ascending places (N_SEGMENTS + 1,) from 0 to 1; segments are the shorter the nearer to the middle."""
-    half = np.geomspace(1.0, FINEST, N_SEGMENTS // 2)
-    steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, N_SEGMENTS)
+def _grade_places(seed: int, count: int) -> FloatArray:
+    """Return ascending places (count + 1,), 0 to 1, for an even count; segments are the shorter the nearer to 1/2."""
+    half = np.geomspace(1.0, FINEST, count // 2)
+    steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, count)
     places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     return places
 

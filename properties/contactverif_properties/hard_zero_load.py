@@ -59,7 +59,7 @@ def measure_unloaded(case: Case, subject: Subject) -> Measurement:
         The largest stress over E, and the largest contact force on a node over E H, both dimensionless.
     """
     scene, formulation = scene_of(case), subject.for_case(case)
-    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     u = trace.u[int(np.argmin(trace.residuals))] if trace.converged else np.zeros(trace.u.shape[1])
     q = u[: scene.n_free]
     z = np.append(scene.positions(q), u[scene.n_free :])

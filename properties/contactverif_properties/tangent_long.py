@@ -1,7 +1,7 @@
 """Ask whether the tangent of a long interface is right in each of its blocks.
 
-**Question.** Seven interfaces have 160 to 200 segments on one side: flat, wavy, graded, a ring, three chains, many
-segments on few, and few on many. Is each block of the tangent the derivative of the residual?
+**Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments on
+few, and few on many. Is each block of the tangent the derivative of the residual?
 
 **Why it matters.** Some errors need size: a table that is too short, a block of rows that is forgotten behind the
 hundredth segment, a wrong entry among a hundred thousand. A norm of the whole matrix loses that entry, and the more so

@@ -14,9 +14,8 @@ from plain_skfem import solve as plain
 from test_speed import time_in_turns
 
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.scene import Scene, forget_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_formulation
@@ -103,17 +102,13 @@ def test_one_random_patch_test(benchmark: Any, capsys: pytest.CaptureFixture[str
     subject = formulation()
     cases = draw_cases(block_cases(), seed="0", examples=N_MESHES).cases
 
-    def clear_caches() -> None:
-        scene_of.cache_clear()
-        condense.cache_clear()
-
     def judge_all() -> None:
-        clear_caches()
+        forget_bodies()
         for case in cases:
             judge_case(FLAT_SOLVE, case, subject)
 
     def condense_all() -> None:
-        clear_caches()
+        forget_bodies()
         for case in cases:
             assert len(scene_of(case).condensed_bodies) == 2
 

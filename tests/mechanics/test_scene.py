@@ -23,7 +23,8 @@ from contactverif.geometry import projection
 from contactverif.geometry.compiled import python_function
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
-from contactverif.mechanics.bulk import assemble_stiffness, body_from_mesh
+from contactverif.mechanics.bulk import assemble_stiffness
+from contactverif.mechanics.mesh_bodies import body_from_mesh
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.run.registry import load_formulation

@@ -18,7 +18,7 @@ from contactverif.contract.property import Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
-from contactverif.scenes.long_states import N_SEGMENTS, long_states
+from contactverif.scenes.long_states import long_states
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
 from contactverif_properties.shared.any_state import prepare_state
@@ -69,7 +69,7 @@ def off_by(size: float, node: int, *, large: bool = False) -> Any:
     """Return a change of one entry by a share of its block, that of a node with itself."""
 
     def change(interface: Any, matrix: Any) -> None:
-        if not large or len(interface.slave) >= N_SEGMENTS:
+        if not large or max(len(interface.slave), len(interface.master)) > 100:
             block = matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2]
             block[0, 1] += size * np.abs(block).max()
 
@@ -112,12 +112,12 @@ def test_unknowns_that_move_together_give_the_columns_of_single_ones(name: str, 
 
 def test_few_moves_are_enough_for_many_unknowns() -> None:
     judge = judge_of(long_states()[0], load_subject("vts-ppt-balanced"))
-    assert len(plan_moves(judge.differences.case, judge.pattern).members) < judge.groups.size / 20
+    assert len(plan_moves(judge.differences.case, judge.pattern).members) < judge.groups.size / 10
 
 
 def test_long_states_are_long_and_in_contact() -> None:
     for state in long_states():
-        assert max(len(state.interface.slave), len(state.interface.master)) >= 160
+        assert max(len(state.interface.slave), len(state.interface.master)) > 100
         formulation, at = prepare_state(state, load_subject("vts-ppt-balanced"))
         forces = formulation.residual(at.interface, formulation.pair(at.interface, at.z), at.z)
         assert (np.abs(forces[: 2 * at.interface.n_slave_nodes].reshape(-1, 2)).max(axis=1) > 0).all(), state.name
@@ -130,7 +130,7 @@ def test_a_right_tangent_passes_in_doubles_alone_and_without_a_pairing(name: str
     for each in FEW[:20]:
         outcome = judge_case(TANGENT_SPARSITY, each, innocent)
         assert outcome.verdict is Verdict.PASS, outcome.reason
-    outcome = judge_case(TANGENT_LONG, long_states()[1], innocent)
+    outcome = judge_case(TANGENT_LONG, long_states()[4], innocent)
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -143,9 +143,8 @@ def test_other_ways_of_writing_pass_in_long_double(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["nts", "vts-ppt-balanced", "mortar"])
-@pytest.mark.parametrize("node", [3, 150, 290])
-@pytest.mark.parametrize("number", [0, 1])
-def test_one_entry_off_by_1e_6_of_its_block_is_found_among_200_segments(name: str, node: int, number: int) -> None:
+@pytest.mark.parametrize(("number", "node"), [(0, 3), (0, 60), (0, 150), (4, 60), (4, 120)])
+def test_one_entry_off_by_1e_6_of_its_block_is_found_among_hundreds_of_nodes(name: str, number: int, node: int) -> None:
     """Differences of doubles are enough."""
     state = long_states()[number]
     outcome = judge_case(TANGENT_LONG, state, plain(name, off_by(1e-6, node)))
@@ -178,7 +177,7 @@ def test_a_coupling_outside_the_pattern_is_found_where_unknowns_move_together() 
     far = Subject("coupled", lambda *, penalty: Coupled(inner.with_penalty(penalty).plugin))
     outcome = judge_case(TANGENT_LONG, long_states()[0], far)
     assert outcome.verdict is Verdict.FAIL
-    assert "row 5 (y of slave node 2), column 300 (x of slave node 150): tangent 0 (not in the" in outcome.reason
+    assert "row 5 (y of slave node 2), column 300 (x of master node 150): tangent 0 (not in the" in outcome.reason
 
 
 class Kinked(Handmade):

@@ -233,12 +233,12 @@ def solve_patch(
     u : FloatArray, shape (n_free + n_multipliers,)
         The unknowns that are judged.
     """
-    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     if trace.converged:
         distance = np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0)
         if distance <= SAME_SOLUTION * penetration:
             return trace, trace.u[-1]
-    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False)
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     balanced = again.roundings[0] <= NEAR_CONVERGENCE or len(again.u) == 1
     return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
 
