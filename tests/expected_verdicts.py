@@ -145,31 +145,33 @@ UNSTATED = frozenset({(HALF_PASSES, HERTZ), (HALF_PASSES, WAVY)})
 MARKS = {Verdict.PASS: "✓", Verdict.FAIL: "✗", Verdict.NOT_APPLICABLE: "·"}
 
 
+# The formulations that a property cannot judge. Where a reason is not plain from the name, it stands beside it.
+WITHOUT_INTEGRAL = (*WITHOUT_DIRECTION, "nts", HALF_PASSES, *WITH_MULTIPLIERS)  # No integral of a linear gap is stated.
+# Nodal multipliers have no area, but the pressure of shrunk rings without springs needs none.
+WITHOUT_RINGS = tuple(name for name in (*WITHOUT_AREA, *NOT_UNIQUE) if name != "nts-lm")
+CANNOT_JUDGE: Mapping[str, frozenset[str]] = {
+    **{property_id: frozenset(NOT_UNIQUE) for property_id in NEEDS_SOLUTION},
+    **{property_id: FAILS.keys() - WITH_MULTIPLIERS for property_id in NEEDS_MULTIPLIERS},
+    **{property_id: frozenset(names) for property_id, names in WITHOUT_PROJECTION.items()},
+    COMPLEMENTARITY: FAILS.keys() - WITH_MULTIPLIERS | frozenset(NOT_UNIQUE),
+    # These have no springs, or no exact tangent to solve with.
+    STIFFNESS: frozenset({*WITH_MULTIPLIERS, *(name for name, fails in FAILS.items() if TANGENT in fails)}),
+    TILTED: frozenset(WITHOUT_DIRECTION),
+    LINEAR: frozenset(WITHOUT_INTEGRAL),
+    NODAL: FAILS.keys() - NODAL_SPRINGS,
+    PUBLISHED: frozenset(WITHOUT_TABLE),
+    # Multipliers solve nothing on the way, and averaged normals and half passes state nothing.
+    CONTINUITY: frozenset({*WITH_MULTIPLIERS, *WITHOUT_RULE}),
+    LOCAL: frozenset(WITHOUT_EXACT_FORCES),
+    CURVED: frozenset(WITHOUT_RINGS),
+    RESULTANT: frozenset(WITHOUT_AREA),
+    ARC: frozenset(WITHOUT_AREA),
+}
+
+
 def applies(name: str, property_id: str) -> bool:
     """Return whether the property makes sense for the formulation."""
-    if property_id in NEEDS_MULTIPLIERS and name not in WITH_MULTIPLIERS:
-        return False
-    if property_id in NEEDS_SOLUTION and name in NOT_UNIQUE:
-        return False
-    if property_id == STIFFNESS and (name in WITH_MULTIPLIERS or TANGENT in FAILS[name]):
-        return False  # It has no springs, or no exact tangent to solve with.
-    if name in WITHOUT_PROJECTION.get(property_id, ()):
-        return False
-    if property_id in (TILTED, LINEAR) and name in WITHOUT_DIRECTION:
-        return False
-    if property_id == LINEAR and (name in ("nts", HALF_PASSES) or name in WITH_MULTIPLIERS):
-        return False  # No integral is stated.
-    if property_id == NODAL and name not in NODAL_SPRINGS:
-        return False
-    if property_id == PUBLISHED and name in WITHOUT_TABLE:
-        return False
-    if property_id == CONTINUITY and (name in WITH_MULTIPLIERS or name in WITHOUT_RULE):
-        return False  # Nothing is solved on the way, and averaged normals and half passes state nothing.
-    if property_id == LOCAL and name in WITHOUT_EXACT_FORCES:
-        return False
-    if property_id == CURVED:  # Nodal multipliers have no area, but the pressure without springs needs none.
-        return name == "nts-lm" or name not in (*WITHOUT_AREA, *NOT_UNIQUE)
-    return not (property_id in (RESULTANT, ARC) and name in WITHOUT_AREA)
+    return name not in CANNOT_JUDGE.get(property_id, ())
 
 
 def expected_verdict(name: str, property_id: str) -> Verdict:

@@ -279,11 +279,21 @@ def _judge_all(
         seconds=perf_counter() - start,
     )
     verdict, reason = _verdict_over_all(row)
-    on_scene = plan.scene is not None and question.bodies and row.outcomes
-    if verdict is Verdict.NOT_JUDGED and on_scene and not row.judged:
-        # There is this one case alone, and nobody promised that it can be decided.
-        verdict, reason = Verdict.UNDECIDED, row.outcomes[0].reason or reason
+    if verdict is Verdict.NOT_JUDGED and question.bodies and _may_stay_undecided(plan, row, source):
+        verdict = Verdict.UNDECIDED
+        reason = row.outcomes[0].reason or reason if plan.scene is not None else reason
     return replace(row, verdict=verdict, reason=reason)
+
+
+def _may_stay_undecided(plan: _Plan, row: Row, source: CaseSource) -> bool:
+    """Return whether nobody promised that the scenes of a row can be decided.
+
+    It is so for the one scene that a user names, and for a list of scenes about which the formulation states nothing:
+    they may have no solution.
+    """
+    if plan.scene is not None:
+        return bool(row.outcomes) and not row.judged
+    return row.promise is None and row.undecided > 0 and isinstance(source, tuple)
 
 
 def _judge_witness(question: Property, witness: Case, subject: Subject, outcomes: Sequence[Outcome]) -> Outcome:

@@ -551,3 +551,12 @@ def test_the_rate_of_the_basic_version_with_the_penalty(over_young: float, rate:
 def test_every_end_has_its_number_and_its_words() -> None:
     assert len({end.label for end in End}) == len(End) == 6
     assert [int(end) for end in End] == list(range(6))
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "mortar"])
+def test_a_kept_matrix_leads_to_the_same_solution(name: str) -> None:
+    scene = catalogue.load_scene("c-prime")
+    traces = [solve(scene, on(name, scene), use_tangent=False, keep_matrix=keep) for keep in (False, True)]
+    assert all(trace.converged for trace in traces)
+    size = np.abs(traces[0].solution).max()
+    assert np.abs(traces[1].solution - traces[0].solution).max() <= 1e-12 * size

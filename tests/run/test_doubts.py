@@ -133,3 +133,19 @@ def test_who_gives_no_answer_has_no_sign() -> None:
             raise IndexError("no answer")
 
     assert run([Subject("mine", Silent)], load_properties(["purity"]), seed=1, examples=1).opposite_signs == ()
+
+
+@pytest.mark.parametrize(("promise", "verdict"), [(None, Verdict.UNDECIDED), (True, Verdict.NOT_JUDGED)])
+def test_a_list_of_scenes_without_solutions_fails_only_who_promised(promise: bool | None, verdict: Verdict) -> None:
+    """A stranger's first formulation may have no solution on some mesh: that is neither wrong nor a failed run."""
+
+    def measure(case: Case, subject: Subject) -> Measurement:
+        return Measurement({}, {}, "Newton's method found no balance" if case.seed else "")
+
+    cases = numbered_cases(3)
+    question = Property("x.y", "x", "A number.", (ERROR,), lambda _: cases, measure, lambda _: promise, bodies=True)
+    result = run([Subject("mine", nts)], [question], seed=1)
+    (row,) = result.rows
+    assert row.verdict is verdict
+    assert "1 of 3 cases judged; most often because Newton's method found no balance" in row.reason
+    assert result.promises_kept == (promise is None)
