@@ -331,11 +331,12 @@ class System:
         self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
     ) -> tuple[Any, FloatArray]:
         """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u (n,); None asks for that."""
-        contact = self.contact_stiffness(self.tangent(u, pairing) if tangent is None else tangent)
+        contact = self.contact_stiffness(u, pairing, tangent)
         return self.stiffness + contact, self.floor(u, contact, forces)
 
-    def contact_stiffness(self, tangent: Any) -> Any:
-        """Return the derivative (n, n) of the contact forces on the unknowns, dense if the stiffness is."""
+    def contact_stiffness(self, u: FloatArray, pairing: Pairing | None, tangent: Any) -> Any:
+        """Return the derivative (n, n) of the contact forces on the unknowns, of a `tangent`; None asks for that."""
+        tangent = self.tangent(u, pairing) if tangent is None else tangent
         start = perf_counter()
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
         contact = self.transformation.T @ tangent @ self.transformation
@@ -491,7 +492,7 @@ def _load_step(
         if not _is_near(u[:n_free], u, size):
             return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
-        share = tolerance if iteration else 0.0
+        share = tolerance * (iteration > 0)
         # The last iterate needs no tangent, nor does one that keeps the matrix.
         forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0 or keep_matrix)
         residual = system.balance(u, forces)
@@ -500,7 +501,7 @@ def _load_step(
             record.add(u, system.factor, residual, floor, 1.0, changes)
             return End.CONVERGED, u
         if not (keep_matrix and _falls_fast(record, first, residual, floor)):
-            contact = system.contact_stiffness(system.tangent(u, pairing) if tangent is None else tangent)
+            contact = system.contact_stiffness(u, pairing, tangent)
         matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
         comparable = system.row_factors(matrix)
         record.add(u, system.factor, residual, floor, comparable, changes)
