@@ -1,8 +1,8 @@
 """`contactverif paper`: what is kept under reports/paper is what comes out, and what comes out is right.
 
 Numbers are compared up to rounding, not bitwise. A solved number is a sum of some hundred terms behind a matrix with a
-condition below 1e6: 2⁻⁵³ × 1e2 × 1e6 of the largest number of its variable, 1e-8. A component of a vector is held to the largest
-component. With springs of 1e8 E/h, as in the item on locking, the condition is 1e8.
+condition below 1e6: 2⁻⁵³ × 1e2 × 1e6 of the largest number of its variable, 1e-8. A component of a vector is held to
+the largest component. With springs of 1e8 E/h, as in the item on locking, the condition is 1e8.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from contactverif_paper.paper_tree import tree_of
 
 STORED = Path(__file__).parents[2] / "reports" / "paper"
 SOLVED = 2.0**-53 * 1e2 * 1e6
-STIFF = {name: 2.0**-53 * 1e2 * 1e8 for name in ("drift", "roughness")}
+STIFF = dict.fromkeys(("drift", "roughness"), 2.0**-53 * 1e2 * 1e8)
 # Numbers that are themselves rounding errors where all is right, and need only stay small there.
 ROUNDING = {
     "stress_error": 1e-9,
@@ -103,7 +103,7 @@ def difference(name: str, new: xr.DataArray, old: xr.DataArray, scale: float) ->
 def largest(group: xr.Dataset, name: str) -> float:
     """Return the largest number of a variable, or of both components where it is one of a vector's."""
     both = {name, re.sub("_x$", "_y", name), re.sub("_y$", "_x", name)}
-    numbers = [group[one].values for one in sorted(both) if one in group and group[one].dtype.kind in "fiu"]
+    numbers = [group[each].values for each in sorted(both) if each in group and group[each].dtype.kind in "fiu"]
     return max((float(np.max(np.abs(part[np.isfinite(part)]), initial=0.0)) for part in numbers), default=0.0)
 
 

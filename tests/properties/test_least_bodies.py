@@ -33,7 +33,7 @@ def test_a_property_without_bodies_builds_none(property_id: str, monkeypatch: py
 
 @pytest.mark.parametrize("property_id", MOST_FACTORISED)
 def test_each_mesh_is_factorised_once(property_id: str) -> None:
-    """Two penalties share their bodies, places far from the origin too; rounded nodes and other units are new meshes."""
+    """Two penalties share their bodies, also far from the origin; rounded nodes and other units are new meshes."""
     question, subject = load_property(property_id), load_subject("vts-ppt")
     (case,) = draw_cases(question.cases(None), seed="1", examples=1).cases
     forget_bodies()
