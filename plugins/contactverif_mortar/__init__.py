@@ -5,6 +5,10 @@
 the pressures: at the points themselves (`segment_to_segment`), at slave nodes from node gaps (`chen_hisada_method`), or
 at slave nodes from weighted gaps (`mortar_methods`, with `weighted_gaps` and `pressure_shapes`). `two_half_passes`
 weighs gaps on both surfaces, at points of `covered_ranges`, and hands no force from one body to the other.
+
+Tangents come in two kernels. `cell_frame`, `cell_tangent` and `node_factors` write those of slaves that look along
+their own normal straight into compressed rows. `cell_geometry`, `cell_forces` and `pressure_shapes` serve averaged
+normals, dual shapes and half passes, and the tests hold the first against the second.
 """
 
 from contactverif_mortar.chen_hisada_method import chen_hisada

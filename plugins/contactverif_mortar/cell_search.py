@@ -9,7 +9,8 @@ A slave segment and a master segment make a cell where
 4. the gap there is at most 2 (h_s + h_m) either way, h the longest segment of the chain. A deeper penetration is no
    contact, and neither is a floor far below an overhang (our choice; a penetration of two segments is well within it).
 
-Candidates come from the tree of `search_tree`, at a cost of O(log n) for each slave segment and each cell.
+Candidates come from the tree of `search_tree` through `strip_search`, at a cost of O(log n) for each slave segment and
+each candidate. What lies behind a surface that hides it is not looked at, so dense turns of a spiral cost no more.
 
 Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
 """
@@ -18,11 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node, segments_in_strip
+from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
+from contactverif_mortar.strip_search import collect_segments, make_strip
 
 # The longest overlap, in c ∈ [−1, 1], that counts as none: roundoff could not tell its points apart.
 ROUNDOFF = 4 * UNIT_ROUNDOFF
@@ -73,86 +75,138 @@ def find_cells(
 
     The second node of the master segment cuts the lower end, the first node the upper end. Cells are in the order of
     the slave segments, and on one slave segment in the order in which one meets them along it.
+
+    A search begins with the depth at which the last slave segment saw the master. It is done as soon as what it saw
+    hides all that lies deeper; otherwise it looks farther, up to the reach of rule 4. The cells are the same.
     """
-    order, boxes = tree
-    cell_slave, cell_master = [0 for _ in range(0)], [0 for _ in range(0)]
-    cut_low, cut_high = [False for _ in range(0)], [False for _ in range(0)]
-    longest = np.max(master_longest)
+    room = len(slave) + len(master)
+    cell_slave, cell_master = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    cut_low, cut_high = np.empty(room, dtype=np.bool_), np.empty(room, dtype=np.bool_)
+    members, table = np.empty(len(master), dtype=np.int64), np.empty((len(master), 3))
+    waiting = np.empty(64, dtype=np.int64)
+    n_cells, longest, depth = 0, np.max(master_longest), 0.0
     for s in range(len(slave)):
         view = slave_view(x, slave, s, before[s], behind[s])
-        reach = 2 * (slave_longest[s] + longest)
-        in_strip = segments_in_strip(view.x_a, view.n_a, view.x_b, view.n_b, reach, order, boxes)
-        in_strip.sort()
-        members, table = _candidates(x, master, view, in_strip, slave_longest[s], master_longest)
-        along = np.argsort(table[:, LOW], kind="mergesort")
+        farthest = 2 * (slave_longest[s] + longest)
+        length, _, _ = frame(view.x_a, view.x_b)
+        reach = min(farthest, max(length / 16, 4 * depth))
+        while True:
+            count = _find_candidates(
+                x, master, view, reach, slave_longest[s], master_longest, tree, waiting, members, table
+            )
+            depth = _hiding_depth(x, master, view, members[:count], table)
+            if reach >= farthest or 2 * depth <= reach:
+                break
+            reach = min(farthest, max(4 * reach, 4 * depth))
+        if n_cells + count > room:
+            room = 2 * (n_cells + count)
+            cell_slave, cell_master = _lengthen(cell_slave, room), _lengthen(cell_master, room)
+            cut_low, cut_high = _lengthen(cut_low, room), _lengthen(cut_high, room)
         reached = -1.0  # the highest upper end so far
-        for place in range(len(along)):
-            i = along[place]
-            if _is_nearest(x, master, view, members, table, along, place, reached):
-                cell_slave.append(s)
-                cell_master.append(members[i])
-                cut_low.append(table[i, LOW] > -1)
-                cut_high.append(table[i, HIGH] < 1)
+        for i in range(count):
+            if _is_nearest(x, master, view, members[:count], table, i, reached):
+                cell_slave[n_cells], cell_master[n_cells] = s, members[i]
+                cut_low[n_cells], cut_high[n_cells] = table[i, LOW] > -1, table[i, HIGH] < 1
+                n_cells += 1
             reached = max(reached, table[i, HIGH])
-    return np.array(cell_slave), np.array(cell_master), np.array(cut_low), np.array(cut_high)
+    return (
+        cell_slave[:n_cells].copy(),
+        cell_master[:n_cells].copy(),
+        cut_low[:n_cells].copy(),
+        cut_high[:n_cells].copy(),
+    )
 
 
 @compile_kernel
-def _candidates(
+def _lengthen(values: Array, room: int) -> Array:
+    """Return an array with more room behind the same values."""
+    longer = np.empty(room, dtype=values.dtype)
+    longer[: len(values)] = values
+    return longer
+
+
+@compile_kernel
+def _find_candidates(
     x: FloatArray,
     master: IntArray,
     view: SlaveView,
-    in_strip: list[int],
+    reach: float,
     slave_longest: float,
     master_longest: FloatArray,
-) -> tuple[IntArray, FloatArray]:
-    """Return the master segments in the strip that overlap the slave segment and are near enough, and their table."""
-    table = np.empty((len(in_strip), 3))
-    members = np.empty(len(in_strip), dtype=np.int64)
+    tree: Tree,
+    waiting: IntArray,
+    members: IntArray,
+    table: FloatArray,
+) -> int:
+    """Find the master segments within `reach` that overlap the slave segment and are near enough; return how many.
+
+    They are written into `members` and `table`, sorted by the lower ends of their overlaps, then by number.
+    """
+    order, boxes = tree
     count = 0
-    for m in in_strip:
+    for place in range(collect_segments(make_strip(view, reach), order, boxes, waiting, members)):
+        m = members[place]
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
         low, high = overlap(view, x_1, x_2)
         if high - low <= ROUNDOFF:
             continue
         _, gap, _ = facing_point(view, x_1, x_2, (low + high) / 2)
-        if abs(gap) <= 2 * (slave_longest + master_longest[m]):
-            table[count, LOW], table[count, HIGH], table[count, GAP] = low, high, abs(gap)
-            members[count] = m
-            count += 1
-    return members[:count], table[:count]
+        if abs(gap) > 2 * (slave_longest + master_longest[m]):
+            continue
+        i = count
+        while i > 0 and (table[i - 1, LOW] > low or (table[i - 1, LOW] == low and members[i - 1] > m)):
+            members[i] = members[i - 1]
+            for column in range(3):
+                table[i, column] = table[i - 1, column]
+            i -= 1
+        members[i], table[i, LOW], table[i, HIGH], table[i, GAP] = m, low, high, abs(gap)
+        count += 1
+    return count
+
+
+@compile_kernel
+def _hiding_depth(x: FloatArray, master: IntArray, view: SlaveView, members: IntArray, table: FloatArray) -> float:
+    """Return the depth below which the candidates hide everything; infinity if they leave a part of the slave open.
+
+    Between the ends of an overlap |gap| is at most the larger one of both ends. Directions that turn bend the gap, by
+    no more than both segments are long.
+    """
+    reached, depth = -1.0, 0.0
+    for i in range(len(members)):
+        if table[i, LOW] > reached:
+            return np.inf
+        reached = max(reached, table[i, HIGH])
+        x_1, x_2 = node(x, master[members[i], 0]), node(x, master[members[i], 1])
+        _, at_low, _ = facing_point(view, x_1, x_2, table[i, LOW])
+        _, at_high, _ = facing_point(view, x_1, x_2, table[i, HIGH])
+        bend = 0.0
+        if not view.straight:
+            bend = frame(view.x_a, view.x_b)[0] + frame(x_1, x_2)[0]
+        depth = max(depth, abs(at_low) + bend, abs(at_high) + bend)
+    return depth if reached >= 1 else np.inf
 
 
 @compile_kernel
 def _is_nearest(
-    x: FloatArray,
-    master: IntArray,
-    view: SlaveView,
-    members: IntArray,
-    table: FloatArray,
-    along: IntArray,
-    place: int,
-    reached: float,
+    x: FloatArray, master: IntArray, view: SlaveView, members: IntArray, table: FloatArray, i: int, reached: float
 ) -> bool:
-    """Return whether no other candidate is nearer in the middle of the overlap of candidate `along[place]`.
+    """Return whether no other candidate is nearer in the middle of the overlap of candidate i.
 
-    `along` sorts the candidates by their lower ends, and `reached` is the highest upper end of those before. Of two
+    The candidates are sorted by their lower ends, and `reached` is the highest upper end of those before. Of two
     equally near segments the one with the lower number counts as nearer. The middle may be at the end of the other: two
     segments that meet there hide what is behind them as one.
     """
-    i = along[place]
     middle = (table[i, LOW] + table[i, HIGH]) / 2
     # Overlapping are at most the candidates before this one, if any of them reaches its middle, and behind it those
     # that do not begin behind its middle.
-    start, stop = 0 if reached >= middle else place + 1, place + 1
-    while stop < len(along) and table[along[stop], LOW] <= middle:
-        stop += 1
-    for other in along[start:stop]:
-        if other != i and table[other, LOW] <= middle <= table[other, HIGH]:
+    other = 0 if reached >= middle else i + 1
+    while other < len(members) and table[other, LOW] <= middle:
+        if other != i and middle <= table[other, HIGH]:
             x_1, x_2 = node(x, master[members[other], 0]), node(x, master[members[other], 1])
             _, gap, _ = facing_point(view, x_1, x_2, middle)
             if abs(gap) < table[i, GAP] or (abs(gap) == table[i, GAP] and members[other] < members[i]):
                 return False
+        other += 1
     return True
 
 

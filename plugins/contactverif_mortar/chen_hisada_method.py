@@ -19,6 +19,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.contract.traits import Traits
+from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
@@ -34,8 +35,9 @@ from contactverif.geometry.projection import (
 )
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_geometry import D_C
+from contactverif_mortar.cell_tangent import tangent_of_cells
 from contactverif_mortar.integration_cells import AREAS, C, Cells, Quadrature
+from contactverif_mortar.node_factors import group_nodes, rows_of_nodes
 
 N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure × a shape function has degree 2.
 
@@ -81,27 +83,40 @@ class ChenHisada:
         at_points = (1 - c) / 2 * pressure[..., 0] + (1 + c) / 2 * pressure[..., 1]
         return cell_forces.forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
-        x = np.array(z).reshape(-1, 2)
+        return self.residual_and_tangent(interface, pairing, z)[1]
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, /
+    ) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute forces (n_unknowns,) and their derivative from the same points."""
+        x, active, nearest = np.array(z).reshape(-1, 2), pairing["active"], pairing["nearest"]
         cells, ends = _carrying(interface, pairing, len(self.quadrature))
-        points, gains = self.quadrature.points(interface, cells, x[None])[0], self.quadrature.gains(interface, cells, x)
-        nodes, active = cells.local_nodes(interface), pairing["active"]
-        pressure = self._node_pressures(interface, pairing, x[None])[0]
-        c = points[:, C]
-        shapes = np.column_stack([(1 - c) / 2, (1 + c) / 2])
-        slope = (pressure[ends[:, 1]] - pressure[ends[:, 0]]) / 2
-        d_pressure = slope[:, None, None] * gains[:, D_C]
-        derivative = cell_forces.tangent(
-            points, gains, (shapes * pressure[ends]).sum(axis=1), d_pressure, nodes, z.size
+        points = self.quadrature.points(interface, cells, x[None])
+        nodal = self._node_pressures(interface, pairing, x[None])[0]
+        slope = (nodal[ends[:, 1]] - nodal[ends[:, 0]]) / 2
+        pressure = (nodal[ends[:, 0]] + nodal[ends[:, 1]]) / 2 + slope * points[0, :, C]
+        forces = cell_forces.forces(points, pressure[None], cells.local_nodes(interface), interface.n_nodes)
+
+        arguments = (interface, cells, self.quadrature, x, points[0])
+        facing = np.column_stack([np.arange(len(active)), interface.master.segments[nearest]])  # V, 1, 2 of a node gap
+        pattern = _couple(interface, cells, np.where(active[:, None], facing[:, 1:], facing[:, :1]))
+        matrix = tangent_of_cells(*arguments, (pressure, slope, np.zeros(len(slope))), pattern)
+        groups = group_nodes(interface, cells, active)
+        influence, _ = rows_of_nodes(*arguments, groups, np.zeros(len(active)), np.ones(len(active)))
+        d_pressure = -self.penalty * _node_gap_rows(x, interface.master.segments, nearest)
+        _add_springs(
+            groups.nodes,
+            groups.starts,
+            influence.data,
+            facing,
+            d_pressure,
+            matrix.indptr,
+            matrix.indices,
+            matrix.data,
         )
-        places = interface.slave.segments[cells.slave]
-        influence = cell_forces.influence(points, shapes, places, nodes, (z.size, len(active)))
-        d_gaps = _node_gap_rows(x, interface.master.segments, pairing["nearest"])  # (n_slave_nodes, 3, 2)
-        local = np.column_stack([np.arange(len(active)), interface.master.segments[pairing["nearest"]]])
-        rows = cell_forces.gather_rows(d_gaps[:, None], np.arange(len(active))[:, None], local, (len(active), z.size))
-        springs = sparse.diags_array(np.where(active, -self.penalty, 0.0))
-        return (derivative.tocsr() + influence.tocsr() @ springs @ rows.tocsr()).tocoo()
+        return forces.ravel(), matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with gaps along the slave's normal and interpolated pressures."""
@@ -124,6 +139,38 @@ def _carrying(interface: Interface, pairing: Pairing, n_q: int) -> tuple[Cells, 
     """Return the cells whose slave segment has an active node, and the slave nodes (n_points, 2) of their points."""
     cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
     return cells, interface.slave.segments[np.repeat(cells.slave, n_q)]
+
+
+def _couple(interface: Interface, cells: Cells, facing: IntArray) -> Couplings:
+    """Return the couplings of each cell: forces on A, B, 1, 2 depend on them, and on what A and B see.
+
+    `facing` (n_slave_nodes, 2) are the two master nodes that the gap of a slave node depends on; the slave node itself
+    where it is not active.
+    """
+    ends = interface.slave.segments[cells.slave]
+    nodes = np.hstack([facing[ends].reshape(-1, 4), ends, interface.master.segments[cells.master]])
+    starts = np.arange(0, nodes.size + 1, 8)
+    return Couplings(nodes.astype(np.int32).ravel(), starts, starts[:-1] + 4)
+
+
+@compile_kernel
+def _add_springs(
+    nodes: NumberArray,
+    starts: IntArray,
+    influence: FloatArray,
+    facing: IntArray,
+    d_pressure: FloatArray,
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    data: FloatArray,
+) -> None:
+    """Add B_i ⊗ Δp_i of all slave nodes; B_i are the entries of group i, and Δp_i (3, 2) belongs to V, 1, 2."""
+    for i in range(len(facing)):
+        for row in range(starts[i], starts[i + 1]):
+            b_x, b_y = influence[2 * row], influence[2 * row + 1]
+            for k in range(3):
+                p_x, p_y = d_pressure[i, k, 0], d_pressure[i, k, 1]
+                add_block(indptr, indices, data, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
 
 
 @compile_kernel

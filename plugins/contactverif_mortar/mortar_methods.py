@@ -25,7 +25,8 @@ from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
-from contactverif_mortar.weighted_gaps import Weighting, at_fixed_pressures, own_lengths
+from contactverif_mortar.node_factors import Factors
+from contactverif_mortar.weighted_gaps import NodeState, Weighted, Weighting, own_lengths
 
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
@@ -65,16 +66,37 @@ class Mortar:
         pressure[:, active] = -self.penalty * weighted.with_gap[:, active] / weighted.areas[:, active]
         return weighted.forces(pressure, interface.n_nodes).reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
+        return self.residual_and_tangent(interface, pairing, z)[1]
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, /
+    ) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute forces (n_unknowns,) and their derivative from the same points."""
+        x, weighted, state = self._node_state(interface, pairing, z)
+        forces = weighted.forces(state.pressure[None], interface.n_nodes).ravel()
+        return forces, self.weighting.tangent(interface, pairing["active"], weighted, x, state)
+
+    def factors(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Factors:
+        """Compute the derivative of the residual in factors, whose size grows with the number of cells alone.
+
+        The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
+        the tangent, or that knows the pressures as unknowns of their own, does not need it.
+        """
+        x, weighted, state = self._node_state(interface, pairing, z)
+        return self.weighting.factors(interface, pairing["active"], weighted, x, state)
+
+    def _node_state(
+        self, interface: Interface, pairing: Pairing, z: FloatArray
+    ) -> tuple[FloatArray, Weighted, NodeState]:
+        """Return positions (n_nodes, 2), the points at them, and the pressures and gaps of the slave nodes."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         weighted = self.weighting.carrying(interface, pairing, x[None])
         areas = np.where(active, weighted.areas[0], 1.0)
         gaps = np.where(active, weighted.with_gap[0] / areas, 0.0)
-        stiffness = np.where(active, self.penalty, 0.0)
-        rows = self.weighting.rows(interface, weighted, x)
-        derivative, influence = at_fixed_pressures(rows, -stiffness * gaps)
-        return (derivative - influence @ sparse.diags_array(stiffness) @ rows.weighted_gaps(gaps, areas)).tocoo()
+        weights = np.where(active, -self.penalty, 0.0)
+        return x, weighted, NodeState(weights * gaps, weights, gaps, areas)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
@@ -127,9 +149,10 @@ class MortarMultipliers:
         """Compute the derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]]; lengths if not active."""
         x, multipliers = split_state(interface, z)
         active = pairing["active"]
-        rows = self.weighting.rows(interface, self.weighting.carrying(interface, pairing, x[None]), x)
-        derivative, influence = at_fixed_pressures(rows, np.where(active, multipliers, 0.0))
-        d_gaps = rows.weighted_gaps(np.zeros(len(active)), np.ones(len(active)))
+        weighted = self.weighting.carrying(interface, pairing, x[None])
+        derivative, influence, d_gaps = self.weighting.saddle(
+            interface, active, weighted, x, np.where(active, multipliers, 0.0)
+        )
         in_contact = sparse.diags_array(active.astype(np.float64))
         idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)))
         return sparse.block_array([[derivative, influence @ in_contact], [-(in_contact @ d_gaps), idle]]).tocoo()

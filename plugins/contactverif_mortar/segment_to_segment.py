@@ -21,7 +21,7 @@ from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_geometry import D_GAP
+from contactverif_mortar.cell_tangent import tangent_of_cells
 from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
@@ -60,14 +60,22 @@ class SegmentToSegment:
         pressure = np.where(active, -self.penalty * points[..., GAP], 0.0)
         return cell_forces.forces(points, pressure, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
+        return self.residual_and_tangent(interface, pairing, z)[1]
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, /
+    ) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute forces (n_unknowns,) and their derivative from the same points."""
         cells, active = _in_contact(pairing, len(self.quadrature))
         x = np.array(z).reshape(-1, 2)
-        points, gains = self.quadrature.points(interface, cells, x[None])[0], self.quadrature.gains(interface, cells, x)
-        pressure = np.where(active, -self.penalty * points[:, GAP], 0.0)
-        d_pressure = np.where(active[:, None, None], -self.penalty * gains[:, D_GAP], 0.0)
-        return cell_forces.tangent(points, gains, pressure, d_pressure, cells.local_nodes(interface), z.size)
+        points = self.quadrature.points(interface, cells, x[None])
+        by_gap = np.where(active, -self.penalty, 0.0)
+        pressure = by_gap * points[..., GAP]
+        forces = cell_forces.forces(points, pressure, cells.local_nodes(interface), interface.n_nodes)
+        pressures = (pressure[0], np.zeros(len(active)), by_gap)
+        return forces.ravel(), tangent_of_cells(interface, cells, self.quadrature, x, points[0], pressures)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with their own gaps and pressures."""

@@ -18,7 +18,7 @@ Source: Duong, De Lorenzis & Sauer (2018), arXiv 1712.01179, after Sauer & De Lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from scipy import sparse
@@ -38,6 +38,7 @@ from contactverif_mortar.weighted_gaps import UNCOVERED, at_fixed_pressures, own
 
 STEEPEST = -0.5  # The cosine between two segments that see each other; −1 where they are parallel.
 PREFIXES = ("slave.", "master.")  # The surface that is pushed in each half pass.
+HalfPasses = tuple[tuple[str, Interface, IntArray], ...]  # The prefix, the interface in its roles, the places in z.
 _SOURCE = "Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179"
 
 
@@ -70,11 +71,12 @@ class TwoHalfPasses:
     traits: Traits
     penalty: float
     rule: Quadrature
+    _last: list[tuple[Interface, HalfPasses]] = field(default_factory=list, init=False, repr=False)
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find cells, ranges and active nodes of both half passes; each name begins with the surface that is pushed."""
         arrays = {}
-        for prefix, sides, places in _half_passes(interface):
+        for prefix, sides, places in self._half_passes(interface):
             x = np.array(z)[places].reshape(-1, 2)
             cells = _find_cells(sides, x)
             ranges = Ranges.find(sides, x, cells, self.rule)
@@ -86,7 +88,7 @@ class TwoHalfPasses:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         total = np.zeros_like(z)
-        for prefix, sides, places in _half_passes(interface):
+        for prefix, sides, places in self._half_passes(interface):
             x = np.array(z)[..., places].reshape(-1, interface.n_nodes, 2)
             active = pairing[f"{prefix}active"]
             weighted = self._carrying(sides, pairing, prefix, x)
@@ -101,14 +103,14 @@ class TwoHalfPasses:
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
         """Compute the derivative of the residual, sparse."""
-        parts = [self._half_tangent(interface, pairing, z, *half_pass) for half_pass in _half_passes(interface)]
+        parts = [self._half_tangent(interface, pairing, z, *half_pass) for half_pass in self._half_passes(interface)]
         rows, columns, values = (np.concatenate(both) for both in zip(*parts, strict=True))
         return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the nodes of both surfaces with weighted gap and nodal pressure; the master's are a second pass."""
         half_passes = []
-        for prefix, sides, places in _half_passes(interface):
+        for prefix, sides, places in self._half_passes(interface):
             x = np.array(z)[places].reshape(-1, 2)
             areas, gaps = self._gaps(sides, Ranges.from_pairing(pairing, prefix), x)
             active = pairing[f"{prefix}active"]
@@ -118,6 +120,12 @@ class TwoHalfPasses:
             half_passes.append(replace(points, on_master=np.full(len(gaps), prefix == PREFIXES[1])))
         names = [entry.name for entry in fields(ContactPoints)]
         return ContactPoints(**{name: np.concatenate([getattr(each, name) for each in half_passes]) for name in names})
+
+    def _half_passes(self, interface: Interface) -> HalfPasses:
+        """Return both half passes. The last ones are kept: exchanging the roles costs as much as finding the cells."""
+        if not self._last or self._last[0][0] is not interface:
+            self._last[:] = [(interface, _make_half_passes(interface))]
+        return self._last[0][1]
 
     def _half_tangent(
         self, interface: Interface, pairing: Pairing, z: FloatArray, prefix: str, sides: Interface, places: IntArray
@@ -173,7 +181,7 @@ def _find_cells(sides: Interface, x: FloatArray) -> Cells:
     return cells.select((slave * master).sum(axis=1) <= STEEPEST * sizes)
 
 
-def _half_passes(interface: Interface) -> tuple[tuple[str, Interface, IntArray], ...]:
+def _make_half_passes(interface: Interface) -> HalfPasses:
     """Return for each half pass its prefix, the interface in its roles, and the places of its positions in z."""
     positions = np.arange(interface.n_unknowns)
     swapped = interface.swap_roles()

@@ -1,0 +1,116 @@
+"""Tangents that kernels write into compressed rows, against those that triplets and sparse products make; factors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from surfaces import make_bent
+
+import contactverif_mortar
+from contactverif import Interface, MisuseError
+from contactverif_mortar import cell_forces
+from contactverif_mortar.cell_geometry import D_GAP
+from contactverif_mortar.cell_search import find_cells, longest_of_chain
+from contactverif_mortar.cell_tangent import tangent_of_cells
+from contactverif_mortar.integration_cells import GAP, Cells, Quadrature
+from contactverif_mortar.node_factors import check_product, group_nodes
+from contactverif_mortar.weighted_gaps import at_fixed_pressures
+
+PENALTY = 8.0
+ROUNDINGS = 256 * 2.0**-53  # Some hundred sums and products, each rounded once.
+MORTARS = [("mortar", {}), ("mortar", {"area": "reference"}), ("mortar_dual", {}), ("mortar", {"normals": "averaged"})]
+
+
+def largest_error(computed: Any, expected: Any) -> float:
+    return float(np.abs(computed - expected).max() / np.abs(expected).max())
+
+
+@pytest.mark.parametrize("current", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_frame_of_the_slave_gives_the_derivative_of_the_global_frame(seed: int, current: bool) -> None:
+    interface, z = make_bent(seed)
+    x, rule = z.reshape(-1, 2), Quadrature.gauss(3, current)
+    cells = Cells.find(interface, x, averaged=False)
+    points, gains = rule.points(interface, cells, x[None])[0], rule.gains(interface, cells, x)
+    pressure, by_c = np.random.default_rng(seed).uniform(1, 2, (2, len(points)))
+    by_gap = -PENALTY * points[:, GAP]
+    d_pressure = by_c[:, None, None] * gains[:, 0] + by_gap[:, None, None] * gains[:, D_GAP]
+    readable = cell_forces.tangent(points, gains, pressure, d_pressure, cells.local_nodes(interface), z.size)
+    written = tangent_of_cells(interface, cells, rule, x, points, (pressure, by_c, by_gap))
+    assert largest_error(written.toarray(), readable.toarray()) <= ROUNDINGS
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mortar_writes_what_sparse_products_make(seed: int) -> None:
+    interface, z = make_bent(seed)
+    plugin = contactverif_mortar.mortar(penalty=PENALTY)
+    pairing = plugin.pair(interface, z)
+    assert pairing["active"].any()
+    x, weighted, state = plugin._node_state(interface, pairing, z)
+    rows = plugin.weighting.rows(interface, weighted, x)
+    derivative, influence = at_fixed_pressures(rows, state.pressure)
+    readable = derivative + (influence * state.weights) @ rows.weighted_gaps(state.gaps, state.divisor)
+    assert largest_error(plugin.tangent(interface, pairing, z).toarray(), readable.toarray()) <= ROUNDINGS
+
+
+@pytest.mark.parametrize(("name", "options"), MORTARS)
+def test_factors_multiply_to_the_tangent(name: str, options: dict[str, str]) -> None:
+    interface, z = make_bent(2)
+    plugin = getattr(contactverif_mortar, name)(penalty=PENALTY, **options)
+    pairing = plugin.pair(interface, z)
+    tangent, factors = plugin.tangent(interface, pairing, z).toarray(), plugin.factors(interface, pairing, z)
+    assert largest_error(factors.assemble().toarray(), tangent) <= ROUNDINGS
+    product = np.column_stack([factors @ direction for direction in np.eye(z.size)])
+    assert largest_error(product, tangent) <= ROUNDINGS
+
+
+def make_one_over_many(n_master: int) -> tuple[Interface, Any]:
+    """Return one slave segment over many master segments, pressed into them."""
+    master = np.column_stack([np.linspace(1, 0, n_master + 1), np.zeros(n_master + 1)])
+    interface = Interface.from_chains([[0, -1e-3], [1, -1e-3]], master)
+    return interface, interface.nodes.ravel()
+
+
+def test_factors_grow_with_the_cells_and_the_assembled_tangent_with_their_square() -> None:
+    entries, squares = [], []
+    for n in (50, 100):
+        interface, z = make_one_over_many(n)
+        plugin = contactverif_mortar.mortar(penalty=PENALTY)
+        pairing = plugin.pair(interface, z)
+        factors = plugin.factors(interface, pairing, z)
+        entries.append(factors.rest.nnz + factors.left.nnz + factors.right.nnz)
+        squares.append(plugin.tangent(interface, pairing, z).nnz)
+    assert entries[1] <= 2 * entries[0]
+    assert squares[1] >= 3.5 * squares[0]
+
+
+def test_a_tangent_that_fits_into_no_memory_is_refused_with_its_size() -> None:
+    interface, z = make_one_over_many(60_000)
+    plugin = contactverif_mortar.mortar(penalty=PENALTY)
+    pairing = plugin.pair(interface, z)
+    with pytest.raises(MisuseError, match=r"tangent: found about 161 GiB .* 60003 nodes .* at most 32 GiB; use"):
+        plugin.tangent(interface, pairing, z)
+    assert np.isfinite(plugin.factors(interface, pairing, z) @ z).all()
+    check_product(group_nodes(interface, Cells.from_pairing(pairing), np.zeros(2, dtype=np.bool_)))
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+def test_a_search_that_stops_early_finds_the_cells_of_one_that_looks_at_all(averaged: bool) -> None:
+    """Two turns of a spiral, its two sides being the surfaces: the outer turn is behind the inner one."""
+    angle = np.linspace(0, 4 * np.pi, 61)
+    radius = 1 + 0.04 * angle
+    outline = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    finer = np.column_stack([np.interp(np.linspace(0, 60, 72), np.arange(61), 1.01 * axis) for axis in outline.T])
+    interface = Interface.from_chains(outline, finer[::-1])
+    x = interface.nodes
+    cells = Cells.find(interface, x, averaged)
+    order, n = interface.master.chain_order, len(interface.master)
+    one_box = (np.append(order, [-1] * (4 - n % 4)) if n % 4 else order, np.tile([-10.0, -10.0, 10.0, 10.0], (64, 1)))
+    lengths = [longest_of_chain(surface, x) for surface in (interface.slave, interface.master)]
+    segments = (interface.slave.segments, interface.master.segments, cells.before, cells.behind)
+    everything = find_cells(x, *segments, *lengths, one_box)
+    assert len(cells.slave) > 60
+    for computed, expected in zip((cells.slave, cells.master, cells.cut_low, cells.cut_high), everything, strict=True):
+        assert np.array_equal(computed, expected)
