@@ -47,7 +47,15 @@ class Room:
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
 BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "scenes", "strategies")
-REPORTS = ("reports", "reports.netcdf", "reports.draw", "reports.html", "reports.compare", "reports.stability")
+REPORTS = (
+    "reports",
+    "reports.netcdf",
+    "reports.draw",
+    "reports.html",
+    "reports.compare",
+    "reports.stability",
+    "reports.bench",
+)
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
@@ -78,12 +86,16 @@ ROOMS = {
         QUIET,
     ),
     "reports": Room(("contract",), ("numpy",)),
-    "reports.netcdf": Room(("contract", "reports"), ("numpy", "xarray", "netCDF4")),
-    "reports.draw": Room(("contract", "reports", "reports.stability"), ("numpy", "matplotlib", "meshio")),
+    "reports.bench": Room(("contract", "reports"), ("numpy",)),
+    "reports.netcdf": Room(("contract", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4")),
+    "reports.draw": Room(
+        ("contract", "reports", "reports.stability", "reports.bench"), ("numpy", "matplotlib", "meshio")
+    ),
     "reports.compare": Room(("contract", "reports"), ("numpy",)),
     "reports.stability": Room(("contract", "reports"), ("numpy",)),
     "reports.html": Room(
-        ("contract", "reports", "reports.draw", "reports.compare"), ("numpy", "matplotlib", "jinja2", "markupsafe")
+        ("contract", "reports", "reports.draw", "reports.compare", "reports.bench"),
+        ("numpy", "matplotlib", "jinja2", "markupsafe"),
     ),
     "paper": Room(
         (*BELOW_RUN, "run", "studies", *REPORTS),

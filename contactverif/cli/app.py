@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli.bench_command import bench
 from contactverif.cli.compare_command import compare
 from contactverif.cli.draw_command import draw
 from contactverif.cli.list_command import list_installed
@@ -44,6 +45,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "replay": replay,
     "draw": draw,
     "stability": stability,
+    "bench": bench,
     "paper": paper,
     "scenes": scenes,
     "queries": queries,

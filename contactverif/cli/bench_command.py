@@ -1,0 +1,171 @@
+"""The command `bench`: speed against error, on scenes whose exact solution is known."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from contactverif.cli.output_files import MARKDOWN, PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.shared_options import complete_formulation
+from contactverif.cli.verify_command import select_names
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif_reports.bench.results import BenchResults
+    from contactverif_reports.bench.slowdown import Slowdown
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def bench(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Formulations, with options; or one file of a bench, FILE.nc, to show it again.",
+            metavar="NAME",
+            autocompletion=complete_formulation,
+        ),
+    ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")] = False,
+    scene: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this scene: wavy, hertz, rings, kinked, random. Repeatable.", metavar="NAME"),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Take the two coarsest meshes, one penalty, six random scenes.")
+    ] = False,
+    repeats: Annotated[int, typer.Option(help="Timed repeats of each solution.", metavar="N")] = 7,
+    against: Annotated[
+        Path | None, typer.Option(help="Say what became slower since this file of a bench.", metavar="OLD.nc")
+    ] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out",
+            help="Write the results: FILE.nc all repeats, FILE.html or FILE.md a page. Repeatable.",
+            metavar="FILE",
+        ),
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Draw the figures into this folder.", metavar="FOLDER")] = None,
+) -> None:
+    """Measure speed against error, on scenes whose exact solution is known.
+
+    All formulations solve the same scenes on meshes fine and coarse, at
+    penalties soft to stiff, in turns, on one thread. Runs without a
+    solution count as infinitely slow. While it runs, FILE.nc.journal keeps
+    what is finished: the same command goes on where it was stopped.
+
+    \bExit status
+      0  measured; with --against, nothing became slower
+      1  something became slower by its ratio, or a plugin does not load
+      2  the command line is wrong; one line says what is needed
+
+    \bExamples
+      contactverif bench mine vts-ppt --out mine.html
+      contactverif bench --all --out bench.nc --pictures figures
+      contactverif bench vts-ppt --quick --against bench.nc
+      contactverif bench bench.nc --out bench.html
+    """
+    pinned = pin_threads()
+    files = OutputFiles.check(out, (REPORT, PAGE, MARKDOWN))
+    folder = PictureFolder.make(pictures)
+    from contactverif_reports.bench.slowdown import slowdowns
+    from contactverif_reports.netcdf.bench_file import read_bench
+
+    old = None if against is None else read_bench(against)
+    if names and names[0].lower().endswith(REPORT):
+        if len(names) > 1 or all_:
+            raise MisuseError("NAME", f"{names[0]} and more", "formulations alone, or one file of a bench")
+        results = read_bench(names[0])
+    else:
+        results = _run(select_names(names or [], all_), scene or [], quick, repeats, files)
+        results = replace(results, provenance={**results.provenance, "threads": "1" if pinned else "not set"})
+    changes = () if old is None else slowdowns(results, old)
+    _write(results, changes, files, folder)
+    _show(results, changes, files, folder, compared=old is not None)
+    slower = any(change.slower for change in changes)
+    raise typer.Exit(1 if slower or results.not_loaded else 0)
+
+
+def pin_threads() -> bool:
+    """Keep numerical libraries to one thread; return False if they are loaded already, so that it is too late."""
+    if "numpy" in sys.modules:
+        return all(os.environ.get(name) == "1" for name in _THREADS)
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    return True
+
+
+def _run(names: list[str], scenes: list[str], quick: bool, repeats: int, files: OutputFiles) -> BenchResults:
+    """Run the bench with a progress bar."""
+    from contactverif.cli.progress import Bar
+    from contactverif.run.registry import load_formulation
+    from contactverif.studies.bench.bench_plan import make_plan
+    from contactverif.studies.bench.bench_study import run_bench
+
+    plan = make_plan(scenes, quick=quick, repeats=repeats)
+    subjects = [load_formulation(name) for name in names]
+    with Bar() as bar:
+        return run_bench(subjects, plan, output=files.paths.get(REPORT), progress=bar.update)
+
+
+def _write(
+    results: BenchResults, changes: tuple[Slowdown, ...], files: OutputFiles, folder: PictureFolder | None
+) -> None:
+    """Write the files that the user wants, before anything is shown."""
+    if REPORT in files.paths:
+        from contactverif.studies.bench.journal import journal_of
+        from contactverif_reports.netcdf.bench_file import write_bench
+
+        write_bench(results, files.paths[REPORT])
+        journal_of(files.paths[REPORT]).unlink(missing_ok=True)
+    if folder is not None:
+        from contactverif_reports.draw.bench_figures import draw_bench
+
+        draw_bench(results, folder.path)
+    if PAGE in files.paths:
+        from contactverif_reports.html.bench_page import bench_page
+        from contactverif_reports.html.pages import write_page
+
+        write_page(files.paths[PAGE], bench_page(results, changes))
+    if MARKDOWN in files.paths:
+        from contactverif_reports.bench.markdown_page import bench_markdown
+        from contactverif_reports.files import whole
+
+        report = files.names[REPORT].name if REPORT in files.names else ""
+        with whole(files.paths[MARKDOWN]) as part:
+            part.write_text(bench_markdown(results, report, folder is not None), encoding="utf-8")
+
+
+def _show(
+    results: BenchResults,
+    changes: tuple[Slowdown, ...],
+    files: OutputFiles,
+    folder: PictureFolder | None,
+    *,
+    compared: bool,
+) -> None:
+    """Print a table for each scene, the sentences, and the names of the files."""
+    from contactverif.cli.bench_tables import slowdown_sentence, slowdown_table, targets_table
+    from contactverif.cli.console import show
+    from contactverif_reports.bench.work_precision import cost_sentence
+
+    for scene in results.scenes:
+        show(targets_table(results, scene))
+    if any(map(results.uses_differences, results.formulations)):
+        show("* with differences of forces where there is no tangent, or it did not help")
+    for scene in results.scenes:
+        if sentence := cost_sentence(results, scene):
+            show(sentence)
+    for name, reason in results.not_loaded.items():
+        show(f"{name} did not load: {reason}")
+    if compared:
+        show(slowdown_table(changes))
+        show(slowdown_sentence(changes))
+    files.announce()
+    if folder is not None:
+        typer.echo(f"pictures: {folder.name}")

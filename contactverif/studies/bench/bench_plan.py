@@ -1,0 +1,81 @@
+"""The plan of a bench: which cells, how many repeats. Two plans that are equal give equal results but for seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from contactverif.contract.errors import MisuseError
+from contactverif_reports.bench.results import RANDOM, SCENES, Cell
+
+# {scene: (meshes, penalties from soft to stiff)}. Finer meshes are about 1.4 times finer each.
+GRID: dict[str, tuple[tuple[int, ...], tuple[float, ...]]] = {
+    "wavy": ((1, 2, 3, 4, 6), (1.0, 30.0, 1e3)),
+    "hertz": ((16, 22, 30, 42), (1.0, 10.0, 100.0)),
+    "rings": ((1, 2, 4, 6), (1e2, 1e3, 1e4)),
+    "kinked": ((1, 2, 4), (1.0, 30.0, 1e3)),
+}
+N_RANDOM = 24  # Random scenes of a full bench.
+QUICK_MESHES, QUICK_RANDOM = 2, 6  # Meshes of each scene, and random scenes, of a quick bench.
+REPEATS = 7  # Repeats of each solution that are timed.
+
+
+@dataclass(frozen=True, slots=True)
+class BenchPlan:
+    """What a bench runs.
+
+    Attributes
+    ----------
+    cells : tuple[Cell, ...]
+        The cells, in the order in which they are run.
+    repeats : int
+        The number of timed repeats.
+    seed : int
+        The seed of the random scenes.
+    """
+
+    cells: tuple[Cell, ...]
+    repeats: int = REPEATS
+    seed: int = 0
+
+
+def make_plan(
+    scenes: Sequence[str] = (), *, quick: bool = False, repeats: int = REPEATS, n_random: int | None = None
+) -> BenchPlan:
+    """Return the plan of a bench.
+
+    Parameters
+    ----------
+    scenes : Sequence[str]
+        The scenes; all by default.
+    quick : bool
+        True takes the coarsest meshes, the penalty in the middle and few random scenes.
+    repeats : int
+        The number of timed repeats.
+    n_random : int | None
+        The number of random scenes.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such scene, or a number is too small.
+    """
+    for scene in scenes:
+        if scene not in SCENES:
+            raise MisuseError("--scene", repr(scene), f"one of {', '.join(SCENES)}")
+    if repeats < 1:
+        raise MisuseError("--repeats", f"{repeats}", "at least 1")
+    count = (QUICK_RANDOM if quick else N_RANDOM) if n_random is None else n_random
+    if count < 0:
+        raise MisuseError("--random", f"{count}", "at least 0")
+    cells: list[Cell] = []
+    for scene, (meshes, penalties) in GRID.items():
+        if not scenes or scene in scenes:
+            chosen = (meshes[:QUICK_MESHES], penalties[1:2]) if quick else (meshes, penalties)
+            cells += [Cell(scene, mesh, stiffness) for stiffness, mesh in product(chosen[1], chosen[0])]
+    if not scenes or RANDOM in scenes:
+        cells += [Cell(RANDOM, number, 1.0) for number in range(count)]
+    if not cells:
+        raise MisuseError("--random", "0 random scenes and no other", "at least one scene")
+    return BenchPlan(tuple(cells), repeats)

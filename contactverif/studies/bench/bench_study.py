@@ -1,0 +1,131 @@
+"""The bench: all cells of a plan, one after the other, with a journal that survives a kill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.run.provenance import collect_provenance
+from contactverif.studies.bench.bench_plan import BenchPlan
+from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
+from contactverif.studies.bench.journal import Journal
+from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
+
+Progress = Callable[[str, int, int], None]  # What comes next, the number of finished cells, the number of all.
+
+
+def run_bench(
+    subjects: Sequence[Subject | NotLoaded],
+    plan: BenchPlan,
+    *,
+    output: Path | None = None,
+    progress: Progress | None = None,
+) -> BenchResults:
+    """Measure speed and error of formulations on all cells of a plan.
+
+    Parameters
+    ----------
+    subjects : Sequence[Subject | NotLoaded]
+        The formulations, as the registry loads them.
+    plan : BenchPlan
+        The cells and the number of repeats.
+    output : Path | None
+        The file that the results go to. A journal beside it keeps what is finished; a bench that was killed goes on
+        with the same plan. Whoever writes the file removes the journal. None keeps no journal.
+    progress : Callable[[str, int, int], None] | None
+        A function that is called before every cell and at the end.
+
+    Returns
+    -------
+    BenchResults
+        Outcomes, errors, counts and seconds.
+
+    Raises
+    ------
+    MisuseError
+        If no formulation is loaded, or the journal belongs to another plan.
+    """
+    loaded = [subject for subject in subjects if isinstance(subject, Subject)]
+    if not loaded:
+        raise MisuseError("NAME", "no formulation that loads", "at least one")
+    provenance = collect_provenance(profile="", examples=0, seed=plan.seed)
+    names = [subject.name for subject in loaded]
+    journal = None if output is None else Journal(output, _describe(plan, names, provenance))
+    records = []
+    for number, cell in enumerate(plan.cells):
+        if progress is not None:
+            progress(f"{cell.scene}, mesh {cell.mesh}, penalty {cell.stiffness:g}", number, len(plan.cells))
+        if journal is not None and number in journal.finished:
+            records.append(CellRecord.from_dict(journal.finished[number]))
+            continue
+        records.append(run_cell(cell, loaded, plan.repeats, plan.seed))
+        if journal is not None:
+            journal.add(number, records[-1].as_dict())
+    if progress is not None:
+        progress("writing", len(plan.cells), len(plan.cells))
+    not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)}
+    return collect_results(names, plan, records, not_loaded, provenance)
+
+
+def collect_results(
+    names: Sequence[str],
+    plan: BenchPlan,
+    records: Sequence[CellRecord],
+    not_loaded: dict[str, str],
+    provenance: dict[str, str],
+) -> BenchResults:
+    """Return the records of all cells as arrays.
+
+    Parameters
+    ----------
+    names : Sequence[str]
+        The formulations.
+    plan : BenchPlan
+        The plan.
+    records : Sequence[CellRecord]
+        The record of each cell.
+    not_loaded : dict[str, str]
+        {formulation: why it did not load}.
+    provenance : dict[str, str]
+        Versions, machine, time and command.
+    """
+    rows = [[record.runs[name] for record in records] for name in names]
+    nothing = [nan] * plan.repeats
+    return BenchResults(
+        formulations=tuple(names),
+        cells=plan.cells,
+        segments=np.array([record.segments for record in records], np.int64),
+        unknowns=np.array([record.unknowns for record in records], np.int64),
+        outcomes=_array(rows, lambda run: run.outcome, np.int64),
+        errors=_array(rows, lambda run: [run.errors.get(kind, nan) for kind in ERRORS], np.float64),
+        counts=_array(rows, lambda run: [run.counts.get(name, 0) for name in COUNTS], np.int64),
+        seconds=_array(rows, lambda run: [run.seconds.get(part, nothing) for part in PARTS], np.float64),
+        yardstick=np.array([record.yardstick for record in records], np.float64),
+        remarks={
+            (name, number): run.remark
+            for name, row in zip(names, rows, strict=True)
+            for number, run in enumerate(row)
+            if run.outcome != Outcome.SOLVED
+        },
+        not_loaded=not_loaded,
+        provenance={name: value for name, value in provenance.items() if name not in ("profile", "examples")},
+    )
+
+
+def _array(rows: list[list[RunRecord]], entry: Callable[[RunRecord], Any], dtype: type) -> Any:
+    """Return an array (n_formulations, n_cells, …) of what `entry` gives for each run."""
+    return np.array([[entry(run) for run in row] for row in rows], dtype)
+
+
+def _describe(plan: BenchPlan, names: list[str], provenance: dict[str, str]) -> dict[str, Any]:
+    """Return what must agree before a killed bench goes on."""
+    versions = {name: value for name, value in provenance.items() if name.endswith("_version") or name == "commit"}
+    return {"plan": asdict(plan), "formulations": names, "versions": versions}

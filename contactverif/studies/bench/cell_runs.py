@@ -1,0 +1,180 @@
+"""One cell of the bench: all formulations solve it in turns, again and again, each repeat timed.
+
+The first turn is not timed: kernels compile, bodies are condensed, errors and counts are taken. Then all formulations
+take turns, and who begins changes, so that whatever disturbs the machine disturbs all. In each repeat a fixed piece of
+work, the yardstick, is timed too.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.errors import ContractError
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.accuracy import solution_of, solve_in_tries
+from contactverif.mechanics.newton import Trace
+from contactverif.studies.bench.bench_scenes import Task, is_solved, make_task
+from contactverif.studies.bench.meter import Meter, metered
+from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
+
+
+@dataclass(slots=True)
+class RunRecord:
+    """One formulation in one cell.
+
+    Attributes
+    ----------
+    outcome : int
+        The outcome, see `Outcome`.
+    remark : str
+        How it ended, if it is no solution.
+    errors : dict[str, float]
+        The errors by kind; empty without a solution.
+    counts : dict[str, int]
+        The counts by name; empty after a crash.
+    seconds : dict[str, list[float]]
+        The seconds of each repeat by part; empty after a crash.
+    """
+
+    outcome: int = int(Outcome.CRASHED)
+    remark: str = ""
+    errors: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class CellRecord:
+    """All formulations in one cell; `as_dict` is what the journal keeps.
+
+    Attributes
+    ----------
+    segments, unknowns : int
+        The numbers of slave segments and of unknowns of the scene.
+    yardstick : list[float]
+        The seconds of the yardstick in each repeat.
+    runs : dict[str, RunRecord]
+        The runs by formulation.
+    """
+
+    segments: int
+    unknowns: int
+    yardstick: list[float]
+    runs: dict[str, RunRecord]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record as plain lists, numbers and words."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> CellRecord:
+        """Return the record that `as_dict` wrote."""
+        runs = {name: RunRecord(**run) for name, run in plain["runs"].items()}
+        return cls(plain["segments"], plain["unknowns"], plain["yardstick"], runs)
+
+
+def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -> CellRecord:
+    """Solve a cell with all formulations, in turns.
+
+    Parameters
+    ----------
+    cell : Cell
+        The scene, the mesh and the penalty.
+    subjects : Sequence[Subject]
+        The formulations, at least one.
+    repeats : int
+        The number of timed repeats.
+    seed : int
+        The seed of the random scenes.
+    """
+    runners = [_Runner(subject, make_task(cell, subject, seed)) for subject in subjects]
+    scene = runners[0].task.scene
+    for runner in runners:
+        runner.warm_up()
+    yardstick = []
+    with _without_collector():
+        for turn in range(repeats):
+            yardstick.append(time_yardstick())
+            for place in range(len(runners)):
+                runners[(place + turn) % len(runners)].take_turn()
+    runs = {runner.subject.name: runner.record for runner in runners}
+    return CellRecord(len(scene.interface.slave), scene.n_free, yardstick, runs)
+
+
+def time_yardstick() -> float:
+    """Return the seconds that a fixed piece of work takes: small steps of numpy and a linear system, as in Newton's."""
+    values, matrix = np.linspace(1.0, 2.0, 64), np.eye(64) + 1 / np.add.outer(np.arange(1.0, 65.0), np.arange(64.0))
+    start = perf_counter()
+    for _ in range(100):
+        values = np.sqrt(values * values[::-1])
+    np.linalg.solve(matrix, values)
+    return perf_counter() - start
+
+
+class _Runner:
+    """One formulation in one cell, with its record so far."""
+
+    def __init__(self, subject: Subject, task: Task) -> None:
+        self.subject, self.task, self.record = subject, task, RunRecord()
+
+    def warm_up(self) -> None:
+        """Solve once without the clock, and record outcome, errors and counts."""
+        try:
+            meter, tries, _ = self._solve()
+            formulation = self.subject.for_case(self.task.case)
+            solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
+            solved = is_solved(solution)
+            self.record.errors = self.task.errors(solution) if solved else {}
+        except ContractError as error:
+            self.record.remark = str(error)
+            return
+        states = meter.states
+        counts = (sum(trace.n_iterations for trace in tries), *(states[name] for name in _COUNTED))
+        self.record.counts = dict(zip(COUNTS, counts, strict=True))
+        self.record.outcome = int(Outcome.SOLVED if solved else Outcome.NOT_SOLVED)
+        self.record.remark = "" if solved else tries[-1].end.label
+        self.record.seconds = {part: [] for part in PARTS}
+
+    def take_turn(self) -> None:
+        """Solve once with the clock; a formulation that crashed takes no turn."""
+        if self.record.outcome == Outcome.CRASHED:
+            return
+        try:
+            meter, tries, total = self._solve()
+        except ContractError as error:  # A plugin with a memory may fail later.
+            self.record = RunRecord(remark=str(error))
+            return
+        solve = sum(trace.seconds["solve"] for trace in tries)
+        for part, seconds in (meter.seconds | {"solve": solve, "total": total}).items():
+            self.record.seconds[part].append(seconds)
+
+    def _solve(self) -> tuple[Meter, tuple[Trace, ...], float]:
+        meter, task = Meter(), self.task
+        formulation = metered(self.subject, task.case, meter)
+        start = perf_counter()
+        with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
+            tries = solve_in_tries(task.scene, formulation, task.start, task.step)
+        return meter, tries, perf_counter() - start
+
+
+_COUNTED = ("pair", "residual", "tangent", "differences")  # The states that a meter counts, in the order of `COUNTS`.
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """Keep Python's collector of garbage out of the times, as `timeit` does."""
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

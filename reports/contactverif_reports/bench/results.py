@@ -1,0 +1,168 @@
+"""The results of a bench: formulations on cells, each with outcome, errors, counts and the seconds of every repeat.
+
+A cell is one scene on one mesh at one penalty. Rules for the next editor: nothing is solved here, a failed solution is
+an entry like any other, and no number is averaged before it is stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+
+RANDOM = "random"  # The scene of the performance profiles.
+SCENES = {
+    "wavy": "two wavy half-planes in full contact",
+    "hertz": "Hertz' contact in boxes",
+    "rings": "two rings shrunk onto each other",
+    "kinked": "two blocks on a zigzag",
+    RANDOM: "random blocks under a uniform pressure",
+}
+ERRORS = {
+    "forces": "E_F of nodal forces, the larger one of slave and master",
+    "displacement": "L2 error of displacements of the interface over the exact ones",
+    "pressure": "root mean square error of reported pressures",
+}
+PARTS = {
+    "pair": "the search",
+    "residual": "forces",
+    "tangent": "the tangent, with the forces if the plugin computes both at once",
+    "differences": "forces at states beside, for a tangent that the plugin does not have or that did not help",
+    "solve": "linear systems",
+    "total": "everything from the first iterate to the last, the harness included",
+}
+COUNTS = {
+    "iterations": "linear systems solved",
+    "pairs": "calls of the search",
+    "residuals": "states at which forces were computed, those for differences not counted",
+    "tangents": "tangents computed by the plugin",
+    "differences": "states at which forces were computed for differences",
+}
+
+
+class Outcome(IntEnum):
+    """How a run ended. The numbers are those of a file."""
+
+    SOLVED = 0
+    NOT_SOLVED = 1
+    CRASHED = 2
+
+    @property
+    def word(self) -> str:
+        """The outcome in words."""
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Cell:
+    """One scene on one mesh at one penalty.
+
+    Attributes
+    ----------
+    scene : str
+        A key of `SCENES`.
+    mesh : int
+        The fineness, as the scene counts it; the number of a random scene.
+    stiffness : float
+        The penalty ε̂ in the unit of the scene: E/h for wavy and hertz, E/ℓ for kinked, N m-2 for rings and random.
+    """
+
+    scene: str
+    mesh: int
+    stiffness: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BenchResults:
+    """All numbers of a bench.
+
+    Attributes
+    ----------
+    formulations : tuple[str, ...]
+        The formulations, as on the command line.
+    cells : tuple[Cell, ...]
+        The cells.
+    segments, unknowns : IntArray, shape (n_cells,)
+        The numbers of slave segments and of the unknowns of the scene.
+    outcomes : IntArray, shape (n_formulations, n_cells)
+        The outcomes, see `Outcome`.
+    errors : FloatArray, shape (n_formulations, n_cells, n_errors)
+        The errors, in the order of `ERRORS`; NaN where nothing is solved, or nothing is reported.
+    counts : IntArray, shape (n_formulations, n_cells, n_counts)
+        The counts, in the order of `COUNTS`.
+    seconds : FloatArray, shape (n_formulations, n_cells, n_parts, n_repeats)
+        The time of each part in each repeat, in the order of `PARTS`; NaN where the plugin crashed.
+    yardstick : FloatArray, shape (n_cells, n_repeats)
+        The time of a fixed piece of work that was done in the same repeats.
+    remarks : Mapping[tuple[str, int], str]
+        {(formulation, number of the cell): how a run ended that gave no solution}.
+    not_loaded : Mapping[str, str]
+        {formulation: why it did not load}.
+    provenance : Mapping[str, str]
+        Versions, machine, time and command.
+    """
+
+    formulations: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    segments: IntArray
+    unknowns: IntArray
+    outcomes: IntArray
+    errors: FloatArray
+    counts: IntArray
+    seconds: FloatArray
+    yardstick: FloatArray
+    remarks: Mapping[tuple[str, int], str]
+    not_loaded: Mapping[str, str]
+    provenance: Mapping[str, str]
+
+    @property
+    def scenes(self) -> tuple[str, ...]:
+        """The scenes that have cells, without the random ones, in the order of `SCENES`."""
+        there = {cell.scene for cell in self.cells}
+        return tuple(scene for scene in SCENES if scene in there and scene != RANDOM)
+
+    @property
+    def fastest(self) -> FloatArray:
+        """The least time (n_formulations, n_cells, n_parts) of all repeats, in seconds."""
+        least: FloatArray = self.seconds.min(axis=-1)
+        return least
+
+    @property
+    def medians(self) -> FloatArray:
+        """The median time (n_formulations, n_cells, n_parts) of all repeats, in seconds."""
+        middle: FloatArray = np.median(self.seconds, axis=-1)
+        return middle
+
+    def times(self, formulation: str, part: str = "total") -> FloatArray:
+        """Return the least time (n_cells,) of a part, in seconds; infinite where there is no solution."""
+        row = self.formulations.index(formulation)
+        least = self.fastest[row, :, list(PARTS).index(part)]
+        times: FloatArray = np.where(self.outcomes[row] == Outcome.SOLVED, least, np.inf)
+        return times
+
+    def errors_of(self, formulation: str, kind: str = "forces") -> FloatArray:
+        """Return the errors (n_cells,) of a kind; infinite where there is no solution, NaN where none is reported."""
+        row = self.formulations.index(formulation)
+        values = self.errors[row, :, list(ERRORS).index(kind)]
+        errors: FloatArray = np.where(self.outcomes[row] == Outcome.SOLVED, values, np.inf)
+        return errors
+
+    def cells_of(self, scene: str, stiffness: float | None = None) -> BoolArray:
+        """Return which cells (n_cells,) belong to a scene, if wanted at one penalty alone."""
+        chosen: BoolArray = np.array(
+            [cell.scene == scene and stiffness in (None, cell.stiffness) for cell in self.cells], dtype=np.bool_
+        )
+        return chosen
+
+    def stiffnesses_of(self, scene: str) -> tuple[float, ...]:
+        """Return the penalties of a scene, soft ones first."""
+        return tuple(sorted({cell.stiffness for cell in self.cells if cell.scene == scene}))
+
+    def uses_differences(self, formulation: str) -> bool:
+        """Return whether some solution needed differences of forces instead of a tangent."""
+        row = self.formulations.index(formulation)
+        return bool(self.counts[row, :, list(COUNTS).index("differences")].any())

@@ -1,0 +1,184 @@
+"""What can be read from a bench: Pareto fronts, the time to reach an error, and performance profiles.
+
+A run that fails counts with an infinite time and an infinite error, as COCO counts it; it is never left out.
+
+References
+----------
+Dolan & Moré, Math. Program. 91 (2002) 201–213 (performance profiles); Gould & Scott, ACM Trans. Math. Software 43
+(2016) 15 (why profiles are read in pairs); Hansen et al., Optim. Methods Softw. 36 (2021) 114–144 (COCO).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif_reports.bench.results import RANDOM, BenchResults
+
+REFERENCE = "vts-ppt"
+TARGETS = (1e-1, 1e-2, 1e-3)
+SENTENCE_TARGET = 1e-2  # The error of the sentence that says who costs how much.
+ACCURATE = 1e-2  # A random scene is solved if the error of the forces is at most this.
+
+
+def pareto_front(times: FloatArray, errors: FloatArray) -> BoolArray:
+    """Return which runs (n,) no other run beats in time and error at once.
+
+    Parameters
+    ----------
+    times, errors : FloatArray, shape (n,)
+        Times and errors. A run whose time or error is not finite is not on the front.
+    """
+    finite = np.isfinite(times) & np.isfinite(errors)
+    front = np.zeros(len(times), dtype=np.bool_)
+    least = inf
+    for index in np.lexsort((errors, times)):
+        if finite[index] and errors[index] < least:
+            front[index], least = True, float(errors[index])
+    return front
+
+
+def time_to_reach(
+    results: BenchResults, formulation: str, scene: str, target: float, kind: str = "forces", part: str = "total"
+) -> float:
+    """Return the time of the cheapest run on a scene, over meshes and penalties, whose error is at most the target.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench.
+    formulation, scene : str
+        The formulation and the scene.
+    target : float
+        The error to reach.
+    kind, part : str
+        The kind of error and the part of the time.
+
+    Returns
+    -------
+    float
+        Seconds; infinite if no run reaches it.
+    """
+    reached = results.cells_of(scene) & (results.errors_of(formulation, kind) <= target)
+    return float(results.times(formulation, part)[reached].min(initial=inf))
+
+
+def cost_ratio(results: BenchResults, formulation: str, scene: str, reference: str = REFERENCE) -> float:
+    """Return the time to an error of 1 % in the forces over that of the reference.
+
+    Returns
+    -------
+    float
+        The ratio; infinite if the formulation never reaches the error, NaN if the reference does not.
+    """
+    own, other = (time_to_reach(results, name, scene, SENTENCE_TARGET) for name in (formulation, reference))
+    return own / other if isfinite(other) else np.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairProfile:
+    """The performance profile of a formulation and the reference, the two alone.
+
+    Attributes
+    ----------
+    formulation, reference : str
+        The two.
+    factors : FloatArray, shape (n_scenes,)
+        The time of the formulation over that of the faster one of both, on each random scene; infinite where it fails.
+    reference_factors : FloatArray, shape (n_scenes,)
+        The same of the reference.
+    """
+
+    formulation: str
+    reference: str
+    factors: FloatArray
+    reference_factors: FloatArray
+
+    def share(self, factor: float) -> float:
+        """Return the share of scenes that the formulation solves within a factor of the faster one of both."""
+        return float((self.factors <= factor).mean())
+
+    @property
+    def share_solved(self) -> float:
+        """The share of scenes that the formulation solves."""
+        return float(np.isfinite(self.factors).mean())
+
+    @property
+    def median_ratio(self) -> float:
+        """The median of the ratio of both times, over the scenes that both solve; NaN if there is none."""
+        both = np.isfinite(self.factors) & np.isfinite(self.reference_factors)
+        return float(np.median((self.factors / self.reference_factors)[both])) if both.any() else np.nan
+
+
+def pair_profiles(results: BenchResults, reference: str = REFERENCE) -> tuple[PairProfile, ...]:
+    """Return the profile of each formulation beside the reference, over the random scenes that have a solution.
+
+    A scene counts as solved if the forces are exact up to `ACCURATE`.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench. Without the reference or without random scenes there are no profiles.
+    reference : str
+        The formulation to compare with.
+    """
+    chosen = results.cells_of(RANDOM)
+    if reference not in results.formulations or not chosen.any():
+        return ()
+    times = {name: _times_of_accurate(results, name)[chosen] for name in results.formulations}
+    profiles = []
+    for name in results.formulations:
+        if name != reference:
+            best = np.minimum(times[name], times[reference])
+            factors = [_over(values, best) for values in (times[name], times[reference])]
+            profiles.append(PairProfile(name, reference, *factors))
+    return tuple(profiles)
+
+
+def _times_of_accurate(results: BenchResults, formulation: str) -> FloatArray:
+    accurate = results.errors_of(formulation) <= ACCURATE
+    times: FloatArray = np.where(accurate, results.times(formulation), np.inf)
+    return times
+
+
+def _over(values: FloatArray, best: FloatArray) -> FloatArray:
+    """Return values over the best; infinite where there is no best."""
+    ratios: FloatArray = np.divide(values, best, where=np.isfinite(values), out=np.full(len(values), np.inf))
+    return ratios
+
+
+def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None = None) -> str:
+    """Return one sentence: at an error of 1 %, what others cost beside the reference.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench.
+    scene : str
+        The scene.
+    names : Sequence[str] | None
+        The formulations to name; all by default.
+
+    Returns
+    -------
+    str
+        The sentence; empty without the reference.
+    """
+    others = [name for name in (names or results.formulations) if name != REFERENCE]
+    if REFERENCE not in results.formulations or not others:
+        return ""
+    ratios = {name: cost_ratio(results, name, scene) for name in others}
+    if all(np.isnan(ratio) for ratio in ratios.values()):
+        return f"On {scene}, {REFERENCE} does not reach an error of 1 % in the forces."
+    costs = [f"{name} {ratio:.2g}" for name, ratio in sorted(ratios.items(), key=lambda pair: pair[1]) if ratio < inf]
+    never = [name for name, ratio in ratios.items() if ratio == inf]
+    text = f"On {scene}, at an error of 1 % in the forces"
+    if costs:
+        text += f", the time over that of {REFERENCE} is: {', '.join(costs)}"
+    if never:
+        text += f"; {', '.join(never)} never get there" if len(never) > 1 else f"; {never[0]} never gets there"
+    return f"{text}."

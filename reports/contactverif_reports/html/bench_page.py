@@ -1,0 +1,114 @@
+"""The page of a bench: sentences, the time to reach an error, figures, the parts of the time, and profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isinf, isnan
+from typing import Any
+
+import numpy as np
+
+from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Outcome
+from contactverif_reports.bench.slowdown import Slowdown
+from contactverif_reports.bench.work_precision import (
+    REFERENCE,
+    TARGETS,
+    cost_ratio,
+    cost_sentence,
+    pair_profiles,
+    time_to_reach,
+)
+from contactverif_reports.html.pages import render, svg_inline
+
+_FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "platform", "threads")
+
+
+def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
+    """Return the page of a bench.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench.
+    changes : Sequence[Slowdown]
+        The times over those of an earlier bench.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file.
+    """
+    from contactverif_reports.draw.bench_figures import (  # Importing matplotlib is slow.
+        make_cost_figure,
+        make_profile_figure,
+        make_work_precision_figure,
+    )
+
+    scenes = results.scenes
+    profile = make_profile_figure(results)
+    with_reference = REFERENCE in results.formulations and len(results.formulations) > 1 and scenes
+    return render(
+        "bench.html.j2",
+        results=results,
+        reference=REFERENCE,
+        titles=SCENES,
+        scenes=scenes,
+        sentences=[text for scene in scenes if (text := cost_sentence(results, scene))],
+        cost=svg_inline(make_cost_figure(results), f"cost beside {REFERENCE}") if with_reference else "",
+        targets=[(kind, [_target_rows(results, scene, kind) for scene in scenes]) for kind in ERRORS],
+        target_heads=[f"{target:g}" for target in TARGETS],
+        figures=[
+            (scene, [(kind, svg_inline(make_work_precision_figure(results, scene, kind))) for kind in ERRORS])
+            for scene in scenes
+        ],
+        parts=PARTS,
+        shares=[_shares(results, name) for name in results.formulations],
+        counts=COUNTS,
+        lost=_lost(results),
+        profiles=pair_profiles(results),
+        profile=svg_inline(profile, "performance profiles") if profile is not None else "",
+        changes=changes,
+        n_repeats=results.seconds.shape[-1],
+        about={name.replace("_", " "): results.provenance[name] for name in _FACTS if results.provenance.get(name)},
+    )
+
+
+def format_time(seconds: float) -> str:
+    """Return a time with two digits and its unit; ∞ for never."""
+    if isnan(seconds):
+        return "–"
+    if isinf(seconds):
+        return "∞"
+    return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{seconds:.2g} s"
+
+
+def _target_rows(results: BenchResults, scene: str, kind: str) -> dict[str, Any]:
+    """Return the rows of a scene: formulation, times to the targets, ratio to the reference."""
+    rows = []
+    for name in results.formulations:
+        times = [format_time(time_to_reach(results, name, scene, target, kind)) for target in TARGETS]
+        ratio = cost_ratio(results, name, scene) if REFERENCE in results.formulations and kind == "forces" else np.nan
+        rows.append((name, times, "∞" if isinf(ratio) else "–" if isnan(ratio) else f"{ratio:.2g}"))
+    return {"scene": scene, "rows": rows}
+
+
+def _shares(results: BenchResults, name: str) -> tuple[str, list[str], list[str]]:
+    """Return the share of each part in the time of all solved runs, and the mean counts of a run."""
+    row = results.formulations.index(name)
+    solved = results.outcomes[row] == Outcome.SOLVED
+    if not solved.any():
+        return name, ["–"] * len(PARTS), ["–"] * len(COUNTS)
+    sums = results.fastest[row, solved].sum(axis=0)
+    shares = [f"{100 * part / sums[-1]:.0f} %" for part in sums[:-1]] + [format_time(float(sums[-1] / solved.sum()))]
+    return name, shares, [f"{mean:.3g}" for mean in results.counts[row, solved].mean(axis=0)]
+
+
+def _lost(results: BenchResults) -> list[tuple[str, int, str]]:
+    """Return formulation, number of runs without a solution, and how they ended."""
+    rows = []
+    for name in results.formulations:
+        ends = [remark for (formulation, _), remark in results.remarks.items() if formulation == name]
+        if ends:
+            kinds = sorted(set(ends), key=ends.count, reverse=True)
+            rows.append((name, len(ends), "; ".join(f"{ends.count(kind)} {kind}" for kind in kinds[:3])))
+    return rows

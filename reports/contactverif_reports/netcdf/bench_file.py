@@ -1,0 +1,158 @@
+"""The file of a bench, written and read: everything that `BenchResults` holds, repeat by repeat.
+
+Rule for the next editor: all that depends on a clock is in the group `timing`, so that the rest of two benches with the
+same plan is identical.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.errors import MisuseError
+from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Cell, Outcome
+from contactverif_reports.files import check_writable, whole
+from contactverif_reports.netcdf.schema import NONE, RATIO, SECONDS, text
+from contactverif_reports.netcdf.variables import codes, numbers, words
+
+TITLE = "contactverif: speed against error of contact formulations"
+BENCH_SCHEMA = "1"
+_RUN = ["formulation", "cell"]
+
+
+def write_bench(results: BenchResults, path: str | os.PathLike[str]) -> None:
+    """Write the file of a bench, whole or not at all.
+
+    Raises
+    ------
+    MisuseError
+        If the path cannot be written.
+    """
+    check_writable(path)
+    with whole(path) as part:
+        bench_tree(results).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+
+
+def bench_tree(results: BenchResults) -> xr.DataTree:
+    """Return the file as a tree: the root, and the group `timing`."""
+    attributes = {name: text(value) or NONE for name, value in results.provenance.items()}
+    attributes |= {"title": TITLE, "bench_schema": BENCH_SCHEMA, "Conventions": "CF-1.11"}
+    attributes |= {"not_loaded": "\n".join(f"{name}: {text(why)}" for name, why in results.not_loaded.items()) or NONE}
+    return xr.DataTree.from_dict(
+        {"/": xr.Dataset(_labels(results) | _runs(results), attrs=attributes), "/timing": _timing(results)}
+    )
+
+
+def read_bench(path: str | os.PathLike[str]) -> BenchResults:
+    """Return what `write_bench` wrote.
+
+    Raises
+    ------
+    MisuseError
+        If the file is missing, or is no file of a bench.
+    """
+    needed = "a file that `contactverif bench --out FILE.nc` wrote"
+    if not Path(path).is_file():
+        raise MisuseError("FILE", f"no file {os.fspath(path)}", needed)
+    try:
+        with xr.open_datatree(path, engine="netcdf4") as tree:
+            if tree.attrs.get("bench_schema") != BENCH_SCHEMA:
+                raise MisuseError("FILE", f"{os.fspath(path)}, another file", needed)
+            return _results(tree.load())
+    except (OSError, ValueError) as error:
+        raise MisuseError("FILE", f"{os.fspath(path)}: {error}", needed) from error
+
+
+def _labels(results: BenchResults) -> dict[str, Any]:
+    """Return the names along the dimensions, and what a cell is."""
+    scenes = {scene: number for number, scene in enumerate(SCENES)}
+    cells = results.cells
+    return {
+        "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
+        "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
+        "mesh": numbers(["cell"], [cell.mesh for cell in cells], "fineness of the mesh, as the scene counts it", RATIO),
+        "stiffness": numbers(
+            ["cell"],
+            [cell.stiffness for cell in cells],
+            "penalty in the unit of the scene",
+            RATIO,
+            "E/h for wavy and hertz, E over the unit of length for kinked, N m-2 for rings; 1 for random",
+        ),
+        "slave_segments": numbers(["cell"], results.segments, "number of slave segments", RATIO),
+        "unknowns": numbers(["cell"], results.unknowns, "number of unknowns of the scene", RATIO),
+        "error_kind": words(["error_kind"], list(ERRORS), "kind of error", "; ".join(map(": ".join, ERRORS.items()))),
+        "count_kind": words(["count_kind"], list(COUNTS), "what is counted", "; ".join(map(": ".join, COUNTS.items()))),
+    }
+
+
+def _runs(results: BenchResults) -> dict[str, Any]:
+    remarks = [
+        [results.remarks.get((name, cell), "") for cell in range(len(results.cells))] for name in results.formulations
+    ]
+    outcomes = {outcome.word.replace(" ", "_"): int(outcome) for outcome in Outcome}
+    return {
+        "outcome": codes(_RUN, results.outcomes, outcomes, "how the run ended"),
+        "remark": words(_RUN, remarks, "how the run ended, where it gave no solution"),
+        "error": numbers(
+            [*_RUN, "error_kind"],
+            results.errors,
+            "error",
+            RATIO,
+            "NaN without a solution, or where nothing is reported",
+        ),
+        "count": numbers([*_RUN, "count_kind"], results.counts, "count", RATIO),
+    }
+
+
+def _timing(results: BenchResults) -> xr.Dataset:
+    parts = "; ".join(map(": ".join, PARTS.items()))
+    table = {
+        "part": words(["part"], list(PARTS), "part of the time", parts),
+        "seconds": numbers(
+            [*_RUN, "part", "repeat"], results.seconds, "time of each repeat", SECONDS, "NaN where the plugin crashed"
+        ),
+        "yardstick_seconds": numbers(
+            ["cell", "repeat"], results.yardstick, "time of a fixed piece of work in the same repeats", SECONDS
+        ),
+    }
+    return xr.Dataset(table, attrs={"comment": "the only numbers that depend on a clock"})
+
+
+def _results(tree: xr.DataTree) -> BenchResults:
+    root, timing = tree.to_dataset(), tree["timing"].to_dataset()
+    formulations = tuple(map(_word, root["formulation"].values))
+    scenes = list(SCENES)
+    columns = (root[name].values.tolist() for name in ("scene", "mesh", "stiffness"))
+    cells = tuple(Cell(scenes[scene], mesh, stiffness) for scene, mesh, stiffness in zip(*columns, strict=True))
+    outcomes, remarks = root["outcome"].values.astype(np.int64), root["remark"].values
+    lost = np.argwhere(outcomes != Outcome.SOLVED).tolist()
+    attributes = {str(name): str(value) for name, value in tree.attrs.items()}
+    not_loaded = attributes["not_loaded"]
+    structure = ("title", "bench_schema", "Conventions", "not_loaded")
+    return BenchResults(
+        formulations=formulations,
+        cells=cells,
+        segments=root["slave_segments"].values.astype(np.int64),
+        unknowns=root["unknowns"].values.astype(np.int64),
+        outcomes=outcomes,
+        errors=root["error"].values,
+        counts=root["count"].values.astype(np.int64),
+        seconds=timing["seconds"].values,
+        yardstick=timing["yardstick_seconds"].values,
+        remarks={(formulations[row], cell): _word(remarks[row, cell]) for row, cell in lost},
+        not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
+        provenance={name: value for name, value in attributes.items() if name not in structure},
+    )
+
+
+def _word(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _split(line: str) -> tuple[str, str]:
+    name, _, reason = line.partition(": ")
+    return name, reason

@@ -1,0 +1,68 @@
+"""The command `bench`: a table that fits 80 columns, files by suffix, and an exit status that follows the ratios."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+from asking import Ask, asking
+from studies.bench_results import make_results
+
+from contactverif_reports.bench.results import Cell
+from contactverif_reports.netcdf.bench_file import write_bench
+
+QUICK = ("nts-ar", "vts-ppt", "--quick", "--scene", "wavy", "--repeats", "1")
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    return partial(asking(monkeypatch, capsys), "bench")
+
+
+def test_a_bench_has_a_table_of_80_columns_sentences_and_files(ask: Ask, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("a.nc", "a.html", "a.md")]
+    outputs = [word for file in files for word in ("--out", file)]
+    answer = ask(*QUICK, *outputs, "--pictures", tmp_path / "figures", columns=80)
+    assert (answer.status, answer.err) == (0, "")
+    assert max(map(len, answer.out.replace(str(tmp_path), "").splitlines())) <= 80
+    assert "On wavy, at an error of 1 % in the forces" in answer.out
+    assert "nts-ar never gets there." in " ".join(answer.out.split())
+    for file in files:
+        assert file.stat().st_size > 0
+        assert str(file) in answer.out
+    assert {file.name for file in (tmp_path / "figures").iterdir()} == {"wavy.svg", "cost.svg"}
+    assert not (tmp_path / "a.nc.journal").exists()
+    again = ask(files[0], "--out", tmp_path / "b.html", columns=80)
+    assert again.status == 0
+    assert (tmp_path / "b.html").read_text() == files[1].read_text()
+
+
+def test_what_became_slower_is_told_by_ratio(ask: Ask, tmp_path: Path) -> None:
+    cells = [Cell("wavy", mesh, 1.0) for mesh in (1, 2)]
+    runs = {"vts-ppt": [(1.0, 0.1), (2.0, 0.01)]}
+    for name, slower in (("old", 1.0), ("new", 2.0)):
+        write_bench(make_results(cells, runs, slower=slower), tmp_path / f"{name}.nc")
+    worse = ask(tmp_path / "new.nc", "--against", tmp_path / "old.nc")
+    assert worse.status == 1
+    assert "Slower than 1.25 times: vts-ppt." in worse.out
+    better = ask(tmp_path / "old.nc", "--against", tmp_path / "new.nc")
+    assert "Nothing became slower." in better.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "NAME: found nothing; needed --all, or some of "),
+        (["nts", "--scene", "disk"], "--scene: found 'disk'; needed one of "),
+        (["nts", "--repeats", "0"], "--repeats: found 0; needed at least 1"),
+        (["nts", "--against", "no-such.nc"], "FILE: found no file no-such.nc; needed a file that "),
+        (["a.nc", "nts"], "NAME: found a.nc and more; needed formulations alone, or one file of a bench"),
+        (["nts", "--out", "a.svg"], "--out: found 'a.svg'; needed a name that ends in .nc, .html or .md"),
+    ],
+)
+def test_a_wrong_command_line_is_one_line(ask: Ask, arguments: list[str], message: str) -> None:
+    answer = ask(*arguments)
+    assert answer.status == 2
+    assert answer.err.startswith(f"contactverif: {message}")
+    assert answer.err.count("\n") == 1

@@ -1,0 +1,175 @@
+"""The bench: all is counted, a failure is kept, a killed bench goes on, and a stranger is one more curve."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from subjects import Changed, load_subject
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
+from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
+from contactverif.studies.bench.bench_scenes import make_task
+from contactverif.studies.bench.bench_study import run_bench
+from contactverif.studies.bench.cell_runs import run_cell
+from contactverif.studies.bench.journal import Journal, journal_of
+from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
+
+WAVY = Cell("wavy", 1, 30.0)
+COMMAND = [sys.executable, "-c", "from contactverif.cli import main; main()"]
+ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "wavy", "--scene", "kinked", "--repeats", "2"]
+
+
+def residual_alone(name: str) -> Subject:
+    """Return a formulation that has neither a pairing nor a tangent."""
+
+    class Alone:
+        def __init__(self, *, penalty: float) -> None:
+            self.inner = load_subject(name).with_penalty(penalty).plugin
+            self.traits = self.inner.traits
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return self.inner.residual(interface, self.inner.pair(interface, np.atleast_2d(z)[0]), z)
+
+    return Subject("alone", Alone)
+
+
+@pytest.mark.parametrize("scene", GRID)
+def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: str) -> None:
+    """On the zigzag the exact solution is in the space of the meshes, so that only roundoff is left."""
+    meshes, penalties = GRID[scene]
+    records = [run_cell(Cell(scene, mesh, penalties[1]), [load_subject("vts-ppt")], 1, 0) for mesh in meshes[:3:2]]
+    runs = [record.runs["vts-ppt"] for record in records]
+    assert [run.outcome for run in runs] == [Outcome.SOLVED, Outcome.SOLVED]
+    for kind in ("forces", "displacement", "pressure"):
+        coarse, fine = (run.errors[kind] for run in runs)
+        assert fine < 0.8 * coarse or coarse < 1e-5, kind
+    assert set(runs[0].seconds) == set(PARTS)
+    assert all(seconds[0] >= 0 for seconds in runs[0].seconds.values())
+    assert runs[0].seconds["total"][0] > sum(runs[0].seconds[part][0] for part in PARTS if part != "total")
+
+
+def test_errors_are_those_of_the_properties() -> None:
+    study, subject = HertzStudy(parabola_is_slave=True, stiffness=10.0), load_subject("nts-ar")
+    expected = hertz_errors(study, 16, subject)
+    run = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"]
+    assert run.errors["forces"] == max(expected.slave, expected.master)
+    assert run.errors["pressure"] == expected.pressure
+    assert run.errors["displacement"] == expected.displacement
+
+
+def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
+    subject = load_subject("vts-ppt")
+    task = make_task(WAVY, subject, 0)
+    trace = solve_for_accuracy(task.scene, subject, task.start, task.step).trace
+    counts = run_cell(WAVY, [subject], 1, 0).runs["vts-ppt"].counts
+    assert list(counts) == list(COUNTS)
+    assert counts["iterations"] == trace.n_iterations
+    assert counts["pairs"] == len(trace.residuals)
+    assert counts["tangents"] >= trace.n_iterations
+    assert counts["differences"] == 0
+
+
+def test_a_residual_alone_is_one_more_curve_and_its_differences_are_counted_as_such() -> None:
+    record = run_cell(WAVY, [residual_alone("vts-ppt"), load_subject("vts-ppt")], 1, 0)
+    alone, whole = (record.runs[name] for name in ("alone", "vts-ppt"))
+    assert alone.outcome == Outcome.SOLVED
+    assert alone.errors["forces"] == pytest.approx(whole.errors["forces"], rel=1e-6)
+    assert (alone.counts["pairs"], alone.counts["tangents"]) == (0, 0)
+    assert alone.counts["differences"] >= 2 * record.unknowns * alone.counts["iterations"]
+    assert alone.seconds["differences"][0] > 0
+    assert alone.seconds["tangent"] == [0.0]
+
+
+def test_a_failure_is_kept_and_stops_no_one() -> None:
+    def make_broken(*, penalty: float) -> Any:
+        return Changed(load_subject("vts-ppt").with_penalty(penalty).plugin, residual=lambda *_: 1 / 0)
+
+    def make_pulling(*, penalty: float) -> Any:
+        inner = load_subject("vts-ppt").with_penalty(penalty).plugin
+        return Changed(inner, residual=lambda *arguments: -inner.residual(*arguments))
+
+    subjects = [Subject("broken", make_broken), Subject("pulling", make_pulling), load_subject("vts-ppt")]
+    absent = NotLoaded("absent", "no such module")
+    results = run_bench([absent, *subjects], BenchPlan((WAVY,), repeats=2))
+    assert [int(outcome) for outcome in results.outcomes[:, 0]] == [Outcome.CRASHED, Outcome.NOT_SOLVED, Outcome.SOLVED]
+    assert "ZeroDivisionError" in results.remarks["broken", 0]
+    assert results.remarks["pulling", 0]
+    assert np.isinf(results.times("broken")).all()
+    assert np.isinf(results.errors_of("pulling")).all()
+    assert np.isfinite(results.seconds[1:]).all()
+    assert results.not_loaded == {"absent": "no such module"}
+
+
+def test_random_scenes_are_the_same_for_the_same_seed() -> None:
+    subject, cell = load_subject("vts-ppt"), Cell("random", 1, 1.0)
+    scenes = [make_task(cell, subject, seed).scene for seed in (0, 0, 1)]
+    assert scenes[0] is scenes[1]
+    assert scenes[0].interface.nodes.tolist() != scenes[2].interface.nodes.tolist()
+
+
+def test_a_torn_line_is_cut_off_and_another_plan_is_refused(tmp_path: Path) -> None:
+    output = tmp_path / "a.nc"
+    Journal(output, {"plan": 1}).add(0, {"x": 1.5})
+    path = journal_of(output)
+    whole = path.read_bytes()
+    path.write_bytes(whole + b'{"cell": 1, "rec')
+    journal = Journal(output, {"plan": 1})
+    assert journal.finished == {0: {"x": 1.5}}
+    assert path.read_bytes() == whole
+    journal.add(1, {"x": 2})
+    assert [json.loads(line) for line in path.read_text().splitlines()][-1] == {"cell": 1, "record": {"x": 2}}
+    with pytest.raises(MisuseError, match="the journal of another bench"):
+        Journal(output, {"plan": 2})
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scenes": ["disk"]}, "--scene: found 'disk'; needed one of wavy, hertz, rings, kinked, random"),
+        ({"repeats": 0}, "--repeats: found 0; needed at least 1"),
+        ({"n_random": -1}, "--random: found -1; needed at least 0"),
+        ({"scenes": ["random"], "n_random": 0}, "--random: found 0 random scenes and no other"),
+    ],
+)
+def test_a_plan_of_nothing_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(MisuseError, match=message):
+        make_plan(**options)
+
+
+def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_seconds(tmp_path: Path) -> None:
+    environment = {**os.environ, "NO_COLOR": "1"}
+    arguments = [*COMMAND, *ARGUMENTS, "--quick", "--out"]
+    killed, unbroken = tmp_path / "killed.nc", tmp_path / "unbroken.nc"
+    process = subprocess.Popen([*arguments, str(killed)], env=environment, stdout=subprocess.DEVNULL)
+    journal, deadline = journal_of(killed), time.monotonic() + 120
+    while not (journal.exists() and len(journal.read_text().splitlines()) >= 2):  # The plan, and one finished cell.
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert not killed.exists()
+    first = journal.read_text().splitlines()[1]
+    for target in (killed, unbroken):
+        subprocess.run([*arguments, str(target)], env=environment, check=True, stdout=subprocess.DEVNULL)
+    assert not journal.exists()
+    with xr.open_datatree(killed, engine="netcdf4") as one, xr.open_datatree(unbroken, engine="netcdf4") as other:
+        xr.testing.assert_identical(one.to_dataset().drop_attrs(), other.to_dataset().drop_attrs())
+        assert one["timing/seconds"].shape == other["timing/seconds"].shape
+        record = json.loads(first)["record"]
+        stored = one["timing/yardstick_seconds"].values[0].tolist()
+    assert stored == record["yardstick"]  # What was measured before the kill was not measured again.
