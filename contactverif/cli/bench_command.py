@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -84,7 +85,8 @@ def bench(
         results = read_bench(names[0])
     else:
         results = _run(select_names(names or [], all_), scene or [], quick, repeats, files)
-        results = replace(results, provenance={**results.provenance, "threads": "1" if pinned else "not set"})
+        facts = {"command": shlex.join(["contactverif", *sys.argv[1:]]), "threads": "1" if pinned else "not set"}
+        results = replace(results, provenance={**results.provenance, **facts})
     changes = () if old is None else slowdowns(results, old)
     _write(results, changes, files, folder)
     _show(results, changes, files, folder, compared=old is not None)

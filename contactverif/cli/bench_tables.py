@@ -62,19 +62,19 @@ def slowdown_sentence(changes: Sequence[Slowdown]) -> str:
 
 
 def _cells(results: BenchResults, name: str, scene: str) -> list[str]:
-    chosen, row = results.cells_of(scene), results.formulations.index(name)
+    selection, row = results.cells_of(scene), results.formulations.index(name)
     times = [_milliseconds(time_to_reach(results, name, scene, target)) for target in TARGETS]
     ratio = cost_ratio(results, name, scene) if REFERENCE in results.formulations else float("nan")
-    solved = chosen & (results.outcomes[row] == Outcome.SOLVED)
+    solved = selection & (results.outcomes[row] == Outcome.SOLVED)
     sums = dict(zip(PARTS, results.fastest[row, solved].sum(axis=0), strict=True))
     shares = ["–", "–"]
     if solved.any():
         plugin = sum(sums[part] for part in ("pair", "residual", "tangent", "differences"))
         shares = [f"{100 * part / sums['total']:.0f}" for part in (plugin, sums["solve"])]
-    n_failed = int((chosen & ~solved).sum())
+    n_failed = int((selection & ~solved).sum())
     word = "∞" if isinf(ratio) else "–" if isnan(ratio) else f"{ratio:.2g}"
     differences = "*" if results.uses_differences(name) else ""
-    return [*times, word, f"{shares[0]}{differences}", shares[1], f"{n_failed}/{int(chosen.sum())}"]
+    return [*times, word, f"{shares[0]}{differences}", shares[1], f"{n_failed}/{int(selection.sum())}"]
 
 
 def _milliseconds(seconds: float) -> str:

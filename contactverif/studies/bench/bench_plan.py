@@ -23,7 +23,7 @@ REPEATS = 7  # Repeats of each solution that are timed.
 
 @dataclass(frozen=True, slots=True)
 class BenchPlan:
-    """What a bench runs.
+    """The cells of a bench, how often each is repeated, and the seed of its random scenes.
 
     Attributes
     ----------
@@ -72,8 +72,8 @@ def make_plan(
     cells: list[Cell] = []
     for scene, (meshes, penalties) in GRID.items():
         if not scenes or scene in scenes:
-            chosen = (meshes[:QUICK_MESHES], penalties[1:2]) if quick else (meshes, penalties)
-            cells += [Cell(scene, mesh, stiffness) for stiffness, mesh in product(chosen[1], chosen[0])]
+            grid = (meshes[:QUICK_MESHES], penalties[1:2]) if quick else (meshes, penalties)
+            cells += [Cell(scene, mesh, stiffness) for stiffness, mesh in product(grid[1], grid[0])]
     if not scenes or RANDOM in scenes:
         cells += [Cell(RANDOM, number, 1.0) for number in range(count)]
     if not cells:

@@ -34,7 +34,7 @@ Errors = dict[str, float]  # {kind of error: number}; a kind that is not reporte
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is solved in a cell by one formulation.
+    """The problem that one formulation solves in a cell.
 
     Attributes
     ----------
@@ -108,10 +108,10 @@ def _hertz_task(cell: Cell, multipliers: bool) -> Task:
     scene, start = study.scene(cell.mesh, multipliers=multipliers)
 
     def errors(solution: Solution) -> Errors:
-        found = errors_of_solution(study, cell.mesh, solution, multipliers=multipliers)
-        numbers = {"slave": found.slave, "master": found.master, "displacement": found.displacement}
-        if found.pressure is not None:
-            numbers["pressure"] = found.pressure
+        hertz = errors_of_solution(study, cell.mesh, solution, multipliers=multipliers)
+        numbers = {"slave": hertz.slave, "master": hertz.master, "displacement": hertz.displacement}
+        if hertz.pressure is not None:
+            numbers["pressure"] = hertz.pressure
         return _largest(numbers, forces=("slave", "master"), displacement=("displacement",), pressure=("pressure",))
 
     return Task(scene, start, None, errors)

@@ -19,7 +19,9 @@ from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
 from contactverif.studies.bench.journal import Journal
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
 
-Progress = Callable[[str, int, int], None]  # What comes next, the number of finished cells, the number of all.
+Progress = Callable[
+    [str, int, int], None
+]  # A function of the next cell in words, the number of finished cells, the number of all.
 
 
 def run_bench(

@@ -21,7 +21,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solution_of, solve_in_tries
 from contactverif.mechanics.newton import Trace
 from contactverif.studies.bench.bench_scenes import Task, is_solved, make_task
-from contactverif.studies.bench.meter import Meter, metered
+from contactverif.studies.bench.meter import Meter, add_meter
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
 
 
@@ -157,7 +157,7 @@ class _Runner:
 
     def _solve(self) -> tuple[Meter, tuple[Trace, ...], float]:
         meter, task = Meter(), self.task
-        formulation = metered(self.subject, task.case, meter)
+        formulation = add_meter(self.subject, task.case, meter)
         start = perf_counter()
         with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
             tries = solve_in_tries(task.scene, formulation, task.start, task.step)

@@ -84,7 +84,7 @@ class MeteredFormulation:
             self._meter.differencing = False
 
 
-def metered(subject: Subject, case: Case, meter: Meter) -> Any:
+def add_meter(subject: Subject, case: Case, meter: Meter) -> Any:
     """Return the formulation with the penalty of a case, as Newton's method needs it, timed by the meter."""
     plugin = MeteredPlugin(subject.for_case(case).plugin, meter)
     return MeteredFormulation(CheckedFormulation(plugin, subject.traits, subject.provides), meter)

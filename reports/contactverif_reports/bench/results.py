@@ -45,7 +45,7 @@ COUNTS = {
 
 
 class Outcome(IntEnum):
-    """How a run ended. The numbers are those of a file."""
+    """The end of a run. The numbers are those of a file."""
 
     SOLVED = 0
     NOT_SOLVED = 1
@@ -153,10 +153,10 @@ class BenchResults:
 
     def cells_of(self, scene: str, stiffness: float | None = None) -> BoolArray:
         """Return which cells (n_cells,) belong to a scene, if wanted at one penalty alone."""
-        chosen: BoolArray = np.array(
+        selection: BoolArray = np.array(
             [cell.scene == scene and stiffness in (None, cell.stiffness) for cell in self.cells], dtype=np.bool_
         )
-        return chosen
+        return selection
 
     def stiffnesses_of(self, scene: str) -> tuple[float, ...]:
         """Return the penalties of a scene, soft ones first."""

@@ -1,4 +1,4 @@
-"""Whether a formulation became slower since an earlier bench: by ratios, since seconds depend on the machine.
+"""Slowdowns since an earlier bench, told by ratios, since seconds depend on the machine.
 
 The time of each run counts in units of the yardstick, a fixed piece of work that was done in the same repeats. The
 ratio of a formulation is the median over all runs that both benches have; a quarter of the runs may be disturbed.

@@ -1,4 +1,4 @@
-"""What can be read from a bench: Pareto fronts, the time to reach an error, and performance profiles.
+"""Conclusions from a bench: Pareto fronts, the time to reach an error, and performance profiles.
 
 A run that fails counts with an infinite time and an infinite error, as COCO counts it; it is never left out.
 
@@ -75,8 +75,8 @@ def cost_ratio(results: BenchResults, formulation: str, scene: str, reference: s
     float
         The ratio; infinite if the formulation never reaches the error, NaN if the reference does not.
     """
-    own, other = (time_to_reach(results, name, scene, SENTENCE_TARGET) for name in (formulation, reference))
-    return own / other if isfinite(other) else np.nan
+    time, other = (time_to_reach(results, name, scene, SENTENCE_TARGET) for name in (formulation, reference))
+    return time / other if isfinite(other) else np.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,10 +126,10 @@ def pair_profiles(results: BenchResults, reference: str = REFERENCE) -> tuple[Pa
     reference : str
         The formulation to compare with.
     """
-    chosen = results.cells_of(RANDOM)
-    if reference not in results.formulations or not chosen.any():
+    selection = results.cells_of(RANDOM)
+    if reference not in results.formulations or not selection.any():
         return ()
-    times = {name: _times_of_accurate(results, name)[chosen] for name in results.formulations}
+    times = {name: _times_of_accurate(results, name)[selection] for name in results.formulations}
     profiles = []
     for name in results.formulations:
         if name != reference:

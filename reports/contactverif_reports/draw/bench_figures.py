@@ -166,9 +166,9 @@ def _draw_runs(axes: Axes, results: BenchResults, cells: Any, kind: str, edge: f
         errors = results.errors_of(name, kind)[cells]
         clipped = np.clip(errors, _LEAST_ERROR, None)
         axes.plot(times[solved], clipped[solved], linewidth=0.8, **pen)
-        lost = {**pen, "marker": "x", "linestyle": "none"}
+        cross = {**pen, "marker": "x", "linestyle": "none"}
         crashed = 1e3 * np.nanmax(results.fastest[:, cells, -1], initial=1e-3)  # A plugin that crashed has no time.
-        axes.plot(np.where(np.isnan(times), crashed, times)[~solved], np.full((~solved).sum(), edge), **lost)
+        axes.plot(np.where(np.isnan(times), crashed, times)[~solved], np.full((~solved).sum(), edge), **cross)
         times_of_all.append(np.where(solved, times, inf))
         errors_of_all.append(np.where(np.isnan(errors), inf, clipped))
     times, errors = np.concatenate(times_of_all), np.concatenate(errors_of_all)

@@ -64,7 +64,7 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         parts=PARTS,
         shares=[_shares(results, name) for name in results.formulations],
         counts=COUNTS,
-        lost=_lost(results),
+        failures=_list_failures(results),
         profiles=pair_profiles(results),
         profile=svg_inline(profile, "performance profiles") if profile is not None else "",
         changes=changes,
@@ -103,7 +103,7 @@ def _shares(results: BenchResults, name: str) -> tuple[str, list[str], list[str]
     return name, shares, [f"{mean:.3g}" for mean in results.counts[row, solved].mean(axis=0)]
 
 
-def _lost(results: BenchResults) -> list[tuple[str, int, str]]:
+def _list_failures(results: BenchResults) -> list[tuple[str, int, str]]:
     """Return formulation, number of runs without a solution, and how they ended."""
     rows = []
     for name in results.formulations:

@@ -129,7 +129,7 @@ def _results(tree: xr.DataTree) -> BenchResults:
     columns = (root[name].values.tolist() for name in ("scene", "mesh", "stiffness"))
     cells = tuple(Cell(scenes[scene], mesh, stiffness) for scene, mesh, stiffness in zip(*columns, strict=True))
     outcomes, remarks = root["outcome"].values.astype(np.int64), root["remark"].values
-    lost = np.argwhere(outcomes != Outcome.SOLVED).tolist()
+    unsolved = np.argwhere(outcomes != Outcome.SOLVED).tolist()
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     not_loaded = attributes["not_loaded"]
     structure = ("title", "bench_schema", "Conventions", "not_loaded")
@@ -143,7 +143,7 @@ def _results(tree: xr.DataTree) -> BenchResults:
         counts=root["count"].values.astype(np.int64),
         seconds=timing["seconds"].values,
         yardstick=timing["yardstick_seconds"].values,
-        remarks={(formulations[row], cell): _word(remarks[row, cell]) for row, cell in lost},
+        remarks={(formulations[row], cell): _word(remarks[row, cell]) for row, cell in unsolved},
         not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
