@@ -135,7 +135,7 @@ def _write(
 
         write_page(files.paths[PAGE], bench_page(results, changes))
     if MARKDOWN in files.paths:
-        from contactverif_reports.bench.markdown_page import bench_markdown
+        from contactverif_reports.bench.bench_text import bench_markdown
         from contactverif_reports.files import whole
 
         report = files.names[REPORT].name if REPORT in files.names else ""

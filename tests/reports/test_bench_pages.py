@@ -1,4 +1,4 @@
-"""What is read from a bench: fronts, times to reach an error, profiles, slowdowns, the file, the pictures, the page."""
+"""Conclusions from a bench, its file, pictures and pages: fronts, times to reach an error, profiles, slowdowns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from page_reader import complaints
 from studies.bench_results import make_results
 
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.bench.markdown_page import bench_markdown
+from contactverif_reports.bench.bench_text import bench_markdown
 from contactverif_reports.bench.results import Cell
 from contactverif_reports.bench.slowdown import slowdowns
 from contactverif_reports.bench.work_precision import (

@@ -21,19 +21,19 @@ def make_results(
     seconds = np.zeros((*shape, len(PARTS), 2))
     seconds[..., -1, :] = slower * times[..., None] * [1, 2]
     seconds[..., 0, :] = seconds[..., -1, :] / 4
-    lost = np.isinf(errors)
-    kinds = np.repeat(np.where(lost, np.nan, errors)[..., None], len(ERRORS), axis=-1)
+    unsolved = np.isinf(errors)
+    kinds = np.repeat(np.where(unsolved, np.nan, errors)[..., None], len(ERRORS), axis=-1)
     return BenchResults(
         formulations=tuple(runs),
         cells=tuple(cells),
         segments=np.full(len(cells), 6),
         unknowns=np.full(len(cells), 28),
-        outcomes=np.where(lost, int(Outcome.NOT_SOLVED), int(Outcome.SOLVED)),
+        outcomes=np.where(unsolved, int(Outcome.NOT_SOLVED), int(Outcome.SOLVED)),
         errors=kinds,
         counts=np.ones((*shape, len(COUNTS)), np.int64),
         seconds=seconds,
         yardstick=np.full((len(cells), 2), 0.5),
-        remarks={(list(runs)[row], int(cell)): "2-cycle" for row, cell in np.argwhere(lost).tolist()},
+        remarks={(list(runs)[row], int(cell)): "2-cycle" for row, cell in np.argwhere(unsolved).tolist()},
         not_loaded={"absent": "no such module"},
         provenance={"command": "contactverif bench", "seed": "0"},
     )

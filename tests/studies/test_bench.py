@@ -167,9 +167,9 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
     for target in (killed, unbroken):
         subprocess.run([*arguments, str(target)], env=environment, check=True, stdout=subprocess.DEVNULL)
     assert not journal.exists()
-    with xr.open_datatree(killed, engine="netcdf4") as one, xr.open_datatree(unbroken, engine="netcdf4") as other:
-        xr.testing.assert_identical(one.to_dataset().drop_attrs(), other.to_dataset().drop_attrs())
-        assert one["timing/seconds"].shape == other["timing/seconds"].shape
+    with xr.open_datatree(killed, engine="netcdf4") as resumed, xr.open_datatree(unbroken, engine="netcdf4") as other:
+        xr.testing.assert_identical(resumed.to_dataset().drop_attrs(), other.to_dataset().drop_attrs())
+        assert resumed["timing/seconds"].shape == other["timing/seconds"].shape
         record = json.loads(first)["record"]
-        stored = one["timing/yardstick_seconds"].values[0].tolist()
+        stored = resumed["timing/yardstick_seconds"].values[0].tolist()
     assert stored == record["yardstick"]  # What was measured before the kill was not measured again.

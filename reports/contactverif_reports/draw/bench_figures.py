@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from contactverif_reports.bench.markdown_page import COST_PICTURE, PROFILE_PICTURE, picture_of
+from contactverif_reports.bench.bench_text import COST_PICTURE, PROFILE_PICTURE, picture_of
 from contactverif_reports.bench.results import BenchResults, Outcome
 from contactverif_reports.bench.work_precision import (
     REFERENCE,

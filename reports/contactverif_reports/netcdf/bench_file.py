@@ -41,7 +41,9 @@ def bench_tree(results: BenchResults) -> xr.DataTree:
     """Return the file as a tree: the root, and the group `timing`."""
     attributes = {name: text(value) or NONE for name, value in results.provenance.items()}
     attributes |= {"title": TITLE, "bench_schema": BENCH_SCHEMA, "Conventions": "CF-1.11"}
-    attributes |= {"not_loaded": "\n".join(f"{name}: {text(why)}" for name, why in results.not_loaded.items()) or NONE}
+    attributes |= {
+        "not_loaded": "\n".join(f"{name}: {text(reason)}" for name, reason in results.not_loaded.items()) or NONE
+    }
     return xr.DataTree.from_dict(
         {"/": xr.Dataset(_labels(results) | _runs(results), attrs=attributes), "/timing": _timing(results)}
     )
