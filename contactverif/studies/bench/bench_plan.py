@@ -61,14 +61,8 @@ def make_plan(
     MisuseError
         If there is no such scene, or a number is too small.
     """
-    for scene in scenes:
-        if scene not in SCENES:
-            raise MisuseError("--scene", repr(scene), f"one of {', '.join(SCENES)}")
-    if repeats < 1:
-        raise MisuseError("--repeats", f"{repeats}", "at least 1")
     count = (QUICK_RANDOM if quick else N_RANDOM) if n_random is None else n_random
-    if count < 0:
-        raise MisuseError("--random", f"{count}", "at least 0")
+    _check_numbers(scenes, repeats, count)
     cells: list[Cell] = []
     for scene, (meshes, penalties) in GRID.items():
         if not scenes or scene in scenes:
@@ -79,3 +73,14 @@ def make_plan(
     if not cells:
         raise MisuseError("--random", "0 random scenes and no other", "at least one scene")
     return BenchPlan(tuple(cells), repeats)
+
+
+def _check_numbers(scenes: Sequence[str], repeats: int, count: int) -> None:
+    """Refuse scenes that there are not, and numbers that are too small."""
+    for scene in scenes:
+        if scene not in SCENES:
+            raise MisuseError("--scene", repr(scene), f"one of {', '.join(SCENES)}")
+    if repeats < 1:
+        raise MisuseError("--repeats", f"{repeats}", "at least 1")
+    if count < 0:
+        raise MisuseError("--random", f"{count}", "at least 0")

@@ -10,7 +10,7 @@ Dolan & Moré, Math. Program. 91 (2002) 201–213 (performance profiles); Gould 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 
@@ -174,6 +174,11 @@ def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None
     ratios = {name: cost_ratio(results, name, scene) for name in others}
     if all(np.isnan(ratio) for ratio in ratios.values()):
         return f"On {scene}, {REFERENCE} does not reach an error of 1 % in the forces."
+    return _put_in_words(scene, ratios)
+
+
+def _put_in_words(scene: str, ratios: Mapping[str, float]) -> str:
+    """Return the sentence of the ratios {formulation: time over that of the reference}."""
     costs = [f"{name} {ratio:.2g}" for name, ratio in sorted(ratios.items(), key=lambda pair: pair[1]) if ratio < inf]
     never = [name for name, ratio in ratios.items() if ratio == inf]
     text = f"On {scene}, at an error of 1 % in the forces"
