@@ -78,20 +78,31 @@ def bench(
     from contactverif_reports.bench.slowdown import slowdowns
     from contactverif_reports.netcdf.bench_file import read_bench
 
-    old = None if against is None else read_bench(against)
-    if names and names[0].lower().endswith(REPORT):
-        if len(names) > 1 or all_:
-            raise MisuseError("NAME", f"{names[0]} and more", "formulations alone, or one file of a bench")
-        results = read_bench(names[0])
+    old = read_bench(against) if against else None
+    if file := _only_file(names or [], all_):
+        results = read_bench(file)
     else:
         results = _run(select_names(names or [], all_), scene or [], quick, repeats, files)
-        facts = {"command": shlex.join(["contactverif", *sys.argv[1:]]), "threads": "1" if pinned else "not set"}
-        results = replace(results, provenance={**results.provenance, **facts})
+        results = _with_facts(results, pinned)
     changes = () if old is None else slowdowns(results, old)
     _write(results, changes, files, folder)
     _show(results, changes, files, folder, compared=old is not None)
-    slower = any(change.slower for change in changes)
-    raise typer.Exit(1 if slower or results.not_loaded else 0)
+    raise typer.Exit(int(any(change.slower for change in changes) or bool(results.not_loaded)))
+
+
+def _with_facts(results: BenchResults, pinned: bool) -> BenchResults:
+    """Return the results with the command as it was typed, and the number of threads."""
+    facts = {"command": shlex.join(["contactverif", *sys.argv[1:]]), "threads": "1" if pinned else "not set"}
+    return replace(results, provenance={**results.provenance, **facts})
+
+
+def _only_file(names: list[str], every: bool) -> str:
+    """Return the file of a bench if it is named instead of formulations; empty if formulations are."""
+    if not names or not names[0].lower().endswith(REPORT):
+        return ""
+    if len(names) > 1 or every:
+        raise MisuseError("NAME", f"{names[0]} and more", "formulations alone, or one file of a bench")
+    return names[0]
 
 
 def pin_threads() -> bool:

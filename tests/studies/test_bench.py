@@ -19,7 +19,7 @@ from subjects import Changed, load_subject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.accuracy import solve_in_tries
 from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
 from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
 from contactverif.studies.bench.bench_scenes import make_task
@@ -63,18 +63,19 @@ def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: s
 
 
 def test_errors_are_those_of_the_properties() -> None:
+    """Properties keep the matrix of Newton's method, a bench does not: both are out of balance by 1e-9 at most."""
     study, subject = HertzStudy(parabola_is_slave=True, stiffness=10.0), load_subject("nts-ar")
     expected = hertz_errors(study, 16, subject)
     run = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"]
-    assert run.errors["forces"] == max(expected.slave, expected.master)
-    assert run.errors["pressure"] == expected.pressure
-    assert run.errors["displacement"] == expected.displacement
+    assert run.errors["forces"] == pytest.approx(max(expected.slave, expected.master), rel=1e-6)
+    assert run.errors["pressure"] == pytest.approx(expected.pressure, rel=1e-6)
+    assert run.errors["displacement"] == pytest.approx(expected.displacement, rel=1e-6)
 
 
 def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
     subject = load_subject("vts-ppt")
     task = make_task(WAVY, subject, 0)
-    trace = solve_for_accuracy(task.scene, subject, task.start, task.step).trace
+    (trace,) = solve_in_tries(task.scene, subject.for_case(task.case), task.start, task.step)
     counts = run_cell(WAVY, [subject], 1, 0).runs["vts-ppt"].counts
     assert list(counts) == list(COUNTS)
     assert counts["iterations"] == trace.n_iterations

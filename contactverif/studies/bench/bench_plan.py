@@ -61,15 +61,16 @@ def make_plan(
     MisuseError
         If there is no such scene, or a number is too small.
     """
-    count = (QUICK_RANDOM if quick else N_RANDOM) if n_random is None else n_random
+    usual = QUICK_RANDOM if quick else N_RANDOM
+    count = usual if n_random is None else n_random
     _check_numbers(scenes, repeats, count)
+    selection = tuple(scenes) or tuple(SCENES)
     cells: list[Cell] = []
     for scene, (meshes, penalties) in GRID.items():
-        if not scenes or scene in scenes:
+        if scene in selection:
             grid = (meshes[:QUICK_MESHES], penalties[1:2]) if quick else (meshes, penalties)
             cells += [Cell(scene, mesh, stiffness) for stiffness, mesh in product(grid[1], grid[0])]
-    if not scenes or RANDOM in scenes:
-        cells += [Cell(RANDOM, number, 1.0) for number in range(count)]
+    cells += [Cell(RANDOM, number, 1.0) for number in range(count * (RANDOM in selection))]
     if not cells:
         raise MisuseError("--random", "0 random scenes and no other", "at least one scene")
     return BenchPlan(tuple(cells), repeats)

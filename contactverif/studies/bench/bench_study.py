@@ -59,22 +59,33 @@ def run_bench(
     if not loaded:
         raise MisuseError("NAME", "no formulation that loads", "at least one")
     provenance = collect_provenance(profile="", examples=0, seed=plan.seed)
+    del provenance["profile"], provenance["examples"]  # A bench has neither.
     names = [subject.name for subject in loaded]
-    journal = None if output is None else Journal(output, _describe(plan, names, provenance))
+    journal = Journal(output, _describe(plan, names, provenance)) if output else None
+    records = _run_cells(loaded, plan, journal, progress or _show_nothing)
+    not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)}
+    return collect_results(names, plan, records, not_loaded, provenance)
+
+
+def _show_nothing(description: str, n_finished: int, n_planned: int) -> None:
+    """Take the progress of a bench that nobody looks at."""
+
+
+def _run_cells(
+    loaded: Sequence[Subject], plan: BenchPlan, journal: Journal | None, progress: Progress
+) -> list[CellRecord]:
+    """Return the records of all cells, those of the journal without running them again."""
     records = []
     for number, cell in enumerate(plan.cells):
-        if progress is not None:
-            progress(f"{cell.scene}, mesh {cell.mesh}, penalty {cell.stiffness:g}", number, len(plan.cells))
+        progress(f"{cell.scene}, mesh {cell.mesh}, penalty {cell.stiffness:g}", number, len(plan.cells))
         if journal is not None and number in journal.finished:
             records.append(CellRecord.from_dict(journal.finished[number]))
             continue
         records.append(run_cell(cell, loaded, plan.repeats, plan.seed))
         if journal is not None:
             journal.add(number, records[-1].as_dict())
-    if progress is not None:
-        progress("writing", len(plan.cells), len(plan.cells))
-    not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)}
-    return collect_results(names, plan, records, not_loaded, provenance)
+    progress("writing", len(plan.cells), len(plan.cells))
+    return records
 
 
 def collect_results(
@@ -111,15 +122,20 @@ def collect_results(
         counts=_array(rows, lambda run: [run.counts.get(name, 0) for name in COUNTS], np.int64),
         seconds=_array(rows, lambda run: [run.seconds.get(part, nothing) for part in PARTS], np.float64),
         yardstick=np.array([record.yardstick for record in records], np.float64),
-        remarks={
-            (name, number): run.remark
-            for name, row in zip(names, rows, strict=True)
-            for number, run in enumerate(row)
-            if run.outcome != Outcome.SOLVED
-        },
+        remarks=_list_remarks(names, rows),
         not_loaded=not_loaded,
-        provenance={name: value for name, value in provenance.items() if name not in ("profile", "examples")},
+        provenance=provenance,
     )
+
+
+def _list_remarks(names: Sequence[str], rows: list[list[RunRecord]]) -> dict[tuple[str, int], str]:
+    """Return {(formulation, number of the cell): how it ended} of the runs without a solution."""
+    return {
+        (name, number): run.remark
+        for name, row in zip(names, rows, strict=True)
+        for number, run in enumerate(row)
+        if run.outcome != Outcome.SOLVED
+    }
 
 
 def _array(rows: list[list[RunRecord]], entry: Callable[[RunRecord], Any], dtype: type) -> Any:

@@ -41,6 +41,7 @@ _PENALTY_NAMES = {
     "rings": "ε̂ = {:g}",
     "kinked": "ε̂ = {:g} E/ℓ",
 }
+_COST_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _STYLE: dict[Any, Any] = {"font.size": 8.0, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 4.0}
 
 
@@ -105,10 +106,9 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
 
 def make_cost_figure(results: BenchResults) -> Figure:
     """Return the time to an error of 1 % in the forces over that of the reference, by formulation and scene."""
+    ratios = _cost_ratios(results)
+    low, high = _cost_range(ratios)
     names = [name for name in results.formulations if name != REFERENCE]
-    ratios = {scene: {name: cost_ratio(results, name, scene) for name in names} for scene in results.scenes}
-    finite = [r for row in ratios.values() for r in row.values() if np.isfinite(r)] or [1.0]
-    low, high = min(0.5, min(finite) / 1.3), max(2.0, max(finite) * 1.3)
     order = sorted(names, key=lambda name: _rank([row[name] for row in ratios.values()]), reverse=True)
     with matplotlib.rc_context(_STYLE | {"font.size": 10.0, "lines.markersize": 6.5}):
         figure = Figure(figsize=(5.4, 1.5 + 0.25 * len(order)), layout="constrained")
@@ -117,12 +117,12 @@ def make_cost_figure(results: BenchResults) -> Figure:
         axes.axvspan(high * 1.15, never * 1.3, color="0.93")
         axes.axvline(1.0, color="0.35", linewidth=0.9)
         for (scene, row), marker, colour in zip(ratios.items(), _MARKERS, _COLOURS, strict=False):
-            places = [(min(row[name], never), place) for place, name in enumerate(order) if not np.isnan(row[name])]
+            values = np.minimum([row[name] for name in order], never)  # NaN, where the reference fails, is not drawn.
             hollow: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "none", "label": scene}
-            axes.plot(*zip(*places, strict=True) if places else ([], []), marker=marker, color=colour, **hollow)
+            axes.plot(values, range(len(order)), marker=marker, color=colour, **hollow)
         axes.set(xscale="log", xlim=(low, never * 1.3), ylim=(-0.7, len(order) - 0.3))
-        ticks = [tick for tick in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if low <= tick <= high]
-        axes.set_xticks([*ticks, never], [*(f"{tick:g}" for tick in ticks), "never"])
+        ticks = [tick for tick in _COST_TICKS if low <= tick <= high]
+        axes.set_xticks([*ticks, never], [*map("{:g}".format, ticks), "never"])
         axes.minorticks_off()
         axes.set_yticks(range(len(order)), order)
         axes.grid(color="0.92", linewidth=0.5)
@@ -155,6 +155,18 @@ def make_profile_figure(results: BenchResults) -> Figure | None:
         handles = [Line2D([], [], color="C3", label="formulation"), Line2D([], [], color="k", ls="--", label=REFERENCE)]
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
+
+
+def _cost_ratios(results: BenchResults) -> dict[str, dict[str, float]]:
+    """Return {scene: {formulation: time over that of the reference}}."""
+    names = [name for name in results.formulations if name != REFERENCE]
+    return {scene: {name: cost_ratio(results, name, scene) for name in names} for scene in results.scenes}
+
+
+def _cost_range(ratios: dict[str, dict[str, float]]) -> tuple[float, float]:
+    """Return the range of the axis, which holds all finite ratios and 1."""
+    finite = [ratio for row in ratios.values() for ratio in row.values() if np.isfinite(ratio)] or [1.0]
+    return min(0.5, min(finite) / 1.3), max(2.0, max(finite) * 1.3)
 
 
 def _draw_runs(axes: Axes, results: BenchResults, cells: Any, kind: str, edge: float) -> None:

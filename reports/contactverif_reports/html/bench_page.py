@@ -46,15 +46,14 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
 
     scenes = results.scenes
     profile = make_profile_figure(results)
-    with_reference = REFERENCE in results.formulations and len(results.formulations) > 1 and scenes
     return render(
         "bench.html.j2",
         results=results,
         reference=REFERENCE,
         titles=SCENES,
         scenes=scenes,
-        sentences=[text for scene in scenes if (text := cost_sentence(results, scene))],
-        cost=svg_inline(make_cost_figure(results), f"cost beside {REFERENCE}") if with_reference else "",
+        sentences=list(filter(None, (cost_sentence(results, scene) for scene in scenes))),
+        cost=svg_inline(make_cost_figure(results), f"cost beside {REFERENCE}") if _has_costs(results) else "",
         targets=[(kind, [_target_rows(results, scene, kind) for scene in scenes]) for kind in ERRORS],
         target_heads=[f"{target:g}" for target in TARGETS],
         figures=[
@@ -69,8 +68,18 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         profile=svg_inline(profile, "performance profiles") if profile is not None else "",
         changes=changes,
         n_repeats=results.seconds.shape[-1],
-        about={name.replace("_", " "): results.provenance[name] for name in _FACTS if results.provenance.get(name)},
+        about=_facts(results),
     )
+
+
+def _has_costs(results: BenchResults) -> bool:
+    """Return whether there is anything to compare the reference with."""
+    return REFERENCE in results.formulations and len(results.formulations) > 1 and bool(results.scenes)
+
+
+def _facts(results: BenchResults) -> dict[str, str]:
+    """Return the origin of the numbers, as far as a reader of the page wants to know it."""
+    return {name.replace("_", " "): results.provenance[name] for name in _FACTS if results.provenance.get(name)}
 
 
 def format_time(seconds: float) -> str:
