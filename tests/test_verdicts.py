@@ -314,6 +314,8 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
         "hard.convex-kink",
         "hard.free-end",
     }
+    # Their scenes have no solution, and nothing was stated about them.
+    assert {judged.pop(name) for name in ("accuracy.hertz", "stability.stiffness")} == {Verdict.UNDECIDED}
     others = {verdict for name, verdict in judged.items() if not name.startswith(("hard.", "projection."))}
     assert others == {Verdict.NOT_JUDGED, Verdict.NOT_APPLICABLE}
 
