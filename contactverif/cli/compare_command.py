@@ -9,7 +9,13 @@ from typing import Annotated, Any
 import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.shared_options import PlaceOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.cli.shared_options import (
+    PlaceOptions,
+    PropertyGlobs,
+    SamplingOptions,
+    WorkerOptions,
+    complete_formulation,
+)
 from contactverif.contract.errors import MisuseError
 
 
@@ -37,6 +43,7 @@ def compare(
         Path | None, typer.Option(help="Draw the meshes on which they differ into this folder.", metavar="FOLDER")
     ] = None,
     place: PlaceOptions,
+    workers: WorkerOptions,
 ) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
 
@@ -66,7 +73,7 @@ def compare(
     globs = properties or []
     reports = _reports_among(names or [])
     if reports:
-        _check_no_run_options(reference, sampling, place, pictures)
+        _check_no_run_options(reference, sampling, place, workers, pictures)
         nothing_worse = _compare_reports(reports, globs, out)
         raise typer.Exit(0 if nothing_worse else 1)
     scene, interface = place.make_scene(), place.read_interface()
@@ -77,7 +84,7 @@ def compare(
     from contactverif.cli.formulation_comparison import compare_formulations, load_contest
 
     contest = load_contest(names or [], reference, globs or ["*"])
-    promises_kept = compare_formulations(contest, sampling, interface, scene, files, folder)
+    promises_kept = compare_formulations(contest, sampling, workers, interface, scene, files, folder)
     raise typer.Exit(0 if promises_kept else 1)
 
 
@@ -123,7 +130,11 @@ def _is_report(name: str) -> bool:
 
 
 def _check_no_run_options(
-    reference: str | None, sampling: SamplingOptions, place: PlaceOptions, pictures: Path | None
+    reference: str | None,
+    sampling: SamplingOptions,
+    place: PlaceOptions,
+    workers: WorkerOptions,
+    pictures: Path | None,
 ) -> None:
     """Refuse the options of a run beside two reports, which have been judged already."""
     values: dict[str, Any] = {
@@ -136,6 +147,7 @@ def _check_no_run_options(
         "master": place.master,
         "flip": place.flip or None,
         "scene": place.scene,
+        "jobs": workers.jobs,
         "pictures": pictures,
     }
     for option, value in values.items():

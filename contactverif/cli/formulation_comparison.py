@@ -12,7 +12,7 @@ from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_lin
 from contactverif.cli.console import show, show_as_it_is
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.progress import Bar
-from contactverif.cli.shared_options import SamplingOptions
+from contactverif.cli.shared_options import SamplingOptions, WorkerOptions
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -23,6 +23,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
+from contactverif.run.workers import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing
@@ -82,6 +83,7 @@ def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]
 def compare_formulations(
     contest: Contest,
     sampling: SamplingOptions,
+    workers: WorkerOptions,
     interface: Interface | None,
     scene: Case | None,
     files: OutputFiles,
@@ -94,7 +96,9 @@ def compare_formulations(
     bool
         Whether every candidate keeps its promises.
     """
-    with Bar() as bar:
+    n_formulations = 1 + len(contest.candidates)
+    jobs = workers.number(n_formulations, len(contest.properties), sampling.planned_examples())
+    with worker_pool(jobs) as executor, Bar() as bar:
         study = run_comparison(
             contest.reference,
             contest.candidates,
@@ -105,6 +109,7 @@ def compare_formulations(
             interface=interface,
             scene=scene,
             progress=bar.show_progress,
+            executor=executor,
         )
     if REPORT in files.paths:  # before anything is shown, so that nothing that was judged is lost
         write(study.run, files.paths[REPORT])

@@ -31,6 +31,11 @@ PROFILE_HELP = (
     "nightly: 2000 cases, new ones in every run. (default: dev)"
 )
 
+JOBS_HELP = (
+    "Number of processes that share the work; the results are the same. "
+    "(default: one for each 1000 planned cases, at most one for each core)"
+)
+
 
 def complete_formulation(incomplete: str) -> list[str]:
     """Return the installed formulations whose name begins so, for the shell."""
@@ -67,6 +72,35 @@ class SamplingOptions:
     examples: Annotated[int | None, typer.Option(help="Number of random cases of each property.", metavar="N")] = None
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", metavar="N")] = None
     profile: Annotated[str | None, typer.Option(help=PROFILE_HELP, metavar="NAME")] = None
+
+    def planned_examples(self) -> int:
+        """Return the number of random cases of each property."""
+        from contactverif.run.profiles import profile_named
+
+        return self.examples or profile_named(self.profile or "dev").examples
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerOptions:
+    """The number of processes that share the work of a run."""
+
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help=JOBS_HELP, metavar="N")] = None
+
+    def number(self, n_formulations: int, n_properties: int, examples: int) -> int:
+        """Return the number of processes: the user's, or one that fits the work.
+
+        Raises
+        ------
+        MisuseError
+            If it is less than 1.
+        """
+        from contactverif.run.workers import default_jobs
+
+        if self.jobs is None:
+            return default_jobs(n_formulations * n_properties * examples)
+        if self.jobs < 1:
+            raise MisuseError("--jobs", str(self.jobs), "at least 1")
+        return self.jobs
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.shared_options import PlaceOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.cli.shared_options import (
+    PlaceOptions,
+    PropertyGlobs,
+    SamplingOptions,
+    WorkerOptions,
+    complete_formulation,
+)
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -46,6 +52,7 @@ def verify(
         typer.Option("--known", help="A known failure, with its reason. Repeatable.", metavar="ID=REASON"),
     ] = None,
     place: PlaceOptions,
+    workers: WorkerOptions,
 ) -> None:
     """Check every property of a formulation: print a table, draw what fails.
 
@@ -67,6 +74,7 @@ def verify(
     from contactverif.cli.run_tables import RunTable, summary
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import run
+    from contactverif.run.workers import worker_pool
 
     names = select_names(names or [], all_)
     files = OutputFiles.check(out, (REPORT, PAGE))
@@ -76,7 +84,8 @@ def verify(
     questions = load_properties(properties or ["*"])
     subjects = [load_formulation(name) for name in names]
     reasons = _known_failures(known or [])
-    with Bar() as bar:
+    jobs = workers.number(len(subjects), len(questions), sampling.planned_examples())
+    with worker_pool(jobs) as executor, Bar() as bar:
         result = run(
             subjects,
             questions,
@@ -87,6 +96,7 @@ def verify(
             scene=scene,
             known=reasons,
             progress=bar.show_progress,
+            executor=executor,
         )
     write_results(result, files)  # before anything is shown, so that nothing that was judged is lost
     show(RunTable(result))

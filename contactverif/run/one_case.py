@@ -8,7 +8,7 @@ from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.run import runner
+from contactverif.run import judging
 from contactverif.run.registry import load_formulation, load_properties
 
 
@@ -46,7 +46,7 @@ def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Out
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
         return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
-    return runner.judge_case(question, case, subject)
+    return judging.judge_case(question, case, subject)
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:

@@ -5,59 +5,34 @@ Rules for the next editor:
 - All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early.
 - The cases of a property depend on the seed and the property alone, neither on the formulation nor on other properties.
 - A finite list of named cases is planned whole, whatever the number of examples.
-- Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
+- The work is done in pieces (`pieces.py`), which any process may do in any order (`conductor.py`, `workers.py`).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import inf, sqrt
-from time import perf_counter
-from typing import Literal, cast
-
-import numpy as np
+from concurrent.futures import Executor
+from dataclasses import replace
 
 from contactverif.contract.case import Case
-from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
-from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
-from contactverif.contract.result import JUDGED_SHARE, NotLoaded, Row, Run
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, STATED_PARTS, Subject
-from contactverif.run.driver import SHRINK_CALLS, CaseSource, PlannedCases, draw_cases, shrink
+from contactverif.run.conductor import Conductor, Progress
+from contactverif.run.driver import CaseSource
+from contactverif.run.judging import judge_case
+from contactverif.run.open_row import OpenRow
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.sign_check import has_opposite_sign
-from contactverif.scenes.named_states import named_case
+from contactverif.run.sampling import Sampling
+from contactverif.run.witnesses import find_witness
+from contactverif.run.workers import Team
 
 __all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
-
-CLEAR_RATIO = 1000.0  # A shrunk case need not fail by more than this many tolerances.
-
-Phase = Literal["drawing", "judging", "shrinking"]
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """The progress of a run with one property of one formulation.
-
-    Attributes
-    ----------
-    formulation, property_id : str
-        The names on the command line.
-    phase : Phase
-        The kind of work.
-    count, planned : int
-        The numbers of finished cases and of all cases; shrinking may end early.
-    """
-
-    formulation: str
-    property_id: str
-    phase: Phase
-    count: int
-    planned: int
 
 
 def run(
@@ -71,6 +46,7 @@ def run(
     scene: Case | None = None,
     known: Mapping[str, str] | None = None,
     progress: Callable[[Progress], None] | None = None,
+    executor: Executor | None = None,
 ) -> Run:
     """Check every property of every formulation.
 
@@ -92,7 +68,11 @@ def run(
     known : Mapping[str, str] | None
         {property id: reason why its failure is known}.
     progress : Callable[[Progress], None] | None
-        A function that is called after every case.
+        A function that is called after every case; with an executor, after every piece.
+    executor : Executor | None
+        Worker processes that do the pieces of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
+        or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
+        process does all.
 
     Returns
     -------
@@ -103,6 +83,8 @@ def run(
     ------
     MisuseError
         If a known failure names no property of this run, or a name stands there twice.
+    WorkerError
+        If a worker process dies.
     """
     known = known or {}
     loaded = [subject for subject in subjects if isinstance(subject, Subject)]
@@ -112,20 +94,26 @@ def run(
     _check_known(known, properties)
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
-    plan = _Plan(
+    sampling = Sampling(
         examples=resolved.examples,
         seed=resolved.seed,
         interface=interface if scene is None else scene.interface,
         scene=scene,
-        known=known,
-        report_progress=progress or (lambda _: None),
-        cases={},
     )
+    sources = {question.id: sampling.source(question) for question in questions}
+    rows = [
+        _open(subject, question, sources[question.id], known=known.get(question.id, ""), on_scene=scene is not None)
+        for subject in loaded
+        for question in questions
+    ]
+    conductor = Conductor(sampling, Team(executor), progress or (lambda _: None))
+    conductor.check_signs(loaded, {question.id: question for question in questions})
+    conductor.judge([row for row in rows if isinstance(row, OpenRow)])
     return Run(
-        rows=tuple(_check_property(plan, subject, question) for subject in loaded for question in questions),
+        rows=tuple(conductor.close(row) if isinstance(row, OpenRow) else row for row in rows),
         not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
         provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
-        opposite_signs=tuple(subject.name for subject in loaded if has_opposite_sign(subject)),
+        opposite_signs=tuple(subject.name for subject in loaded if subject.name in conductor.opposite_signs),
         provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=resolved.seed),
     )
 
@@ -143,98 +131,16 @@ def _check_known(known: Mapping[str, str], properties: Sequence[Property | NotLo
             raise unknown_name_error("known failure", property_id, ids)
 
 
-def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
-    """Judge one case, a new one or one that was stored. Whatever the plugin does is an outcome.
-
-    Parameters
-    ----------
-    question : Property
-        The property to check.
-    case : Case
-        The case to check it on.
-    subject : Subject
-        The formulation.
-
-    Returns
-    -------
-    Outcome
-        Verdict, reason and numbers.
-
-    Raises
-    ------
-    Exception
-        Any error of the harness or the property itself, with the case as a note.
-    """
-    start = perf_counter()
-
-    def outcome(verdict: Verdict, reason: str, *, breach: bool = False) -> Outcome:
-        return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
-
-    try:
-        with np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
-            measurement = question.measure(case, subject)
-            verdict, reason = judge(question, measurement)
-    except PluginError as error:
-        kinds: dict[type, str] = {MemoryError: "memory", SystemExit: "exit"}
-        kind = kinds.get(type(error.__cause__), "exception")
-        return outcome(Verdict.CRASHED, f"{kind}: {error}")
-    except NonFiniteError as error:
-        return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
-    except ContractError as error:
-        return outcome(Verdict.FAIL, f"breaks the contract: {error}", breach=True)
-    except Exception as error:
-        error.add_note(f"while judging {question.id} of {subject.name} on {case!r}")
-        raise
-    return replace(outcome(verdict, reason), measurement=measurement)
-
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """The data that all rows of a run share; `cases` fills up with the cases of each property."""
-
-    examples: int
-    seed: int
-    interface: Interface | None
-    scene: Case | None
-    known: Mapping[str, str]
-    report_progress: Callable[[Progress], None]
-    cases: dict[str, PlannedCases]
-
-    def key(self, question: Property) -> str:
-        """Return the seed of a property, which does not depend on the other properties of the run."""
-        return f"{self.seed}/{question.id}"
-
-    def source(self, question: Property) -> CaseSource | None:
-        """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
-        if not question.bodies:
-            return cast("CaseSource | None", question.cases(self.interface))
-        if self.interface is not None and self.scene is None:
-            return None
-        return cast("CaseSource | None", question.cases(self.scene))
-
-    def progress(self, subject: Subject, question: Property, phase: Phase, planned: int) -> Callable[[int], None]:
-        """Return a function that reports how many cases are finished."""
-        return lambda count: self.report_progress(Progress(subject.name, question.id, phase, count, planned))
-
-    def planned_cases(self, source: CaseSource, subject: Subject, question: Property) -> tuple[PlannedCases, int]:
-        """Return the cases of the property, drawn once a run, and how many were planned."""
-        if question.id not in self.cases:
-            progress = self.progress(subject, question, "drawing", self.examples)
-            self.cases[question.id] = draw_cases(
-                source, seed=self.key(question), examples=self.examples, progress=progress
-            )
-        cases = self.cases[question.id]
-        return cases, len(cases.cases) if cases.exhausted else self.examples
-
-
-def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
-    """Return the row of one formulation and one property."""
+def _open(
+    subject: Subject, question: Property, source: CaseSource | None, *, known: str, on_scene: bool
+) -> OpenRow | Row:
+    """Return a row whose cases are to be judged, or the row itself if there is nothing to judge."""
     row = Row(
         formulation=subject.name,
         info=question.info,
         verdict=Verdict.PASS,
         promise=question.promise(subject.traits),
-        known=plan.known.get(question.id, ""),
+        known=known,
     )
     if reason := question.applicable(subject.traits):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
@@ -242,158 +148,12 @@ def _check_property(plan: _Plan, subject: Subject, question: Property) -> Row:
         promise = row.promise if missing & STATED_PARTS else None
         reason = f"{', '.join(sorted(missing))}: not provided"
         return replace(row, verdict=Verdict.NOT_PROVIDED, promise=promise, reason=reason)
-    source = plan.source(question)
     if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
-    if plan.scene is not None and row.promise is False:  # The formulation fails on some scene, not on every one.
+    if on_scene and row.promise is False:  # The formulation fails on some scene, not on every one.
         row = replace(row, promise=None)
     try:
-        witness = _witness(subject, question, source) if row.promise is False else None
+        witness = find_witness(subject, question, source) if row.promise is False else None
     except MisuseError as error:
         return replace(row, verdict=Verdict.CRASHED, reason=f"traits: {error}")
-    row = _judge_all(plan, subject, question, row, source, witness)
-    return replace(row, shrunk=_shrink(plan, source, subject, question, row))
-
-
-def _judge_all(
-    plan: _Plan,
-    subject: Subject,
-    question: Property,
-    row: Row,
-    source: CaseSource,
-    witness: Case | None,
-) -> Row:
-    """Return the row with the outcomes of all planned cases, and the verdict over them."""
-    cases, planned = plan.planned_cases(source, subject, question)
-    progress = plan.progress(subject, question, "judging", planned)
-    start = perf_counter()
-    outcomes = []
-    for case in cases.cases:
-        outcomes.append(judge_case(question, case, subject))
-        progress(len(outcomes))
-    row = replace(
-        row,
-        planned=planned,
-        outcomes=tuple(outcomes),
-        witness=None if witness is None else _judge_witness(question, witness, subject, outcomes),
-        seconds=perf_counter() - start,
-    )
-    verdict, reason = _verdict_over_all(row)
-    if verdict is Verdict.NOT_JUDGED and question.bodies and _may_stay_undecided(plan, row, source):
-        verdict = Verdict.UNDECIDED
-        reason = row.outcomes[0].reason or reason if plan.scene is not None else reason
-    return replace(row, verdict=verdict, reason=reason)
-
-
-def _may_stay_undecided(plan: _Plan, row: Row, source: CaseSource) -> bool:
-    """Return whether nobody promised that the scenes of a row can be decided.
-
-    It is so for the one scene that a user names, and for a list of scenes about which the formulation states nothing:
-    they may have no solution.
-    """
-    if plan.scene is not None:
-        return bool(row.outcomes) and not row.judged
-    return row.promise is None and row.undecided > 0 and isinstance(source, tuple)
-
-
-def _judge_witness(question: Property, witness: Case, subject: Subject, outcomes: Sequence[Outcome]) -> Outcome:
-    """Return the outcome of the witness, which a case of a finite list has already."""
-    judged = (outcome for outcome in outcomes if outcome.case_or_summary is witness)
-    return next(judged, None) or judge_case(question, witness, subject)
-
-
-def _witness(subject: Subject, question: Property, source: CaseSource) -> Case:
-    """Return the case that the traits name as a proof that the formulation fails.
-
-    It is a case of the property's own finite list, if that has one of this name, else a named state or scene.
-    """
-    name = subject.traits.witness(question.id)
-    if name is None:
-        raise MisuseError(
-            "witnesses", f"none for {question.id}, which {subject.name} says it does not pass", "the name of a case"
-        )
-    if isinstance(source, tuple) and (matches := [case for case in source if case.name == name]):
-        return matches[0]
-    if not question.bodies:
-        return named_case(name)
-    # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
-    from contactverif.scenes.catalogue import load_scene_case
-
-    return load_scene_case(name)
-
-
-def _verdict_over_all(row: Row) -> tuple[Verdict, str]:
-    """Return verdict and reason of a row from its outcomes."""
-    everything = [*row.outcomes, *([row.witness] if row.witness else [])]
-    worst = max(everything, key=lambda outcome: _badness(row.info, outcome), default=None)
-    if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
-        return worst.verdict, _reason_with_name(row, worst)
-    if row.judged < JUDGED_SHARE * row.planned:
-        cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
-        return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
-    if reason := _too_idle(row):
-        return Verdict.NOT_JUDGED, reason
-    return Verdict.PASS, ""
-
-
-def _too_idle(row: Row) -> str:
-    """Return why too few cases were in contact, or an empty string. One idle case may be chance; all of them is not."""
-    counts, least = row.tally.counts, row.info.least_contact
-    if not counts.idle or counts.contact_share >= least or (counts.idle == 1 and counts.judged > 1):
-        return ""
-    if counts.idle == counts.judged:
-        return "nothing was in contact in any case: nothing was judged"
-    return f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
-
-
-def _reason_with_name(row: Row, outcome: Outcome) -> str:
-    """Return the reason of an outcome, with the name of its case before it where a finite list has named it."""
-    name = outcome.case.name
-    return f"{name}: {outcome.reason}" if name and outcome is not row.witness else outcome.reason
-
-
-def _badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
-    """Return a key that orders outcomes: crashes, breaches of the contract, failures by how far beyond tolerance."""
-    if outcome.verdict is Verdict.CRASHED:
-        return 3, inf
-    if outcome.verdict is not Verdict.FAIL:
-        return 0, 0.0
-    if outcome.breach:
-        return 2, inf
-    if outcome.measurement is None or outcome.measurement.broken:
-        return 1, inf
-    return 1, max((number.ratio for number in checked_numbers(info, outcome.measurement)), default=inf)
-
-
-def _shrink(plan: _Plan, source: CaseSource, subject: Subject, question: Property, row: Row) -> Outcome | None:
-    """Return the smallest case that fails as badly as the worst random one; None if no random case failed.
-
-    Of a finite list of named cases it is the first that fails as badly.
-
-    It crashes if something crashed, and breaks the contract if something did. Of failures by a number it must be a
-    clear one, half-way on a logarithmic scale between the tolerance and the worst value: the smallest case that fails
-    at all often fails by a hair, and convinces nobody.
-    """
-    badness = [_badness(row.info, outcome) for outcome in row.outcomes]
-    kind, worst = max(badness, default=(0, 0.0))
-    if kind == 0:
-        return None
-    least = (kind, min(CLEAR_RATIO, sqrt(worst)) if kind == 1 else worst)
-    first = next(number for number, bad in enumerate(badness) if bad >= least and bad[0] == kind)
-    smallest = row.outcomes[first]
-    progress = plan.progress(subject, question, "shrinking", SHRINK_CALLS)
-    calls = 0
-
-    def fails(case: Case) -> bool:
-        nonlocal smallest, calls
-        calls += 1
-        progress(calls)
-        outcome = judge_case(question, case, subject)
-        bad = _badness(row.info, outcome)
-        if bad[0] != kind or bad < least:
-            return False
-        smallest = outcome
-        return True
-
-    shrink(source, seed=plan.key(question), examples=plan.examples, first=first, fails=fails)
-    return smallest
+    return OpenRow(row, subject, question, source, witness)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from math import inf, isnan
 from typing import Any
 
@@ -15,8 +16,10 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
+from contactverif.run.conductor import with_case
 from contactverif.run.profiles import Profile
 from contactverif.run.runner import Progress, run
+from contactverif.run.sampling import Sampling
 from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 
@@ -54,6 +57,7 @@ def run_comparison(
     interface: Interface | None = None,
     scene: Case | None = None,
     progress: Callable[[Progress], None] | None = None,
+    executor: Executor | None = None,
 ) -> Study:
     """Check every property of the reference and of the candidates, on the same cases.
 
@@ -75,6 +79,8 @@ def run_comparison(
         The scene to check on, as in `run`.
     progress : Callable[[Progress], None] | None
         A function that is called as the run advances, as in `run`.
+    executor : Executor | None
+        Worker processes, as in `run`.
 
     Returns
     -------
@@ -99,10 +105,33 @@ def run_comparison(
         interface=interface,
         scene=scene,
         progress=progress,
+        executor=executor,
     )
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    return Study(result, comparison, find_differing(result, comparison), measure_costs([reference, *loaded]))
+    differing = _with_cases(find_differing(result, comparison), properties, result, interface, scene)
+    return Study(result, comparison, differing, measure_costs([reference, *loaded]))
+
+
+def _with_cases(
+    every: Sequence[Differing],
+    properties: Sequence[Property | NotLoaded],
+    result: Run,
+    interface: Interface | None,
+    scene: Case | None,
+) -> tuple[Differing, ...]:
+    """Return the differing outcomes with their cases; a run of many examples does not keep them all."""
+    facts = result.provenance
+    place = interface if scene is None else scene.interface
+    sampling = Sampling(int(facts["examples"]), int(facts["seed"]), place, scene)
+    question_of = {question.id: question for question in properties if isinstance(question, Property)}
+    complete = []
+    for differing in every:
+        question, number = question_of[differing.info.id], differing.number
+        outcome = with_case(sampling, question, number, differing.outcome)
+        reference_outcome = replace(differing.reference_outcome, case_or_summary=outcome.case)
+        complete.append(replace(differing, outcome=outcome, reference_outcome=reference_outcome))
+    return tuple(complete)
 
 
 def find_differing(result: Run, comparison: Comparison) -> tuple[Differing, ...]:

@@ -17,7 +17,7 @@ from asking import Ask, asking
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
-from contactverif.run import runner
+from contactverif.run import judging
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import run
 from contactverif_reports.netcdf.differences import same_data
@@ -119,8 +119,8 @@ def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not
     ask: Ask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """VTS-PPT under trial says that it fails `balance.force`; a harness where nothing fails breaks that."""
-    judge = runner.judge_case
-    monkeypatch.setattr(runner, "judge_case", lambda *result: replace(judge(*result), verdict=Verdict.PASS, reason=""))
+    judge = judging.judge_case
+    monkeypatch.setattr(judging, "judge_case", lambda *result: replace(judge(*result), verdict=Verdict.PASS, reason=""))
     options = ("--examples", "3", "--seed", "1", "-p", "balance.force")
     answer = ask("vts-ppt", "--against", "vts-me", *options)
     assert answer.status == 1
@@ -234,7 +234,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     judged: list[Any] = []
-    monkeypatch.setattr(runner, "judge_case", lambda *anything: judged.append(anything))
+    monkeypatch.setattr(judging, "judge_case", lambda *anything: judged.append(anything))
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
     assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err

@@ -18,7 +18,7 @@ from contactverif.cli.gallery import MEANINGS
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import End
-from contactverif.run import runner
+from contactverif.run import judging
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.scenes.named_states import named_case
@@ -125,7 +125,7 @@ def test_a_mistake_is_one_line_and_nothing_is_solved(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(pictures, "solve", never)
-    monkeypatch.setattr(runner, "judge_case", never)
+    monkeypatch.setattr(judging, "judge_case", never)
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
     assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
@@ -257,13 +257,13 @@ def test_a_stored_interface_is_drawn_as_replay_does(ask: Ask, tmp_path: Path) ->
 
 def test_verify_asks_on_a_scene(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
     cases = []
-    real = runner.judge_case
+    real = judging.judge_case
 
     def judge(question: Any, case: Any, subject: Any) -> Any:
         cases.append(case)
         return real(question, case, subject)
 
-    monkeypatch.setattr(runner, "judge_case", judge)
+    monkeypatch.setattr(judging, "judge_case", judge)
     options = ("-p", "patch.flat.transmission", "--examples", "4", "--seed", "1")
     assert ask("verify", "vts-ppt", "--scene", "b:refine=2", *options).status == 0
     interface = load_scene("b:refine=2").interface

@@ -21,7 +21,7 @@ from contactverif.contract.property import Measurement, Outcome, Property, Quant
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run import runner
+from contactverif.run import witnesses as witnesses_module
 from contactverif.run.runner import PROFILES, Progress, judge_case, run
 
 ERROR = Quantity("error", "1", "1e-6", "a number for a test")
@@ -103,14 +103,15 @@ def witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
             raise MisuseError("case", repr(name), "C")
         return a_case(7, "C")
 
-    monkeypatch.setattr(runner, "named_case", find_case)
+    monkeypatch.setattr(witnesses_module, "named_case", find_case)
 
 
 def test_as_many_different_cases_are_judged_as_asked() -> None:
-    question = replace(ZERO, cases=lambda _: st.integers(1, 10**6).map(lambda seed: replace(a_case(1), seed=seed)))
+    penalties = st.integers(1, 10**6).map(float)
+    question = replace(ZERO, cases=lambda _: penalties.map(lambda penalty: replace(a_case(1), penalty=penalty)))
     row = one_row(subject(), question, examples=150)
     assert (row.verdict, row.planned, row.judged) == (Verdict.PASS, 150, 150)
-    assert len({outcome.case.seed for outcome in row.outcomes}) == 150
+    assert len({outcome.summary.penalty for outcome in row.outcomes}) == 150
     assert not row.unexpected
     assert row.shrunk is None
 
@@ -177,11 +178,11 @@ def test_all_planned_cases_are_judged_before_one_is_shrunk() -> None:
     log: list[Progress] = []
     row = one_row(subject(from_size(3)), progress=log.append)
     assert [step.phase for step in log] == sorted(
-        (step.phase for step in log), key=["drawing", "judging", "shrinking"].index
+        (step.phase for step in log), key=["first call (compiles)", "drawing", "judging", "shrinking"].index
     )
     judging = [step for step in log if step.phase == "judging"]
     assert [(step.count, step.planned) for step in judging] == [(count, 40) for count in range(1, 41)]
-    assert {(step.formulation, step.property_id) for step in log} == {("mine", "patch.zero")}
+    assert {(step.formulation, step.property_id) for step in judging} == {("mine", "patch.zero")}
     assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 20
 
 

@@ -1,0 +1,156 @@
+"""The pieces that a run is made of: draw the cases of a property, judge some, shrink one, call a formulation first.
+
+A piece is a plain function of data that can be pickled. It runs in the parent or in a worker process, with the same
+result. Rule for the next editor: a piece knows nothing of other pieces, and nothing outside is changed by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContractError
+from contactverif.contract.property import Outcome, Property
+from contactverif.contract.subject import Subject
+from contactverif.run import judging
+from contactverif.run.driver import draw_cases, shrink
+from contactverif.run.packing import CaseChunk
+from contactverif.run.sampling import Sampling
+from contactverif.run.sign_check import has_opposite_sign
+from contactverif.scenes.named_states import named_case
+
+CHUNK = 25  # The number of drawn cases that are judged in one piece.
+LIST_CHUNK = 5  # The same for named cases, which are often slower.
+
+Count = Callable[[int], None]  # It is called with the number of finished cases.
+Badness = tuple[int, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnCases:
+    """The drawn cases of a property.
+
+    Attributes
+    ----------
+    chunks : tuple[CaseChunk, ...]
+        The cases in order.
+    exhausted : bool
+        The strategy has no other cases.
+    """
+
+    chunks: tuple[CaseChunk, ...]
+    exhausted: bool
+
+    @property
+    def count(self) -> int:
+        """The number of cases."""
+        return sum(chunk.count for chunk in self.chunks)
+
+
+def draw_property(sampling: Sampling, question: Property, count: Count | None = None) -> DrawnCases:
+    """Draw the cases of a property."""
+    source = sampling.source(question)
+    assert source is not None
+    planned = draw_cases(source, seed=sampling.key(question), examples=sampling.examples, progress=count)
+    return DrawnCases(in_chunks(planned.cases, CHUNK), planned.exhausted)
+
+
+def in_chunks(cases: tuple[Case, ...], size: int) -> tuple[CaseChunk, ...]:
+    """Return cases in chunks of a size."""
+    return tuple(CaseChunk(cases[first : first + size]) for first in range(0, len(cases), size))
+
+
+def judge_chunk(
+    question: Property, subject: Subject, chunk: CaseChunk, count: Count | None = None
+) -> tuple[Outcome, ...]:
+    """Judge some cases; the outcomes hold summaries, because the parent has the cases."""
+    outcomes = []
+    for number, case in enumerate(chunk.cases, start=1):
+        outcome = judging.judge_case(question, case, subject)
+        outcomes.append(replace(outcome, case_or_summary=outcome.summary))
+        if count is not None:
+            count(number)
+    return tuple(outcomes)
+
+
+@dataclass(frozen=True, slots=True)
+class Shrinking:
+    """The goal of a search for the smallest case.
+
+    Attributes
+    ----------
+    first : int
+        The number of the first case that is bad enough.
+    kind : int
+        The kind of badness that the smallest case must have.
+    least : tuple[int, float]
+        The least badness that it must have.
+    """
+
+    first: int
+    kind: int
+    least: Badness
+
+
+def shrink_case(
+    sampling: Sampling, question: Property, subject: Subject, goal: Shrinking, count: Count | None = None
+) -> Outcome | None:
+    """Return the outcome of the smallest case that is bad enough; None if the search judged none."""
+    source = sampling.source(question)
+    assert source is not None
+    smallest: Outcome | None = None
+    calls = 0
+
+    def fails(case: Case) -> bool:
+        nonlocal smallest, calls
+        calls += 1
+        if count is not None:
+            count(calls)
+        outcome = judging.judge_case(question, case, subject)
+        bad = judging.badness(question.info, outcome)
+        if bad[0] != goal.kind or bad < goal.least:
+            return False
+        smallest = outcome
+        return True
+
+    shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    return smallest
+
+
+def call_first(subject: Subject, parts: Collection[str]) -> bool:
+    """Call a formulation for the first time, and return whether its forces have the opposite sign.
+
+    Parameters
+    ----------
+    subject : Subject
+        The formulation. Many compile their kernels in the first call.
+    parts : Collection[str]
+        The optional parts that the run will need; no other part is called.
+
+    Returns
+    -------
+    bool
+        As `has_opposite_sign` says. What else goes wrong here, the properties will say.
+    """
+    opposite = has_opposite_sign(subject)
+    case = named_case("c")
+    try:
+        with np.errstate(all="ignore"):
+            formulation = subject.for_case(case)
+            state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
+            pairing = formulation.pair(case.interface, state.z)
+            if "tangent" in parts:
+                formulation.tangent(case.interface, pairing, state.z)
+            if "contact_points" in parts:
+                formulation.contact_points(case.interface, pairing, state.z)
+    except ContractError:
+        pass
+    return opposite
+
+
+def needed_parts(questions: Mapping[str, Property], subject: Subject) -> frozenset[str]:
+    """Return the optional parts of a formulation that some property needs."""
+    return frozenset().union(*(question.needs for question in questions.values())) & subject.provides

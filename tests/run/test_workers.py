@@ -1,0 +1,161 @@
+"""The work of a run in several processes: the same results, and a clear end whatever happens to a worker."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Traits
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Outcome
+from contactverif.contract.result import Row, Run
+from contactverif.contract.subject import Subject
+from contactverif.run import workers
+from contactverif.run.packing import CaseChunk, pack, unpack
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import run
+from contactverif.run.workers import WorkerError, default_jobs, usable_cores, worker_pool
+from contactverif.scenes.named_states import named_case
+
+PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[Executor]:
+    with worker_pool(2) as executor:
+        assert executor is not None
+        yield executor
+
+
+class Ends:
+    """A formulation that ends its process."""
+
+    traits = Traits()
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        os._exit(0)
+
+
+def facts(result: Run) -> list[bytes]:
+    """Return all rows as bytes, without the seconds and without the meshes of those cases that all have."""
+
+    def timeless(outcome: Outcome | None, *, whole: bool = True) -> Any:
+        if outcome is None:
+            return None
+        case = outcome.case_or_summary if whole else outcome.summary
+        arrays = {name: array.tolist() for name, array in case.to_arrays().items()} if isinstance(case, Case) else case
+        return replace(outcome, seconds=0.0, case_or_summary=outcome.summary), arrays
+
+    def line(row: Row) -> bytes:
+        outcomes = [timeless(outcome) for outcome in row.outcomes]
+        return repr(
+            (row.formulation, row.property_id, row.verdict, row.reason, row.planned, row.promise)
+            + (outcomes, timeless(row.witness), timeless(row.shrunk))
+        ).encode()
+
+    return [line(row) for row in result.rows]
+
+
+def test_one_process_and_two_give_the_same_results_bit_by_bit(pool: Executor) -> None:
+    subjects = [load_formulation("vts-ppt"), load_formulation("nts")]
+    alone, shared = (
+        run(subjects, load_properties(PROPERTY_IDS), examples=30, seed=3, executor=executor)
+        for executor in (None, pool)
+    )
+    assert facts(alone) == facts(shared)
+    assert any(row.shrunk is not None for row in shared.rows)
+    assert any(row.witness is not None for row in shared.rows)
+
+
+def test_what_a_function_defines_runs_in_the_parent(pool: Executor) -> None:
+    processes = set()
+
+    class Local:
+        traits = Traits()
+
+        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+            processes.add(os.getpid())
+            return 0 * z
+
+    local = Subject("local", lambda *, penalty: Local())
+    result = run([local], load_properties(["balance.force"]), examples=10, seed=1, executor=pool)
+    assert processes == {os.getpid()}
+    assert result.rows[0].judged == 10
+
+
+def test_a_worker_that_dies_ends_the_run_with_one_clear_line() -> None:
+    ends = object.__new__(Subject)  # Its constructor would call nothing, but the run must not either.
+    ends.name, ends._make, ends.traits, ends.provides = "ends", Ends, Ends.traits, frozenset()
+    with pytest.raises(WorkerError, match="a worker process died"), worker_pool(2) as executor:
+        run([ends], load_properties(["balance.force"]), examples=10, seed=1, executor=executor)
+
+
+def test_an_executor_with_threads_is_refused() -> None:
+    with ThreadPoolExecutor(2) as threads, pytest.raises(MisuseError, match="executor: found a ThreadPoolExecutor"):
+        run([load_formulation("nts")], load_properties(["purity"]), examples=1, executor=threads)
+
+
+def test_the_default_number_of_jobs_follows_the_planned_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "usable_cores", lambda: 4)
+    assert default_jobs(10**6) == 1  # Here pytest runs.
+    for name in ("PYTEST_CURRENT_TEST", "PYTEST_XDIST_WORKER"):
+        monkeypatch.delenv(name, raising=False)
+    assert [default_jobs(planned) for planned in (100, 1999, 2000, 3000, 10**6)] == [1, 1, 2, 3, 4]
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system does not bind processes to cores")
+def test_only_the_cores_that_a_container_allows_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3})
+    assert usable_cores() == 1
+
+
+def test_what_travels_is_the_same_and_read_only_there() -> None:
+    (case,) = unpack(pack(CaseChunk([named_case("c-prime")]))).cases
+    before = named_case("c-prime")
+    assert {name: values.tobytes() for name, values in case.to_arrays().items()} == {
+        name: values.tobytes() for name, values in before.to_arrays().items()
+    }
+    for array in (case.z, case.interface.nodes, case.interface.slave.segments, *case.parameters.values()):
+        assert not array.flags.writeable
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.setflags(write=True)
+    (question,) = load_properties(["purity"])
+    assert unpack(pack(question)) is question
+    assert unpack(pack(np.empty((0, 2)))).shape == (0, 2)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signal")
+def test_an_interrupt_in_the_parent_ends_workers_that_hear_none_themselves(pool: Executor) -> None:
+    assert pool.submit(signal.getsignal, signal.SIGINT).result() is signal.SIG_IGN
+    before = set(multiprocessing.active_children())
+    started: set[BaseProcess] = set()
+
+    def interrupt() -> None:
+        with worker_pool(2) as executor:
+            assert executor is not None
+            executor.submit(signal.getsignal, signal.SIGINT).result()
+            executor.submit(signal.pause)  # It would never end.
+            started.update(set(multiprocessing.active_children()) - before)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    assert started
+    for worker in started:
+        worker.join()
+        assert worker.exitcode != 0
