@@ -22,7 +22,7 @@ from asking import Answer, Ask, asking
 from rich.cells import cell_len
 
 from contactverif.cli import app as cli
-from contactverif.run import registry, runner
+from contactverif.run import judging, registry
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_case
 
@@ -134,7 +134,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
     ask: Ask, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], message: str
 ) -> None:
     judged: list[Any] = []
-    monkeypatch.setattr(runner, "judge_case", lambda *anything: judged.append(anything))
+    monkeypatch.setattr(judging, "judge_case", lambda *anything: judged.append(anything))
     answer = ask(*arguments)
     assert (answer.status, answer.out) == (2, "")
     assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
