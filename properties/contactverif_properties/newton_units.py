@@ -119,9 +119,12 @@ class Units:
 
     def step(self, u: FloatArray) -> linear.Step:
         """Return the Newton step in the other units from the unknowns u (n,) in those of the scene."""
-        pairing = self.other.pair(u * self.factors)
-        matrix, floor = self.other.matrix(u * self.factors, pairing)
-        return self.other.step(matrix, -self.other.residual(u * self.factors, pairing), floor)
+        u = u * self.factors
+        pairing = self.other.pair(u)
+        # Asked as `solve` asks: forces of one call with the tangent may be rounded otherwise than forces alone.
+        forces, tangent = self.other.forces_and_tangent(u, pairing)
+        matrix, floor = self.other.assemble(u, pairing, forces, tangent)
+        return self.other.step(matrix, -self.other.balance(u, forces), floor)
 
     def compare_decisions(self, trace: Trace, number: int) -> str:
         """Return in words what differs in the other units at the iterate `number`, or an empty string."""
