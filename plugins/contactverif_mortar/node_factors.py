@@ -247,7 +247,7 @@ def _add_node_rows(
     places, weights = rule
     n_q = len(places)
     ends, d = np.empty((2, 4, 2)), np.empty((4, 4, 2))
-    d_gap, force = np.empty((2, 4, 2)), np.empty((2, 4))  # of the ends A and B of the slave segment
+    d_gap, force = np.empty((2, 4, 2)), np.empty((2, 4))  # Their rows are the ends A and B of the slave segment.
     for cell in range(len(cell_slave)):
         s, m = cell_slave[cell], cell_master[cell]
         view = slave_view(x, slave, s, -1, -1)
