@@ -1,0 +1,9 @@
+"""Types for the fixture `race` in conftest.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+Call = Callable[[], Any]
+Race = Callable[[Call, Call, str], None]  # A call, its reference, and what the reference is in words.
