@@ -165,6 +165,7 @@ def _show(
     """Print a table for each scene, the sentences, and the names of the files."""
     from contactverif.cli.bench_tables import slowdown_sentence, slowdown_table, targets_table
     from contactverif.cli.console import show
+    from contactverif_reports.bench.clocks import clock_sentences
     from contactverif_reports.bench.work_precision import cost_sentence
 
     for scene in results.scenes:
@@ -174,6 +175,8 @@ def _show(
     for scene in results.scenes:
         if sentence := cost_sentence(results, scene):
             show(sentence)
+    for sentence in clock_sentences(results):
+        show(sentence)
     for name, reason in results.not_loaded.items():
         show(f"{name} did not load: {reason}")
     if compared:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from asking import Ask, asking
 from studies.bench_results import make_results
+from subjects import Changed, load_subject
 
+from contactverif.contract.subject import Subject
+from contactverif.run import registry
+from contactverif.studies.bench import cell_runs, meter
 from contactverif_reports.bench.results import Cell
-from contactverif_reports.netcdf.bench_file import write_bench
+from contactverif_reports.bench.slowdown import slowdowns
+from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 QUICK = ("nts-ar", "vts-ppt", "--quick", "--scene", "wavy", "--repeats", "1")
 
@@ -66,3 +72,59 @@ def test_a_wrong_command_line_is_one_line(ask: Ask, arguments: list[str], messag
     assert answer.status == 2
     assert answer.err.startswith(f"contactverif: {message}")
     assert answer.err.count("\n") == 1
+
+
+class Counter:
+    """A clock without time: a reading is one tick, and a plugin says how many ticks its work takes."""
+
+    def __init__(self) -> None:
+        self.ticks = 0.0
+
+    def __call__(self) -> float:
+        self.ticks += 1e-6
+        return self.ticks
+
+
+@pytest.fixture
+def counter(monkeypatch: pytest.MonkeyPatch) -> Counter:
+    """Put a counter in the place of both clocks of a bench."""
+    clock = Counter()
+    monkeypatch.setattr(meter, "process_time", clock)
+    monkeypatch.setattr(cell_runs, "process_time", clock)
+    monkeypatch.setattr(cell_runs, "perf_counter", clock)
+    return clock
+
+
+def count_work(name: str, counter: Counter, work: float) -> Subject:
+    """Return a formulation whose forces and tangents take so much work by the counter."""
+
+    def make(*, penalty: float) -> Any:
+        inner = load_subject(name).with_penalty(penalty).plugin
+
+        def with_work(verb: Any) -> Any:
+            def call(*arguments: Any) -> Any:
+                counter.ticks += work
+                return verb(*arguments)
+
+            return call
+
+        verbs = ("residual", "tangent", "residual_and_tangent")
+        return Changed(inner, **{verb: with_work(getattr(inner, verb)) for verb in verbs if hasattr(inner, verb)})
+
+    return Subject(name, make)
+
+
+@pytest.mark.parametrize(("factor", "status"), [(1.0, 0), (1.2, 0), (1.5, 1)])
+def test_a_formulation_that_does_more_work_is_found_end_to_end(
+    ask: Ask, counter: Counter, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, factor: float, status: int
+) -> None:
+    works = {"vts-ppt": 1e-3, "nts-ar": 1e-3}
+    monkeypatch.setattr(registry, "load_formulation", lambda name: count_work(name, counter, works[name]))
+    assert ask(*QUICK, "--out", tmp_path / "old.nc").status == 0
+    works["vts-ppt"] *= factor
+    answer = ask(*QUICK, "--out", tmp_path / "new.nc", "--against", tmp_path / "old.nc")
+    assert answer.status == status, answer.out + answer.err
+    new, old = (read_bench(tmp_path / f"{name}.nc") for name in ("new", "old"))
+    ratios = {change.formulation: change.ratio for change in slowdowns(new, old)}
+    assert ratios == {"vts-ppt": pytest.approx(factor, rel=0.05), "nts-ar": pytest.approx(1, rel=0.05)}
+    assert ("Slower than 1.25 times: vts-ppt." if status else "Nothing became slower.") in answer.out

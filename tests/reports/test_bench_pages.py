@@ -13,6 +13,7 @@ from studies.bench_results import make_results
 
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.bench_text import bench_markdown
+from contactverif_reports.bench.clocks import clock_sentences
 from contactverif_reports.bench.results import Cell
 from contactverif_reports.bench.slowdown import slowdowns
 from contactverif_reports.bench.work_precision import (
@@ -84,12 +85,25 @@ def test_a_slowdown_is_a_ratio_to_the_yardstick() -> None:
     assert not any(change.slower for change in slowdowns(machine, RESULTS))
 
 
+@pytest.mark.parametrize(
+    ("wall", "words"), [(1.0, ""), (1.9, ""), (3.0, "works in other processes"), (0.5, "uses several threads")]
+)
+def test_what_the_clock_of_the_processor_does_not_show_is_said(wall: float, words: str) -> None:
+    """One undisturbed repeat is enough to tell a busy machine from a plugin that waits."""
+    results = make_results(CELLS, RUNS)
+    results.wall[:] *= wall
+    assert [words in sentence for sentence in clock_sentences(results)] == [True] * len(RUNS) * bool(words)
+    if wall > 1:
+        results.wall[:, 0, 0] /= wall
+        assert clock_sentences(results) == []
+
+
 def test_the_file_holds_everything(tmp_path: Path) -> None:
     write_bench(RESULTS, tmp_path / "a.nc")
     again = read_bench(tmp_path / "a.nc")
     for name in ("formulations", "cells", "remarks", "not_loaded", "provenance"):
         assert getattr(again, name) == getattr(RESULTS, name), name
-    for name in ("segments", "unknowns", "outcomes", "errors", "counts", "seconds", "yardstick"):
+    for name in ("segments", "unknowns", "outcomes", "errors", "counts", "seconds", "wall", "yardstick"):
         np.testing.assert_array_equal(getattr(again, name), getattr(RESULTS, name), name)
 
 

@@ -32,6 +32,7 @@ def make_results(
         errors=kinds,
         counts=np.ones((*shape, len(COUNTS)), np.int64),
         seconds=seconds,
+        wall=seconds[:, :, -1].copy(),
         yardstick=np.full((len(cells), 2), 0.5),
         remarks={(list(runs)[row], int(cell)): "2-cycle" for row, cell in np.argwhere(unsolved).tolist()},
         not_loaded={"absent": "no such module"},

@@ -121,6 +121,7 @@ def collect_results(
         errors=_array(rows, lambda run: [run.errors.get(kind, nan) for kind in ERRORS], np.float64),
         counts=_array(rows, lambda run: [run.counts.get(name, 0) for name in COUNTS], np.int64),
         seconds=_array(rows, lambda run: [run.seconds.get(part, nothing) for part in PARTS], np.float64),
+        wall=_array(rows, lambda run: run.wall or nothing, np.float64),
         yardstick=np.array([record.yardstick for record in records], np.float64),
         remarks=_list_remarks(names, rows),
         not_loaded=not_loaded,

@@ -1,14 +1,17 @@
 """The clock and the counters around a plugin, while Newton's method calls it.
 
 The plugin itself is timed, without the checks of the harness. Whatever verb Newton's method uses is seen, because every
-call passes through here. Rule for the next editor: a call costs two readings of the clock and nothing else.
+call passes through here. The clock is that of the processor, because a program beside this one may take the core away
+in the middle of a call.
+
+Rule for the next editor: a call costs two readings of the clock and nothing else.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -43,11 +46,11 @@ class Meter:
 
     def call(self, part: str, verb: Callable[..., Any], *arguments: Any) -> Any:
         """Call a verb of the plugin and book its time and its states."""
-        start = perf_counter()
+        start = process_time()
         try:
             return verb(*arguments)
         finally:
-            elapsed = perf_counter() - start
+            elapsed = process_time() - start
             part = "differences" if self.differencing else part
             self.seconds[part] += elapsed
             state = np.shape(arguments[-1])  # Forces may be wanted at a batch of states z (..., n_unknowns).

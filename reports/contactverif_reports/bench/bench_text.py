@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import isinf, isnan
 
+from contactverif_reports.bench.clocks import clock_sentences
 from contactverif_reports.bench.results import SCENES, BenchResults
 from contactverif_reports.bench.work_precision import (
     REFERENCE,
@@ -37,15 +38,16 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
     facts = results.provenance
     version, commit = (facts.get(name, "unknown") for name in ("contactverif_version", "commit"))
     n_repeats = results.seconds.shape[-1]
+    costs = filter(None, (cost_sentence(results, scene) for scene in results.scenes))
     parts = [
         "# Speed against error",
         f"`{facts.get('command', '')}`",
         f"The command above wrote these files with contactverif {version}, commit {commit}.",
         "Each formulation solves the same scenes, whose exact solution is known, on meshes fine and coarse and at "
-        f"penalties soft to stiff. All take turns, {n_repeats} times, on one thread; the least time of a run counts. "
-        "The time is that of a whole solution by Newton's method, from the first iterate to the last. Bodies are "
-        "condensed before.",
-        "\n".join(f"- {text}" for scene in results.scenes if (text := cost_sentence(results, scene))),
+        f"penalties soft to stiff. All take turns, {n_repeats} times, on one thread; the least time of a run counts, "
+        "in seconds of the processor. The time is that of a whole solution by Newton's method, from the first iterate "
+        "to the last. Bodies are condensed before.",
+        "\n".join(f"- {text}" for text in [*costs, *clock_sentences(results)]),
     ]
     if with_pictures:
         parts.append(f"![Time to an error of 1 % in the forces, over that of {REFERENCE}]({COST_PICTURE})")

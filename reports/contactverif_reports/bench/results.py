@@ -95,7 +95,9 @@ class BenchResults:
     counts : IntArray, shape (n_formulations, n_cells, n_counts)
         The counts, in the order of `COUNTS`.
     seconds : FloatArray, shape (n_formulations, n_cells, n_parts, n_repeats)
-        The time of each part in each repeat, in the order of `PARTS`; NaN where the plugin crashed.
+        The processor's time of each part in each repeat, in the order of `PARTS`; NaN where the plugin crashed.
+    wall : FloatArray, shape (n_formulations, n_cells, n_repeats)
+        The time of each repeat by the wall clock; NaN where the plugin crashed, or an old file has none.
     yardstick : FloatArray, shape (n_cells, n_repeats)
         The time of a fixed piece of work that was done in the same repeats.
     remarks : Mapping[tuple[str, int], str]
@@ -114,6 +116,7 @@ class BenchResults:
     errors: FloatArray
     counts: IntArray
     seconds: FloatArray
+    wall: FloatArray
     yardstick: FloatArray
     remarks: Mapping[tuple[str, int], str]
     not_loaded: Mapping[str, str]

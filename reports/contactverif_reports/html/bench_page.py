@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from contactverif_reports.bench.clocks import clock_sentences
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Outcome
 from contactverif_reports.bench.slowdown import Slowdown
 from contactverif_reports.bench.work_precision import (
@@ -53,6 +54,7 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         titles=SCENES,
         scenes=scenes,
         sentences=list(filter(None, (cost_sentence(results, scene) for scene in scenes))),
+        clocks=clock_sentences(results),
         cost=svg_inline(make_cost_figure(results), f"cost beside {REFERENCE}") if _has_costs(results) else "",
         targets=[(kind, [_target_rows(results, scene, kind) for scene in scenes]) for kind in ERRORS],
         target_heads=[f"{target:g}" for target in TARGETS],

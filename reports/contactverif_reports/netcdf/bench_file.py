@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
@@ -115,7 +116,10 @@ def _timing(results: BenchResults) -> xr.Dataset:
     table = {
         "part": words(["part"], list(PARTS), "part of the time", parts),
         "seconds": numbers(
-            [*_RUN, "part", "repeat"], results.seconds, "time of each repeat", SECONDS, "NaN where the plugin crashed"
+            [*_RUN, "part", "repeat"], results.seconds, "processor time of each repeat", SECONDS, "NaN where it crashed"
+        ),
+        "wall_seconds": numbers(
+            [*_RUN, "repeat"], results.wall, "time of each repeat by the wall clock", SECONDS, "NaN where it crashed"
         ),
         "yardstick_seconds": numbers(
             ["cell", "repeat"], results.yardstick, "time of a fixed piece of work in the same repeats", SECONDS
@@ -144,11 +148,19 @@ def _results(tree: xr.DataTree) -> BenchResults:
         errors=root["error"].values,
         counts=root["count"].values.astype(np.int64),
         seconds=timing["seconds"].values,
+        wall=_wall(timing),
         yardstick=timing["yardstick_seconds"].values,
         remarks={(formulations[row], cell): _word(remarks[row, cell]) for row, cell in unsolved},
         not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
+
+
+def _wall(timing: xr.Dataset) -> FloatArray:
+    """Return the times by the wall clock; NaN from a file whose only clock it was."""
+    nothing = np.full_like(timing["seconds"].values[:, :, -1], np.nan)
+    wall: FloatArray = timing["wall_seconds"].values if "wall_seconds" in timing else nothing
+    return wall
 
 
 def _word(value: Any) -> str:
