@@ -85,7 +85,7 @@ def bench(
         results = _run(select_names(names or [], all_), scene or [], quick, repeats, files)
         results = _with_facts(results, pinned)
     changes = () if old is None else slowdowns(results, old)
-    _write(results, changes, files, folder)
+    _write(results, changes, files, folder, file)
     _show(results, changes, files, folder, compared=old is not None)
     raise typer.Exit(int(any(change.slower for change in changes) or bool(results.not_loaded)))
 
@@ -127,9 +127,13 @@ def _run(names: list[str], scenes: list[str], quick: bool, repeats: int, files: 
 
 
 def _write(
-    results: BenchResults, changes: tuple[Slowdown, ...], files: OutputFiles, folder: PictureFolder | None
+    results: BenchResults,
+    changes: tuple[Slowdown, ...],
+    files: OutputFiles,
+    folder: PictureFolder | None,
+    file: str,
 ) -> None:
-    """Write the files that the user wants, before anything is shown."""
+    """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
         from contactverif.studies.bench.journal import journal_of
         from contactverif_reports.netcdf.bench_file import write_bench
@@ -149,7 +153,7 @@ def _write(
         from contactverif_reports.bench.bench_text import bench_markdown
         from contactverif_reports.files import whole
 
-        report = files.names[REPORT].name if REPORT in files.names else ""
+        report = (files.names.get(REPORT) or Path(file)).name
         with whole(files.paths[MARKDOWN]) as part:
             part.write_text(bench_markdown(results, report, folder is not None), encoding="utf-8")
 

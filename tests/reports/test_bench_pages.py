@@ -19,6 +19,7 @@ from contactverif_reports.bench.slowdown import slowdowns
 from contactverif_reports.bench.work_precision import (
     cost_ratio,
     cost_sentence,
+    figure_sentence,
     pair_profiles,
     pareto_front,
     time_to_reach,
@@ -126,6 +127,47 @@ def test_a_run_without_a_solution_is_drawn_at_the_edge() -> None:
     crosses = [line for line in panel.lines if line.get_marker() == "x" and len(line.get_xdata())]
     assert [line.get_ydata().tolist() for line in crosses] == [[edge]]
     assert edge > 0.25
+
+
+def test_many_formulations_have_a_panel_each_with_their_failures_at_the_edge() -> None:
+    many = make_results(
+        CELLS, {f"f{n}": RUNS["poor" if n == 1 else "quick"] for n in range(7)} | {"vts-ppt": RUNS["vts-ppt"]}
+    )
+    figure = make_work_precision_figure(many, "wavy")
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in shown] == list(many.formulations)
+    (edge,) = {
+        line.get_ydata()[0]
+        for axes in shown
+        for line in axes.lines
+        if line.get_marker() == "None" and len(set(line.get_ydata())) == 1
+    }
+    crosses = {
+        axes.get_title(): line.get_ydata().tolist()
+        for axes in shown
+        for line in axes.lines
+        if line.get_marker() == "x" and len(line.get_xdata())
+    }
+    assert crosses == {"f1": [edge]}
+
+
+def test_sentences_about_many_formulations_stay_short() -> None:
+    many = make_results(CELLS, {f"f{n}": RUNS["quick"] for n in range(8)} | {"vts-ppt": RUNS["vts-ppt"]})
+    assert "f4 0.5, 3 more up to 0.5." in cost_sentence(many, "wavy")
+    none = make_results(CELLS, {f"f{n}": RUNS["poor"] for n in range(8)} | {"vts-ppt": RUNS["vts-ppt"]})
+    assert cost_sentence(none, "wavy").endswith("in the forces; 8 of 9 formulations never get there.")
+
+
+def test_the_caption_says_who_is_exact_and_who_is_first() -> None:
+    assert figure_sentence(RESULTS, "wavy") == (
+        "The smallest error of the forces is 0.004, by vts-ppt; quick is the first of 2 to reach 1 %, after 1e+03 ms."
+    )
+    poor = make_results(CELLS, {"poor": RUNS["poor"]})
+    assert (
+        figure_sentence(poor, "wavy") == "The smallest error of the forces is 0.2, by poor; no formulation reaches 1 %."
+    )
+    nothing = make_results(CELLS, {"poor": [(1.0, inf)] * len(CELLS)})
+    assert figure_sentence(nothing, "wavy") == "No formulation has an error of the forces on wavy."
 
 
 def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from contactverif_reports.bench.work_precision import (
     TARGETS,
     cost_ratio,
     cost_sentence,
+    figure_sentence,
     pair_profiles,
     time_to_reach,
 )
@@ -57,7 +58,7 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
         parts.append(f"### {title}")
         if with_pictures:
             parts.append(f"![Error of the forces against time: {SCENES[scene]}]({picture_of(scene)})")
-        parts.append(_table(results, scene))
+        parts += [figure_sentence(results, scene), _table(results, scene)]
     parts.append(_profiles(results, with_pictures))
     if report:
         parts.append(
@@ -68,9 +69,9 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
 
 
 _HOW_TO_READ = (
-    "A line is one formulation on finer and finer meshes. A run without a solution is a cross at the upper edge. The "
-    "grey steps are the Pareto front. The tables say how long the cheapest run takes whose error of the nodal forces "
-    "is at most the number above, in milliseconds; ∞ where no run gets there."
+    "A line is one formulation at one penalty on finer and finer meshes. A run without a solution is a cross at the "
+    "upper edge. The grey steps are the Pareto front of all formulations. The tables say how long the cheapest run "
+    "takes whose error of the nodal forces is at most the number above, in milliseconds; ∞ where no run gets there."
 )
 
 

@@ -21,7 +21,9 @@ from contactverif_reports.bench.results import RANDOM, BenchResults
 
 REFERENCE = "vts-ppt"
 TARGETS = (1e-1, 1e-2, 1e-3)
+MOST_NAMES = 6  # A sentence names no more formulations than these; the table has all.
 SENTENCE_TARGET = 1e-2  # The error of the sentence that says who costs how much.
+ROUNDOFF = 1e-12  # Smaller errors are roundoff.
 ACCURATE = 1e-2  # A random scene is solved if the error of the forces is at most this.
 
 
@@ -182,8 +184,38 @@ def _put_in_words(scene: str, ratios: Mapping[str, float]) -> str:
     costs = [f"{name} {ratio:.2g}" for name, ratio in sorted(ratios.items(), key=lambda pair: pair[1]) if ratio < inf]
     never = [name for name, ratio in ratios.items() if ratio == inf]
     text = f"On {scene}, at an error of 1 % in the forces"
+    if len(costs) > MOST_NAMES:
+        last = costs[-1].rpartition(" ")[2]
+        costs[MOST_NAMES - 1 :] = [f"{len(costs) - MOST_NAMES + 1} more up to {last}"]
     if costs:
         text += f", the time over that of {REFERENCE} is: {', '.join(costs)}"
-    if never:
+    if len(never) > MOST_NAMES:
+        text += f"; {len(never)} of {len(ratios) + 1} formulations never get there"
+    elif never:
         text += f"; {', '.join(never)} never get there" if len(never) > 1 else f"; {never[0]} never gets there"
     return f"{text}."
+
+
+def figure_sentence(results: BenchResults, scene: str, kind: str = "forces") -> str:
+    """Return one sentence on what a figure of error against time shows: who is exact, and who is quick.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench.
+    scene, kind : str
+        The scene and the kind of error.
+    """
+    cells = results.cells_of(scene)
+    best = {name: float(np.fmin.reduce(results.errors_of(name, kind)[cells])) for name in results.formulations}
+    best = {name: inf if np.isnan(error) else error for name, error in best.items()}
+    exact = min(best, key=lambda name: best[name])
+    if best[exact] == inf:
+        return f"No formulation has an error of the {kind} on {scene}."
+    text = f"The smallest error of the {kind} is {max(best[exact], ROUNDOFF):.1g}, by {exact}"
+    times = {name: time_to_reach(results, name, scene, SENTENCE_TARGET, kind) for name in results.formulations}
+    quick = min(times, key=lambda name: times[name])
+    if times[quick] == inf:
+        return f"{text}; no formulation reaches 1 %."
+    n_reached = sum(time < inf for time in times.values())
+    return f"{text}; {quick} is the first of {n_reached} to reach 1 %, after {1e3 * times[quick]:.3g} ms."

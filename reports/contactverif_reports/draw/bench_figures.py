@@ -28,12 +28,14 @@ from contactverif_reports.bench.work_precision import (
     pair_profiles,
     pareto_front,
 )
+from contactverif_reports.draw.bench_multiples import hide_empty_panels, make_multiples_figure
 from contactverif_reports.draw.case_figure import save
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8B4513")  # Okabe and Ito's, and brown.
 _MARKERS = "os^vDPX"
 _DASHES = ("-", "--", ":")
 _LEAST_ERROR = 1e-12  # Errors below are roundoff, and are drawn here.
+_MOST_IN_A_PANEL = 6  # More curves than these cannot be told apart.
 _EDGE = 0.07  # Failed runs are drawn above the largest error, by this share of the range of log errors, and a half.
 _PENALTY_NAMES = {
     "wavy": "ε̂ = {:g} E/h",
@@ -63,7 +65,9 @@ def draw_bench(results: BenchResults, folder: Path) -> None:
 
 
 def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "forces") -> Figure:
-    """Return error against time of one scene, a panel for each penalty, with the Pareto front.
+    """Return error against time of one scene with the Pareto front.
+
+    There is a panel for each penalty; of many formulations there is a panel for each instead.
 
     Parameters
     ----------
@@ -75,13 +79,16 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
         The kind of error.
     """
     stiffnesses, n_names = results.stiffnesses_of(scene), len(results.formulations)
+    low, high = _error_range(results, scene, kind)
+    edge = 1.5 * high * (high / low) ** _EDGE
+    if n_names > _MOST_IN_A_PANEL:
+        penalties = {stiffness: _PENALTY_NAMES[scene].format(stiffness) for stiffness in stiffnesses}
+        return make_multiples_figure(results, scene, kind, (low / 2, edge, edge**2 / high), penalties)
     with matplotlib.rc_context(_STYLE):
         n_columns = min(6, max(2, 2 * len(stiffnesses)))
         legend = 0.19 * ceil(n_names / n_columns) + 0.2
         figure = Figure(figsize=(1 + 2.7 * len(stiffnesses), 2.9 + legend), layout="constrained")
         panels = figure.subplots(1, len(stiffnesses), squeeze=False, sharey=True)[0]
-        low, high = _error_range(results, scene, kind)
-        edge = 1.5 * high * (high / low) ** _EDGE
         for axes, stiffness in zip(panels, stiffnesses, strict=True):
             axes.set(xscale="log", yscale="log", ylim=(low / 2, edge**2 / high), xlabel="time of the solution / ms")
             axes.set_title(_PENALTY_NAMES[scene].format(stiffness))
@@ -113,16 +120,19 @@ def make_cost_figure(results: BenchResults) -> Figure:
     with matplotlib.rc_context(_STYLE | {"font.size": 10.0, "lines.markersize": 6.5}):
         figure = Figure(figsize=(5.4, 1.5 + 0.25 * len(order)), layout="constrained")
         axes = figure.subplots()
-        never = high * 1.5
-        axes.axvspan(high * 1.15, never * 1.3, color="0.93")
+        width = (high / low) ** 0.03  # One place in the column of those that never get there.
+        places = [high * width ** (2 + place) for place in range(len(ratios))]
+        end = places[-1] * width**2
+        axes.axvspan(high * width**0.5, end, color="0.93")
         axes.axvline(1.0, color="0.35", linewidth=0.9)
-        for (scene, row), marker, colour in zip(ratios.items(), _MARKERS, _COLOURS, strict=False):
-            values = np.minimum([row[name] for name in order], never)  # NaN, where the reference fails, is not drawn.
+        for (scene, row), never, marker, colour in zip(ratios.items(), places, _MARKERS, _COLOURS, strict=False):
+            values = np.array([row[name] for name in order])  # NaN, where the reference fails, is not drawn.
+            values = np.where(values == inf, never, values)
             hollow: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "none", "label": scene}
             axes.plot(values, range(len(order)), marker=marker, color=colour, **hollow)
-        axes.set(xscale="log", xlim=(low, never * 1.3), ylim=(-0.7, len(order) - 0.3))
+        axes.set(xscale="log", xlim=(low, end), ylim=(-0.7, len(order) - 0.3))
         ticks = [tick for tick in _COST_TICKS if low <= tick <= high]
-        axes.set_xticks([*ticks, never], [*map("{:g}".format, ticks), "never"])
+        axes.set_xticks([*ticks, (places[0] * places[-1]) ** 0.5], [*map("{:g}".format, ticks), "never"])
         axes.minorticks_off()
         axes.set_yticks(range(len(order)), order)
         axes.grid(color="0.92", linewidth=0.5)
@@ -136,10 +146,10 @@ def make_profile_figure(results: BenchResults) -> Figure | None:
     profiles = pair_profiles(results)
     if not profiles:
         return None
-    n_columns = min(4, len(profiles))
+    n_columns = min(3, len(profiles))
     n_rows = ceil(len(profiles) / n_columns)
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(0.6 + 2.1 * n_columns, 0.7 + 1.55 * n_rows), layout="constrained")
+        figure = Figure(figsize=(0.5 + 1.5 * n_columns, 0.7 + 1.25 * n_rows), layout="constrained")
         panels = figure.subplots(n_rows, n_columns, squeeze=False, sharex=True, sharey=True)
         furthest = _furthest(profiles)
         for axes, profile in zip(panels.reshape(-1), profiles, strict=False):
@@ -148,8 +158,7 @@ def make_profile_figure(results: BenchResults) -> Figure | None:
             axes.set(xscale="log", xlim=(0.95, furthest), ylim=(-0.03, 1.05))
             axes.set_title(profile.formulation, fontsize=7.5)
             axes.grid(color="0.92", linewidth=0.5)
-        for axes in panels.reshape(-1)[len(profiles) :]:
-            axes.set_axis_off()
+        hide_empty_panels(panels.reshape(-1), len(profiles), n_columns)
         figure.supxlabel("within this factor of the faster one", fontsize=8)
         figure.supylabel("share of the random scenes", fontsize=8)
         handles = [Line2D([], [], color="C3", label="formulation"), Line2D([], [], color="k", ls="--", label=REFERENCE)]

@@ -7,6 +7,7 @@ from math import isinf, isnan
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from contactverif_reports.bench.clocks import clock_sentences
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Outcome
@@ -16,6 +17,7 @@ from contactverif_reports.bench.work_precision import (
     TARGETS,
     cost_ratio,
     cost_sentence,
+    figure_sentence,
     pair_profiles,
     time_to_reach,
 )
@@ -42,7 +44,6 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
     from contactverif_reports.draw.bench_figures import (  # Importing matplotlib is slow.
         make_cost_figure,
         make_profile_figure,
-        make_work_precision_figure,
     )
 
     scenes = results.scenes
@@ -59,7 +60,7 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         targets=[(kind, [_target_rows(results, scene, kind) for scene in scenes]) for kind in ERRORS],
         target_heads=[f"{target:g}" for target in TARGETS],
         figures=[
-            (scene, [(kind, svg_inline(make_work_precision_figure(results, scene, kind))) for kind in ERRORS])
+            (scene, [(kind, _figure(results, scene, kind), figure_sentence(results, scene, kind)) for kind in ERRORS])
             for scene in scenes
         ],
         parts=PARTS,
@@ -72,6 +73,13 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         n_repeats=results.seconds.shape[-1],
         about=_facts(results),
     )
+
+
+def _figure(results: BenchResults, scene: str, kind: str) -> Markup:
+    """Return error against time of a scene as SVG."""
+    from contactverif_reports.draw.bench_figures import make_work_precision_figure
+
+    return svg_inline(make_work_precision_figure(results, scene, kind), f"error of the {kind} against time, {scene}")
 
 
 def _has_costs(results: BenchResults) -> bool:
