@@ -310,6 +310,12 @@ def keep_pictures(folder: Path) -> None:
     for path in sorted(folder.glob("*.svg")):
         shutil.copyfile(path, PICTURES / path.name)
         print(f"    {path.name}")
+    texts = [page.read_text(encoding="utf-8") for page in pages()]
+    for path in sorted(folder.glob("*/*.svg")):  # Of a folder of pictures a page may show some.
+        name = f"{path.parent.name}_{path.name}"
+        if any(f"pictures/{name}" in text for text in texts):
+            shutil.copyfile(path, PICTURES / name)
+            print(f"    {name}")
 
 
 def main(names: Sequence[str]) -> None:

@@ -134,17 +134,17 @@ def test_many_formulations_have_a_panel_each_with_their_failures_at_the_edge() -
         CELLS, {f"f{n}": RUNS["poor" if n == 1 else "quick"] for n in range(7)} | {"vts-ppt": RUNS["vts-ppt"]}
     )
     figure = make_work_precision_figure(many, "wavy")
-    shown = [axes for axes in figure.axes if axes.get_visible()]
-    assert [axes.get_title() for axes in shown] == list(many.formulations)
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in panels] == list(many.formulations)
     (edge,) = {
         line.get_ydata()[0]
-        for axes in shown
+        for axes in panels
         for line in axes.lines
         if line.get_marker() == "None" and len(set(line.get_ydata())) == 1
     }
     crosses = {
         axes.get_title(): line.get_ydata().tolist()
-        for axes in shown
+        for axes in panels
         for line in axes.lines
         if line.get_marker() == "x" and len(line.get_xdata())
     }
