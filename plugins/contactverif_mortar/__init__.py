@@ -6,9 +6,10 @@ the pressures: at the points themselves (`segment_to_segment`), at slave nodes f
 at slave nodes from weighted gaps (`mortar_methods`, with `weighted_gaps` and `pressure_shapes`). `two_half_passes`
 weighs gaps on both surfaces, at points of `covered_ranges`, and hands no force from one body to the other.
 
-Tangents come in two kernels. `cell_frame`, `cell_tangent` and `node_factors` write those of slaves that look along
-their own normal straight into compressed rows. `cell_geometry`, `cell_forces` and `pressure_shapes` serve averaged
-normals, dual shapes and half passes, and the tests hold the first against the second.
+Tangents are written straight into compressed rows. `cell_frame` has the Δ of points of slaves that look along their own
+normal: `cell_tangent` makes the tangent of springs at points of it, and `node_rows` that of all mortar methods. For
+averaged normals and half passes `shape_rows` does so with the Δ of `cell_geometry`. Tests hold all of them against
+triplets and sparse products (`tests/plugins/readable_mortar.py`).
 """
 
 from contactverif_mortar.chen_hisada_method import chen_hisada

@@ -10,7 +10,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
-from contactverif_mortar.integration_cells import GAP, NORMAL_X, WEIGHT, XI, C, Cells, Quadrature
+from contactverif_mortar.integration_cells import GAP, NORMAL_X, WEIGHT, XI, C, Cells, Quadrature, Sides
 
 
 def at_points(
@@ -53,7 +53,7 @@ def at_points(
 
 
 def at_nodes(
-    interface: Interface,
+    interface: Interface | Sides,
     cells: Cells,
     x: FloatArray,
     areas: FloatArray,

@@ -1,19 +1,23 @@
-"""The Δ of the points of a cell in the frame (τ, n) of its slave segment, for slaves that look along their own normal.
+"""The points of a cell and their Δ in the frame (τ, n) of its slave segment, for slaves that look along their normal.
 
 All points of such a cell have one frame: τ along the slave, n out of it, l = |x_B − x_A|. With ω = n·(Δx_B − Δx_A)/l,
-L = (x_2 − x_1)·τ and λ = (x_2 − x_1)·n:
+L = (x_2 − x_1)·τ, λ = (x_2 − x_1)·n and the rows N = ((1−c)/2, (1+c)/2, ξ−1, −ξ) of the nodes A, B, 1, 2:
 
-    l/2 Δc_e = τ·(Δx_e − (1−c_e)/2 Δx_A − (1+c_e)/2 Δx_B) + g_e ω          the end of the cell that node e cuts
-    Δc = (1−a)/2 Δc_low + (1+a)/2 Δc_high                                   the point at the place a of the rule
-    L Δξ = τ·(Δx_s − (1−ξ)Δx_1 − ξΔx_2) + l/2 Δc − g ω                      Δx_s at a fixed c
-    Δg = n·((1−ξ)Δx_1 + ξΔx_2 − Δx_s) + λ Δξ
-    Δw = w_a [l_w/2 (Δc_high − Δc_low) + (c_high − c_low)/2 τ·(Δx_B − Δx_A)]   the last term for current lengths
+    (1)  l/2 Δc_e = τ·(Δx_e − (1−c_e)/2 Δx_A − (1+c_e)/2 Δx_B) + g_e ω       the end of the cell that node e cuts
+    (2)  Δc = (1−a)/2 Δc_low + (1+a)/2 Δc_high                               the point at the place a of the rule
+    (3)  L Δξ = Σ N_m τ·Δx_m + l/2 Δc − g ω
+    (4)  Δg = λ Δξ − Σ N_m n·Δx_m
+    (5)  Δw = w_a [l_w/2 (Δc_high − Δc_low) + (c_high − c_low)/2 σ]          σ = τ·(Δx_B − Δx_A) for current lengths
 
-l_w is the length that weights are measured with. A Δ is an array (4 nodes A, B, 1, 2; 2): what a number gains if a node
-moves along τ, and along n. `cell_geometry` has the same Δ for directions that turn, in the global frame; tests hold one
-against the other.
+l_w is the length that weights are measured with. A method adds up rows: linear functions of the movements,
 
-Rule for the next editor: nothing is allocated here. The arrays `ends` and `d` are room that a caller reuses.
+    (6)  Σ over points of  α Δw + β Δc + γ Δξ + δ Δg
+
+So a row of a cell is twelve numbers: what it gains for τ·Δx_m and for n·Δx_m of the four nodes, for Δc_low, Δc_high,
+ω and σ. `add_to_row` adds a point to them. `turn_row` puts in (1), and turns the result into the global frame.
+`cell_geometry` has the same Δ for directions that turn; tests hold one against the other.
+
+Rule for the next editor: nothing is allocated here. The array `rows` is room that a caller reuses.
 """
 
 from __future__ import annotations
@@ -21,12 +25,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline
 from contactverif.geometry.projection import Vector, dot, frame, minus
-from contactverif_mortar.cell_geometry import NODE_1, NODE_2, A, B, SlaveView, facing_point, seen_from
+from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from
 
-TAU, N = range(2)  # The two directions in which a node moves.
-C, XI, GAP, WEIGHT = range(4)  # The Δ of a point, in this order.
+# The twelve numbers of a row; the first two stand for four, one for each node A, B, 1, 2.
+ALONG_TAU, ALONG_N, BY_LOW, BY_HIGH, BY_OMEGA, BY_SIGMA, N_NUMBERS = 0, 4, 8, 9, 10, 11, 12
 
 
 class CellFrame(NamedTuple):
@@ -38,66 +42,107 @@ class CellFrame(NamedTuple):
     n: Vector
     along: float  # L, negative
     lean: float  # λ
-    low: float
+    low: float  # c_low
     high: float
+    cut_low: float  # 1 where node 2 cuts the lower end, else 0
+    cut_high: float  # 1 where node 1 cuts the upper end, else 0
+    gap_low: float
+    gap_high: float
     current: float  # 1 where weights are measured with current lengths, else 0
 
 
-@compile_kernel
-def begin_cell(
-    ends: FloatArray, view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool, measured: float
-) -> CellFrame:
-    """Return the frame of a cell, and write Δc_low and Δc_high into `ends` (2, 4, 2).
+class CellPoint(NamedTuple):
+    """A point of a cell."""
 
-    The nodes 2 and 1 cut the lower and the upper end. A length `measured` of −1 stands for the current length.
-    """
+    place: float  # a
+    share: float  # w_a
+    c: float
+    xi: float
+    gap: float
+    weight: float  # w
+
+
+@compile_inline
+def begin_cell(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool, measured: float) -> CellFrame:
+    """Return the frame of a cell. A length `measured` of −1 stands for the current length."""
     length, tau, n = frame(view.x_a, view.x_b)
-    for end in range(2):
-        for k in range(4):
-            ends[end, k, TAU] = ends[end, k, N] = 0.0
-    low, high = -1.0, 1.0
+    low, high, gap_low, gap_high = -1.0, 1.0, 0.0, 0.0
     if cut_low:
         low = seen_from(x_2, view)
-        _, gap, _ = facing_point(view, x_1, x_2, low)
-        _cut_gains(ends, 0, low, gap, length, NODE_2)
+        gap_low = facing_point(view, x_1, x_2, low)[1]
     if cut_high:
         high = seen_from(x_1, view)
-        _, gap, _ = facing_point(view, x_1, x_2, high)
-        _cut_gains(ends, 1, high, gap, length, NODE_1)
+        gap_high = facing_point(view, x_1, x_2, high)[1]
     d, current = minus(x_2, x_1), measured < 0
     return CellFrame(
-        length, length if current else measured, tau, n, dot(d, tau), dot(d, n), low, high, 1.0 if current else 0.0
+        length,
+        length if current else measured,
+        tau,
+        n,
+        dot(d, tau),
+        dot(d, n),
+        low,
+        high,
+        1.0 if cut_low else 0.0,
+        1.0 if cut_high else 0.0,
+        gap_low,
+        gap_high,
+        1.0 if current else 0.0,
     )
 
 
-@compile_kernel
-def _cut_gains(ends: FloatArray, end: int, c: float, gap: float, length: float, cutting: int) -> None:
-    """Write Δ of the c from which the node `cutting` is seen."""
-    ends[end, A, TAU] = -(1 - c) / length
-    ends[end, B, TAU] = -(1 + c) / length
-    ends[end, cutting, TAU] = 2 / length
-    turned = 2 * gap / (length * length)
-    ends[end, A, N] = -turned
-    ends[end, B, N] = turned
+@compile_inline
+def place_point(cell: CellFrame, view: SlaveView, x_1: Vector, x_2: Vector, place: float, share: float) -> CellPoint:
+    """Return the point at a place of the rule, whose weight there is `share`."""
+    c = (cell.low + cell.high) / 2 + (cell.high - cell.low) / 2 * place
+    xi, gap, _ = facing_point(view, x_1, x_2, c)
+    return CellPoint(place, share, c, xi, gap, share * (cell.high - cell.low) / 2 * cell.measured)
 
 
-@compile_kernel
-def write_gains(
-    d: FloatArray, ends: FloatArray, cell: CellFrame, place: float, share: float, c: float, xi: float, gap: float
+@compile_inline
+def add_to_row(
+    rows: FloatArray,
+    row: int,
+    cell: CellFrame,
+    point: CellPoint,
+    by_weight: float,
+    by_c: float,
+    by_xi: float,
+    by_gap: float,
 ) -> None:
-    """Write Δc, Δξ, Δg and Δw of the point at a place of the rule, whose weight there is `share`, into d (4, 4, 2)."""
-    half, spread = cell.length / 2, (cell.high - cell.low) / 2
-    shape = ((1 - c) / 2, (1 + c) / 2, xi - 1, -xi)
-    turn = (-1 / cell.length, 1 / cell.length, 0.0, 0.0)  # ω, of movements along n
-    stretch = (-cell.current, cell.current, 0.0, 0.0)  # Δl_w, of movements along τ
-    for k in range(4):
-        for i in range(2):
-            low, high = ends[0, k, i], ends[1, k, i]
-            d[C, k, i] = ((1 - place) * low + (1 + place) * high) / 2
-            d[XI, k, i] = half * d[C, k, i]
-            d[WEIGHT, k, i] = share * cell.measured / 2 * (high - low)
-        d[XI, k, TAU] = (d[XI, k, TAU] + shape[k]) / cell.along
-        d[XI, k, N] = (d[XI, k, N] - gap * turn[k]) / cell.along
-        d[GAP, k, TAU] = cell.lean * d[XI, k, TAU]
-        d[GAP, k, N] = cell.lean * d[XI, k, N] - shape[k]
-        d[WEIGHT, k, TAU] += share * spread * stretch[k]
+    """Add α Δw + β Δc + γ Δξ + δ Δg of a point, Eqs. (2)–(6), to a row of `rows` (n_rows, 12)."""
+    place, share, c, xi, gap, _ = point
+    slope = (by_xi + by_gap * cell.lean) / cell.along  # for L Δξ
+    along_c = by_c + slope * cell.length / 2
+    spread = by_weight * share * cell.measured / 2
+    rows[row, BY_LOW] += (1 - place) / 2 * along_c - spread
+    rows[row, BY_HIGH] += (1 + place) / 2 * along_c + spread
+    rows[row, BY_OMEGA] -= slope * gap
+    rows[row, BY_SIGMA] += by_weight * share * (cell.high - cell.low) / 2
+    for m, shape in enumerate(((1 - c) / 2, (1 + c) / 2, xi - 1, -xi)):
+        rows[row, ALONG_TAU + m] += slope * shape
+        rows[row, ALONG_N + m] -= by_gap * shape
+
+
+@compile_inline
+def finish_rows(rows: FloatArray, n_rows: int, cell: CellFrame) -> None:
+    """Put Δc_low and Δc_high of Eq. (1), ω and σ into the numbers of the four nodes."""
+    per_length = 1 / cell.length
+    for row in range(n_rows):
+        low = 2 * per_length * cell.cut_low * rows[row, BY_LOW]
+        high = 2 * per_length * cell.cut_high * rows[row, BY_HIGH]
+        omega = (rows[row, BY_OMEGA] + low * cell.gap_low + high * cell.gap_high) * per_length
+        sigma = rows[row, BY_SIGMA] * cell.current
+        rows[row, ALONG_TAU] -= (1 - cell.low) / 2 * low + (1 - cell.high) / 2 * high + sigma
+        rows[row, ALONG_TAU + 1] += sigma - (1 + cell.low) / 2 * low - (1 + cell.high) / 2 * high
+        rows[row, ALONG_TAU + 2] += high
+        rows[row, ALONG_TAU + 3] += low
+        rows[row, ALONG_N] -= omega
+        rows[row, ALONG_N + 1] += omega
+
+
+@compile_inline
+def turn_row(rows: FloatArray, row: int, m: int, cell: CellFrame) -> Vector:
+    """Return what a row gains for a movement of local node m, in the global frame."""
+    a, b = rows[row, ALONG_TAU + m], rows[row, ALONG_N + m]
+    return a * cell.tau[0] + b * cell.n[0], a * cell.tau[1] + b * cell.n[1]

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, cross, dot, frame, minus, node
 
 A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes
@@ -51,7 +51,7 @@ def turn(n: Vector) -> Vector:
     return -n[1], n[0]
 
 
-@compile_kernel
+@compile_inline
 def slave_view(x: FloatArray, slave: IntArray, segment: int, before: int, behind: int) -> SlaveView:
     """Return a slave segment with the directions of its ends.
 
@@ -82,7 +82,7 @@ def seen_from(x_e: Vector, view: SlaveView) -> float:
     x_a, x_b, n_a, n_b, straight = view
     half = ((x_b[0] - x_a[0]) / 2, (x_b[1] - x_a[1]) / 2)
     from_e = arm(x_e, PointOnSegment(x_a, x_b, 0.0))
-    tau_0 = turn(between(n_a, n_b, 0.0))
+    tau_0 = turn(n_a) if straight else turn(between(n_a, n_b, 0.0))
     d, slope = -dot(from_e, tau_0), dot(half, tau_0)
     if straight:
         return d / slope
@@ -96,9 +96,11 @@ def seen_from(x_e: Vector, view: SlaveView) -> float:
 def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[float, float, Vector]:
     """Return ξ, the gap g and the normal n (out of the slave) at c."""
     d, along = arm(x_1, PointOnSegment(view.x_a, view.x_b, c)), minus(x_2, x_1)
-    nu = between(view.n_a, view.n_b, c)
-    size = np.sqrt(dot(nu, nu))
-    n = (nu[0] / size, nu[1] / size)
+    n = view.n_a
+    if not view.straight:
+        nu = between(view.n_a, view.n_b, c)
+        size = np.sqrt(dot(nu, nu))
+        n = (nu[0] / size, nu[1] / size)
     tau = turn(n)
     length = dot(along, tau)  # negative
     return dot(d, tau) / length, cross(along, d) / length, n

@@ -21,23 +21,34 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
-from contactverif_mortar.strip_search import collect_segments, make_strip
+from contactverif_mortar.strip_search import Region, collect_segments, holds, make_region, make_strip
 
 # The longest overlap, in c ∈ [−1, 1], that counts as none: roundoff could not tell its points apart.
 ROUNDOFF = 4 * UNIT_ROUNDOFF
-LOW, HIGH, GAP = range(3)  # The columns of the table of candidates: ends of the overlap, and |gap| in its middle.
+# The columns of the table of candidates: ends of the overlap, |gap| in its middle, and the largest |gap| on it.
+LOW, HIGH, GAP, DEPTH, N_COLUMNS = range(5)
 
 
 def longest_of_chain(surface: Surface, x: FloatArray) -> FloatArray:
     """Return for each segment the length of the longest one of its chain, at the positions x (n_nodes, 2)."""
-    order = surface.chain_order
-    begins = np.flatnonzero(np.r_[True, surface.neighbours[order[:-1], 1] != order[1:]])
-    longest = np.maximum.reduceat(surface.lengths(x)[order], begins)
-    lengths = np.empty(len(order))
-    lengths[order] = np.repeat(longest, np.diff(np.r_[begins, len(order)]))
+    return _longest_of_chain(x, surface.segments, surface.neighbours, surface.chain_order)
+
+
+@compile_kernel
+def _longest_of_chain(x: FloatArray, segments: IntArray, neighbours: IntArray, order: IntArray) -> FloatArray:
+    """Return the lengths (n_segments,); a chain begins where the walk `order` does not go on to a neighbour."""
+    lengths, begin, longest = np.empty(len(order)), 0, 0.0
+    for place in range(len(order)):
+        s = order[place]
+        length, _, _ = frame(node(x, segments[s, 0]), node(x, segments[s, 1]))
+        longest = max(longest, length)
+        if place + 1 == len(order) or neighbours[s, 1] != order[place + 1]:
+            for member in range(begin, place + 1):
+                lengths[order[member]] = longest
+            begin, longest = place + 1, 0.0
     return lengths
 
 
@@ -76,38 +87,41 @@ def find_cells(
     The second node of the master segment cuts the lower end, the first node the upper end. Cells are in the order of
     the slave segments, and on one slave segment in the order in which one meets them along it.
 
-    A search begins with the depth at which the last slave segment saw the master. It is done as soon as what it saw
-    hides all that lies deeper; otherwise it looks farther, up to the reach of rule 4. The cells are the same.
+    A search begins with the depth of the cells on the last slave segment. It is done as soon as it saw what hides all
+    that lies deeper; otherwise it looks farther, up to the reach of rule 4. The cells are the same.
     """
     room = len(slave) + len(master)
     cell_slave, cell_master = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     cut_low, cut_high = np.empty(room, dtype=np.bool_), np.empty(room, dtype=np.bool_)
-    members, table = np.empty(len(master), dtype=np.int64), np.empty((len(master), 3))
+    members, table = np.empty(len(master), dtype=np.int64), np.empty((len(master), N_COLUMNS))
     waiting = np.empty(64, dtype=np.int64)
     n_cells, longest, depth = 0, np.max(master_longest), 0.0
+    region = Region((0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), 1)
     for s in range(len(slave)):
         view = slave_view(x, slave, s, before[s], behind[s])
         farthest = 2 * (slave_longest[s] + longest)
         length, _, _ = frame(view.x_a, view.x_b)
         reach = min(farthest, max(length / 16, 4 * depth))
         while True:
-            count = _find_candidates(
-                x, master, view, reach, slave_longest[s], master_longest, tree, waiting, members, table
-            )
-            depth = _hiding_depth(x, master, view, members[:count], table)
-            if reach >= farthest or 2 * depth <= reach:
+            strip = make_strip(view, reach)
+            if not holds(region, strip):
+                region = make_region(strip, tree[1])
+            count = collect_segments(strip, region.box, tree[0], tree[1], waiting, members)
+            count = _find_candidates(x, master, view, count, slave_longest[s], master_longest, members, table)
+            if reach >= farthest or _hides(table, count, reach / 2):
                 break
-            reach = min(farthest, max(4 * reach, 4 * depth))
+            reach = min(farthest, 4 * reach)
         if n_cells + count > room:
             room = 2 * (n_cells + count)
             cell_slave, cell_master = _lengthen(cell_slave, room), _lengthen(cell_master, room)
             cut_low, cut_high = _lengthen(cut_low, room), _lengthen(cut_high, room)
-        reached = -1.0  # the highest upper end so far
+        reached, depth = -1.0, 0.0  # the highest upper end so far, and the largest |gap| of a cell
         for i in range(count):
             if _is_nearest(x, master, view, members[:count], table, i, reached):
                 cell_slave[n_cells], cell_master[n_cells] = s, members[i]
                 cut_low[n_cells], cut_high[n_cells] = table[i, LOW] > -1, table[i, HIGH] < 1
                 n_cells += 1
+                depth = max(depth, table[i, DEPTH])
             reached = max(reached, table[i, HIGH])
     return (
         cell_slave[:n_cells].copy(),
@@ -125,26 +139,24 @@ def _lengthen(values: Array, room: int) -> Array:
     return longer
 
 
-@compile_kernel
+@compile_inline
 def _find_candidates(
     x: FloatArray,
     master: IntArray,
     view: SlaveView,
-    reach: float,
+    n_members: int,
     slave_longest: float,
     master_longest: FloatArray,
-    tree: Tree,
-    waiting: IntArray,
     members: IntArray,
     table: FloatArray,
 ) -> int:
-    """Find the master segments within `reach` that overlap the slave segment and are near enough; return how many.
+    """Keep those of the first `members` that overlap the slave segment and are near enough; return how many.
 
-    They are written into `members` and `table`, sorted by the lower ends of their overlaps, then by number.
+    They and their overlaps are written into `members` and `table`, sorted by the lower ends of their overlaps, then by
+    number.
     """
-    order, boxes = tree
     count = 0
-    for place in range(collect_segments(make_strip(view, reach), order, boxes, waiting, members)):
+    for place in range(n_members):
         m = members[place]
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
         low, high = overlap(view, x_1, x_2)
@@ -156,37 +168,43 @@ def _find_candidates(
         i = count
         while i > 0 and (table[i - 1, LOW] > low or (table[i - 1, LOW] == low and members[i - 1] > m)):
             members[i] = members[i - 1]
-            for column in range(3):
+            for column in range(N_COLUMNS):
                 table[i, column] = table[i - 1, column]
             i -= 1
         members[i], table[i, LOW], table[i, HIGH], table[i, GAP] = m, low, high, abs(gap)
+        table[i, DEPTH] = _largest_gap(view, x_1, x_2, low, high)
         count += 1
     return count
 
 
-@compile_kernel
-def _hiding_depth(x: FloatArray, master: IntArray, view: SlaveView, members: IntArray, table: FloatArray) -> float:
-    """Return the depth below which the candidates hide everything; infinity if they leave a part of the slave open.
+@compile_inline
+def _hides(table: FloatArray, count: int, depth: float) -> bool:
+    """Return whether the candidates that lie no deeper than `depth` leave no part of the slave segment open."""
+    reached = -1.0
+    for i in range(count):
+        if table[i, DEPTH] <= depth:
+            if table[i, LOW] > reached:
+                return False
+            reached = max(reached, table[i, HIGH])
+    return reached >= 1
 
-    Between the ends of an overlap |gap| is at most the larger one of both ends. Directions that turn bend the gap, by
-    no more than both segments are long.
+
+@compile_kernel
+def _largest_gap(view: SlaveView, x_1: Vector, x_2: Vector, low: float, high: float) -> float:
+    """Return the largest |gap| between two points of a slave segment.
+
+    Between them |gap| is at most the larger one of both ends. Directions that turn bend the gap, by no more than both
+    segments are long.
     """
-    reached, depth = -1.0, 0.0
-    for i in range(len(members)):
-        if table[i, LOW] > reached:
-            return np.inf
-        reached = max(reached, table[i, HIGH])
-        x_1, x_2 = node(x, master[members[i], 0]), node(x, master[members[i], 1])
-        _, at_low, _ = facing_point(view, x_1, x_2, table[i, LOW])
-        _, at_high, _ = facing_point(view, x_1, x_2, table[i, HIGH])
-        bend = 0.0
-        if not view.straight:
-            bend = frame(view.x_a, view.x_b)[0] + frame(x_1, x_2)[0]
-        depth = max(depth, abs(at_low) + bend, abs(at_high) + bend)
-    return depth if reached >= 1 else np.inf
+    _, at_low, _ = facing_point(view, x_1, x_2, low)
+    _, at_high, _ = facing_point(view, x_1, x_2, high)
+    bend = 0.0
+    if not view.straight:
+        bend = frame(view.x_a, view.x_b)[0] + frame(x_1, x_2)[0]
+    return max(abs(at_low), abs(at_high)) + bend
 
 
-@compile_kernel
+@compile_inline
 def _is_nearest(
     x: FloatArray, master: IntArray, view: SlaveView, members: IntArray, table: FloatArray, i: int, reached: float
 ) -> bool:

@@ -1,10 +1,11 @@
-"""The tangent of forces on cells, written straight into compressed rows, for slaves that look along their own normal.
+"""Forces on cells and their tangent, written straight into compressed rows, for slaves that look along their normal.
 
 With F = w p and the rows (1−c)/2, (1+c)/2, ξ−1, −ξ of the nodes A, B, 1, 2 (`cell_forces`) as N_k:
 
-    ΔR_k = (N_k ΔF + F ΔN_k) n − N_k F ω τ        ΔF = p Δw + w Δp        Δp = p_c Δc + p_g Δg
+    R_k = Σ N_k F n        ΔR_k = Σ (N_k ΔF + F ΔN_k) n − N_k F ω τ        ΔF = p Δw + w (p_c Δc + p_g Δg)
 
-A method is p, p_c and p_g at each point. `cell_forces.tangent` has the same for directions that turn.
+So ΔR_k·n is a row of `cell_frame`. A method is p, p_c and p_g at each point. `cell_forces` has the same for directions
+that turn.
 """
 
 from __future__ import annotations
@@ -12,24 +13,23 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import AnyIntArray, Couplings, add_block, zero_matrix
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block, zero_matrix
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import node
-from contactverif_mortar import cell_frame
-from contactverif_mortar.cell_frame import TAU, CellFrame, N, begin_cell, write_gains
+from contactverif_mortar.cell_frame import (
+    N_NUMBERS,
+    CellFrame,
+    CellPoint,
+    add_to_row,
+    begin_cell,
+    finish_rows,
+    place_point,
+    turn_row,
+)
 from contactverif_mortar.cell_geometry import A, B, slave_view
-from contactverif_mortar.integration_cells import GAP, WEIGHT, XI, C, Cells, Fields, Quadrature
-
-D_C, D_XI, D_GAP, D_WEIGHT = cell_frame.C, cell_frame.XI, cell_frame.GAP, cell_frame.WEIGHT
-
-
-def couple_cells(interface: Interface, cells: Cells) -> Couplings:
-    """Return the couplings of the four nodes of each cell."""
-    nodes = np.hstack([interface.slave.segments[cells.slave], interface.master.segments[cells.master]])
-    starts = np.arange(0, nodes.size + 1, 4)
-    return Couplings(nodes.astype(np.int32).ravel(), starts, starts[:-1])
+from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
 
 
 def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tuple[Fields, Fields]:
@@ -47,16 +47,10 @@ def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tupl
     return segments_and_cells, (rule.places, rule.weights)
 
 
-def tangent_of_cells(
-    interface: Interface,
-    cells: Cells,
-    rule: Quadrature,
-    x: FloatArray,
-    points: FloatArray,
-    pressures: tuple[FloatArray, FloatArray, FloatArray],
-    couplings: Couplings | None = None,
-) -> sparse.csr_array:
-    """Compute the derivative of the forces on cells.
+def springs_at_points(
+    interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, penalty: float, active: BoolArray
+) -> tuple[FloatArray, sparse.csr_array]:
+    """Compute the forces of springs at the points of cells, p = −ε̂ g, and their derivative.
 
     Parameters
     ----------
@@ -68,120 +62,138 @@ def tangent_of_cells(
         The rule of the points.
     x : FloatArray, shape (n_nodes, 2)
         Positions.
-    points : FloatArray, shape (n_points, 6)
-        The points of `Quadrature.points`.
-    pressures : tuple[FloatArray, FloatArray, FloatArray], each of shape (n_points,)
-        The pressure p, p_c and p_g.
-    couplings : Couplings, optional
-        The pattern of the result, if it is to have more entries than the nodes of each cell need.
+    penalty : float
+        Distributed stiffness ε̂.
+    active : BoolArray, shape (n_points,)
+        The points that have a spring.
 
     Returns
     -------
-    sparse.csr_array, shape (n_unknowns, n_unknowns)
-        The derivative.
+    forces : FloatArray, shape (n_unknowns,)
+        Internal forces.
+    tangent : sparse.csr_array, shape (n_unknowns, n_unknowns)
+        Their derivative. Its pattern holds the nodes of all cells that have a spring.
     """
-    matrix = zero_matrix(interface.n_nodes, 0, couplings or couple_cells(interface, cells))
-    _add_cells(
+    segments_and_cells, places_and_weights = cell_arguments(interface, cells, rule)
+    nodes = _nodes_of_cells(interface.slave.segments, interface.master.segments, cells.slave, cells.master, active)
+    starts = np.arange(0, len(nodes) + 1, 4)
+    matrix = zero_matrix(interface.n_nodes, 0, Couplings(nodes, starts, starts[:-1]))
+    forces: FloatArray = np.zeros(interface.n_unknowns)
+    _add_springs(
         x,
-        *cell_arguments(interface, cells, rule),
-        points,
-        *pressures,
+        segments_and_cells,
+        places_and_weights,
+        penalty,
+        active,
+        forces,
         matrix.indptr,
         matrix.indices,
         matrix.data,
     )
-    return matrix
+    return forces, matrix
 
 
 @compile_kernel
-def _add_cells(
+def _nodes_of_cells(
+    slave: IntArray, master: IntArray, cell_slave: IntArray, cell_master: IntArray, active: BoolArray
+) -> NumberArray:
+    """Return the nodes A, B, 1, 2 of each cell that has an active point, one cell after the other."""
+    nodes, count = np.empty(4 * len(cell_slave), dtype=np.int32), 0
+    n_q = len(active) // max(len(cell_slave), 1)
+    for cell in range(len(cell_slave)):
+        if not _any_active(active, cell * n_q, n_q):
+            continue
+        s, m = cell_slave[cell], cell_master[cell]
+        nodes[count], nodes[count + 1] = slave[s, 0], slave[s, 1]
+        nodes[count + 2], nodes[count + 3] = master[m, 0], master[m, 1]
+        count += 4
+    return nodes[:count]
+
+
+@compile_inline
+def _any_active(active: BoolArray, begin: int, count: int) -> bool:
+    """Return whether one of some points that follow each other is active."""
+    for i in range(begin, begin + count):  # noqa: SIM110 - a compiled kernel knows no generators
+        if active[i]:
+            return True
+    return False
+
+
+@compile_kernel
+def _add_springs(
     x: FloatArray,
     segments_and_cells: Fields,
     rule: Fields,
-    points: FloatArray,
-    pressure: FloatArray,
-    by_c: FloatArray,
-    by_gap: FloatArray,
+    penalty: float,
+    active: BoolArray,
+    forces: FloatArray,
     indptr: AnyIntArray,
     indices: AnyIntArray,
     data: FloatArray,
 ) -> None:
-    """Add the derivative of the forces of all cells to compressed rows."""
+    """Add the forces of the springs on all cells, and their derivative to compressed rows."""
     lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
     places, weights = rule
     n_q = len(places)
-    ends, d = np.empty((2, 4, 2)), np.empty((4, 4, 2))
-    along_n, forces = np.empty((4, 4, 2)), np.empty(4)
-    for cell in range(len(cell_slave)):
-        s, m = cell_slave[cell], cell_master[cell]
+    rows, pushes = np.empty((4, N_NUMBERS)), np.empty(4)
+    for i in range(len(cell_slave)):
+        if not _any_active(active, i * n_q, n_q):
+            continue
+        s, m = cell_slave[i], cell_master[i]
         view = slave_view(x, slave, s, -1, -1)
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        axes = begin_cell(ends, view, x_1, x_2, cut_low[cell], cut_high[cell], lengths[s])
-        along_n[:], forces[:] = 0.0, 0.0
+        cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
+        rows[:], pushes[:] = 0.0, 0.0
         for q in range(n_q):
-            i = cell * n_q + q
-            p, p_c, p_g = pressure[i], by_c[i], by_gap[i]
-            if p == 0 and p_c == 0 and p_g == 0:
-                continue
-            write_gains(d, ends, axes, places[q], weights[q], points[i, C], points[i, XI], points[i, GAP])
-            _add_point(along_n, forces, d, points[i, C], points[i, XI], points[i, WEIGHT], p, p_c, p_g)
+            if active[i * n_q + q]:
+                point = place_point(cell, view, x_1, x_2, places[q], weights[q])
+                push_point(rows, pushes, cell, point, -penalty * point.gap, 0.0, -penalty)
         local = (slave[s, A], slave[s, B], master[m, 0], master[m, 1])
-        _add_blocks(indptr, indices, data, local, along_n, forces, axes)
+        finish_rows(rows, 4, cell)
+        add_cell(forces, indptr, indices, data, local, rows, pushes, cell)
 
 
-@compile_kernel
-def _add_point(
-    along_n: FloatArray,
-    forces: FloatArray,
-    d: FloatArray,
-    c: float,
-    xi: float,
-    w: float,
-    p: float,
-    p_c: float,
-    p_g: float,
+@compile_inline
+def push_point(
+    rows: FloatArray, pushes: FloatArray, cell: CellFrame, point: CellPoint, p: float, p_c: float, p_g: float
 ) -> None:
-    """Add N_k ΔF + F ΔN_k of a point to `along_n` (4, 4, 2), and N_k F to `forces` (4,)."""
+    """Add N_k ΔF + F ΔN_k of a point to the first four `rows`, and N_k F to `pushes` (4,)."""
+    c, xi, w = point.c, point.xi, point.weight
     f = w * p
-    n_a, n_b, n_1, n_2 = (1 - c) / 2, (1 + c) / 2, xi - 1, -xi
-    for column in range(4):
-        for i in range(2):
-            d_c, d_xi = d[D_C, column, i], d[D_XI, column, i]
-            d_f = p * d[D_WEIGHT, column, i] + w * (p_c * d_c + p_g * d[D_GAP, column, i])
-            along_n[0, column, i] += n_a * d_f - f * d_c / 2
-            along_n[1, column, i] += n_b * d_f + f * d_c / 2
-            along_n[2, column, i] += n_1 * d_f + f * d_xi
-            along_n[3, column, i] += n_2 * d_f - f * d_xi
-    for k, shape in enumerate((n_a, n_b, n_1, n_2)):
-        forces[k] += shape * f
+    for k, (shape, by_c, by_xi) in enumerate(
+        (((1 - c) / 2, -0.5, 0.0), ((1 + c) / 2, 0.5, 0.0), (xi - 1, 0.0, 1.0), (-xi, 0.0, -1.0))
+    ):
+        pushes[k] += shape * f
+        add_to_row(rows, k, cell, point, shape * p, shape * w * p_c + f * by_c, f * by_xi, shape * w * p_g)
 
 
-@compile_kernel
-def _add_blocks(
+@compile_inline
+def add_cell(
+    forces: FloatArray,
     indptr: AnyIntArray,
     indices: AnyIntArray,
     data: FloatArray,
     local: tuple[int, int, int, int],
-    along_n: FloatArray,
-    forces: FloatArray,
-    axes: CellFrame,
+    rows: FloatArray,
+    pushes: FloatArray,
+    cell: CellFrame,
 ) -> None:
-    """Add n ⊗ `along_n` − `forces` τ ⊗ ω of a cell, turned into the global frame."""
-    tau, n = axes.tau, axes.n
-    turn = (-1 / axes.length, 1 / axes.length, 0.0, 0.0)
+    """Add `pushes` n to forces, and n ⊗ `rows` − `pushes` τ ⊗ ω to compressed rows, in the global frame."""
+    tau, n = cell.tau, cell.n
     for k in range(4):
-        for column in range(4):
-            along_tau = -forces[k] * turn[column]
-            a, b = along_n[k, column, TAU], along_n[k, column, N]
-            x, y = a * tau[0] + b * n[0], a * tau[1] + b * n[1]
+        forces[2 * local[k]] += pushes[k] * n[0]
+        forces[2 * local[k] + 1] += pushes[k] * n[1]
+        turn = pushes[k] / cell.length
+        for column, omega in enumerate((-turn, turn, 0.0, 0.0)):
+            x, y = turn_row(rows, k, column, cell)
             add_block(
                 indptr,
                 indices,
                 data,
                 local[k],
                 local[column],
-                n[0] * x + tau[0] * along_tau * n[0],
-                n[0] * y + tau[0] * along_tau * n[1],
-                n[1] * x + tau[1] * along_tau * n[0],
-                n[1] * y + tau[1] * along_tau * n[1],
+                n[0] * x - omega * tau[0] * n[0],
+                n[0] * y - omega * tau[0] * n[1],
+                n[1] * x - omega * tau[1] * n[0],
+                n[1] * y - omega * tau[1] * n[1],
             )

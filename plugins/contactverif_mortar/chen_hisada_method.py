@@ -35,9 +35,9 @@ from contactverif.geometry.projection import (
 )
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import tangent_of_cells
 from contactverif_mortar.integration_cells import AREAS, C, Cells, Quadrature
-from contactverif_mortar.node_factors import group_nodes, rows_of_nodes
+from contactverif_mortar.node_groups import group_nodes
+from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
 N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure × a shape function has degree 2.
 
@@ -92,31 +92,27 @@ class ChenHisada:
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         x, active, nearest = np.array(z).reshape(-1, 2), pairing["active"], pairing["nearest"]
-        cells, ends = _carrying(interface, pairing, len(self.quadrature))
-        points = self.quadrature.points(interface, cells, x[None])
-        nodal = self._node_pressures(interface, pairing, x[None])[0]
-        slope = (nodal[ends[:, 1]] - nodal[ends[:, 0]]) / 2
-        pressure = (nodal[ends[:, 0]] + nodal[ends[:, 1]]) / 2 + slope * points[0, :, C]
-        forces = cell_forces.forces(points, pressure[None], cells.local_nodes(interface), interface.n_nodes)
-
-        arguments = (interface, cells, self.quadrature, x, points[0])
+        cells = Cells.from_pairing(pairing).near(active, interface)
+        groups = group_nodes(
+            interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, dual=False
+        )
         facing = np.column_stack([np.arange(len(active)), interface.master.segments[nearest]])  # V, 1, 2 of a node gap
         pattern = _couple(interface, cells, np.where(active[:, None], facing[:, 1:], facing[:, :1]))
-        matrix = tangent_of_cells(*arguments, (pressure, slope, np.zeros(len(slope))), pattern)
-        groups = group_nodes(interface, cells, active)
-        influence, _ = rows_of_nodes(*arguments, groups, np.zeros(len(active)), np.ones(len(active)))
-        d_pressure = -self.penalty * _node_gap_rows(x, interface.master.segments, nearest)
+        zeros, ones = np.zeros(len(active)), np.ones(len(active))
+        state = NodeState(self._node_pressures(interface, pairing, x[None])[0], ones, zeros, ones)
+        shapes = weigh(interface, cells, self.quadrature, x, dual=False).shapes
+        rows = node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         _add_springs(
             groups.nodes,
             groups.starts,
-            influence.data,
+            rows.left,
             facing,
-            d_pressure,
-            matrix.indptr,
-            matrix.indices,
-            matrix.data,
+            -self.penalty * _node_gap_rows(x, interface.master.segments, nearest),
+            rows.rest.indptr,
+            rows.rest.indices,
+            rows.rest.data,
         )
-        return forces.ravel(), matrix
+        return rows.forces, rows.rest
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with gaps along the slave's normal and interpolated pressures."""

@@ -20,6 +20,7 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_kernel, match_precision
 from contactverif.geometry.projection import frame, node
 from contactverif_mortar.cell_geometry import (
@@ -44,6 +45,8 @@ from contactverif_mortar.integration_cells import (
     Cells,
     Fields,
     Quadrature,
+    Sides,
+    any_end,
 )
 
 LOW, HIGH = 4, 5  # The local nodes that cut a range, behind A, B, 1 and 2.
@@ -71,10 +74,10 @@ class Ranges:
     high: IntArray
 
     @classmethod
-    def find(cls, interface: Interface, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
+    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
         """Return the points of the ranges that the cells make at the positions x (n_nodes, 2)."""
         arrays = (cells.slave, cells.master, cells.cut_low, cells.cut_high)
-        return cls(*_find(x, interface.slave.segments, interface.master.segments, arrays, rule.places))
+        return cls(*_find(x, sides.slave.segments, sides.master.segments, arrays, rule.places))
 
     @classmethod
     def from_pairing(cls, pairing: Pairing, prefix: str) -> Ranges:
@@ -85,30 +88,34 @@ class Ranges:
         """Return the arrays by name, for a pairing."""
         return {prefix + entry.name: getattr(self, entry.name) for entry in fields(self)}
 
-    def near(self, nodes: BoolArray, interface: Interface) -> Ranges:
+    def near(self, nodes: BoolArray, sides: Interface | Sides) -> Ranges:
         """Return the points whose slave segment has one of some slave nodes, given by mask (n_slave_nodes,)."""
-        chosen = nodes[interface.slave.segments[self.slave]].any(axis=1)
-        return Ranges(*(getattr(self, entry.name)[chosen] for entry in fields(self)))
+        carrying = any_end(nodes, sides.slave.segments, self.slave)
+        return self if carrying.all() else self.select(carrying)
 
-    def local_nodes(self, interface: Interface) -> IntArray:
+    def select(self, selection: BoolArray | slice) -> Ranges:
+        """Return some of the points, selected by mask or range."""
+        return Ranges(*(getattr(self, entry.name)[selection] for entry in fields(self)))
+
+    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
         """Return the nodes (n_points, 6): A, B, 1, 2, and those that cut the range (any node where none does)."""
-        ends = interface.slave.segments[self.slave]
+        ends = sides.slave.segments[self.slave]
         cuts = [np.where(cut >= 0, cut, ends[:, 0]) for cut in (self.low, self.high)]  # Their Δ is zero.
-        return np.column_stack([ends, interface.master.segments[self.master], *cuts])
+        return np.column_stack([ends, sides.master.segments[self.master], *cuts]).astype(np.int32)
 
-    def points(self, interface: Interface, x: Array, rule: Quadrature) -> Array:
+    def points(self, sides: Interface | Sides, x: Array, rule: Quadrature) -> Array:
         """Compute the six numbers of each point, (n_states, n_points, 6), as `Quadrature.points` does."""
-        return _points(x, *self._arguments(interface, x, rule))
+        return _points(x, *self._arguments(sides, x, rule))
 
-    def gains(self, interface: Interface, x: FloatArray, rule: Quadrature) -> FloatArray:
+    def gains(self, sides: Interface | Sides, x: FloatArray, rule: Quadrature) -> FloatArray:
         """Compute the Δ of the points, (n_points, 5, 6, 2), as `Quadrature.gains` does, at positions x (n_nodes, 2)."""
-        return _gains(x, *self._arguments(interface, x, rule))
+        return _gains(x, *self._arguments(sides, x, rule))
 
-    def _arguments(self, interface: Interface, x: Array, rule: Quadrature) -> tuple[Fields, Fields, Fields]:
+    def _arguments(self, sides: Interface | Sides, x: Array, rule: Quadrature) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `Segments`, of these points, and of `Rule`."""
-        reference, places, weights = match_precision(x, interface.nodes, rule.places, rule.weights)
+        reference, places, weights = match_precision(x, sides.nodes, rule.places, rule.weights)
         return (
-            (interface.slave.lengths(reference), interface.slave.segments, interface.master.segments),
+            (sides.slave.lengths(reference), sides.slave.segments, sides.master.segments),
             (self.slave, self.master, self.slot, self.low, self.high),
             (places, weights, rule.current),
         )

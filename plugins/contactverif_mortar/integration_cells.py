@@ -20,7 +20,8 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, Surface
+from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_kernel, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
@@ -44,6 +45,19 @@ C, XI, GAP, WEIGHT, NORMAL_X, NORMAL_Y = range(6)  # The numbers of a point, in 
 AREAS = {"current": True, "reference": False}  # The words of the option `area`.
 
 Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+
+
+class Sides(NamedTuple):
+    """The surfaces of an interface in their roles, or with the roles exchanged; the nodes keep their numbers."""
+
+    nodes: FloatArray  # (n_nodes, 2), reference positions
+    slave: Surface
+    master: Surface
+
+    @property
+    def n_slave_nodes(self) -> int:
+        """A number above those of all slave nodes."""
+        return len(self.nodes)
 
 
 class Segments(NamedTuple):
@@ -95,7 +109,7 @@ class Cells:
     behind: IntArray
 
     @classmethod
-    def find(cls, interface: Interface, x: FloatArray, averaged: bool) -> Cells:
+    def find(cls, interface: Interface | Sides, x: FloatArray, averaged: bool) -> Cells:
         """Find the cells at the positions x (n_nodes, 2)."""
         slave, master = interface.slave, interface.master
         before = behind = np.full(len(slave), -1)
@@ -122,8 +136,8 @@ class Cells:
         """Return the arrays by name, for a pairing."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
-    def select(self, selection: BoolArray | IntArray) -> Cells:
-        """Return some of the cells, selected by mask or number."""
+    def select(self, selection: BoolArray | IntArray | slice) -> Cells:
+        """Return some of the cells, selected by mask, number or range."""
         return Cells(
             self.slave[selection],
             self.master[selection],
@@ -135,20 +149,13 @@ class Cells:
 
     def near(self, nodes: BoolArray, interface: Interface) -> Cells:
         """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
-        first, second = nodes[interface.slave.segments].T
-        return self.select((first | second)[self.slave])
+        carrying = any_end(nodes, interface.slave.segments, self.slave)
+        return self if carrying.all() else self.select(carrying)
 
-    def local_nodes(self, interface: Interface) -> IntArray:
+    def local_nodes(self, interface: Interface | Sides) -> NumberArray:
         """Return the nodes (n_cells, n_local): A, B, 1, 2, and with averaged normals those before A and behind B."""
-        slave, master = interface.slave.segments, interface.master.segments
-        ends = [slave[self.slave], master[self.master]]
-        if self.averaged:
-            around = [
-                np.where(other >= 0, slave[other, end], slave[:, 0])  # no segment: any node, Δ is zero
-                for end, other in enumerate((self.before, self.behind))
-            ]
-            ends.append(np.column_stack(around)[self.slave])
-        return np.hstack(ends)
+        arrays = (self.slave, self.master, self.before, self.behind)
+        return _local_nodes(interface.slave.segments, interface.master.segments, *arrays, self.averaged)
 
     @property
     def averaged(self) -> bool:
@@ -181,7 +188,7 @@ class Quadrature:
     def __len__(self) -> int:
         return len(self.places)
 
-    def points(self, interface: Interface, cells: Cells, x: Array) -> Array:
+    def points(self, interface: Interface | Sides, cells: Cells, x: Array) -> Array:
         """Compute the points of all cells.
 
         Parameters
@@ -220,7 +227,7 @@ class Quadrature:
         n_local = 6 if cells.averaged else 4
         return _gains(x, n_local, *self._arguments(interface, cells, x))
 
-    def _arguments(self, interface: Interface, cells: Cells, x: Array) -> tuple[Fields, Fields, Fields]:
+    def _arguments(self, interface: Interface | Sides, cells: Cells, x: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `Segments`, `CellArrays` and `Rule`."""
         reference, places, weights = match_precision(x, interface.nodes, self.places, self.weights)
         return (
@@ -228,6 +235,38 @@ class Quadrature:
             (cells.slave, cells.master, cells.cut_low, cells.cut_high, cells.before, cells.behind),
             (places, weights, self.current),
         )
+
+
+@compile_kernel
+def any_end(nodes: BoolArray, slave: IntArray, cell_slave: IntArray) -> BoolArray:
+    """Return for each cell whether one of the ends of its slave segment is among some nodes, given by mask."""
+    selection = np.empty(len(cell_slave), dtype=np.bool_)
+    for cell in range(len(cell_slave)):
+        s = cell_slave[cell]
+        selection[cell] = nodes[slave[s, 0]] or nodes[slave[s, 1]]
+    return selection
+
+
+@compile_kernel
+def _local_nodes(
+    slave: IntArray,
+    master: IntArray,
+    cell_slave: IntArray,
+    cell_master: IntArray,
+    before: IntArray,
+    behind: IntArray,
+    averaged: bool,
+) -> NumberArray:
+    """Return the local nodes of each cell; where a segment to average with is missing, A stands for it."""
+    nodes = np.empty((len(cell_slave), 6 if averaged else 4), dtype=np.int32)
+    for cell in range(len(cell_slave)):
+        s, m = cell_slave[cell], cell_master[cell]
+        nodes[cell, 0], nodes[cell, 1] = slave[s, 0], slave[s, 1]
+        nodes[cell, 2], nodes[cell, 3] = master[m, 0], master[m, 1]
+        if averaged:
+            nodes[cell, 4] = slave[before[s], 0] if before[s] >= 0 else slave[s, 0]
+            nodes[cell, 5] = slave[behind[s], 1] if behind[s] >= 0 else slave[s, 0]
+    return nodes
 
 
 @compile_kernel

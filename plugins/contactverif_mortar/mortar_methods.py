@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
@@ -26,7 +26,8 @@ from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
 from contactverif_mortar.node_factors import Factors
-from contactverif_mortar.weighted_gaps import NodeState, Weighted, Weighting, own_lengths
+from contactverif_mortar.node_rows import NodeState
+from contactverif_mortar.weighted_gaps import StateWeights, Weighting, own_lengths
 
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
@@ -74,9 +75,8 @@ class Mortar:
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        x, weighted, state = self._node_state(interface, pairing, z)
-        forces = weighted.forces(state.pressure[None], interface.n_nodes).ravel()
-        return forces, self.weighting.tangent(interface, pairing["active"], weighted, x, state)
+        rows = self.weighting.tangent(interface, *self._node_state(interface, pairing, z))
+        return rows.forces, rows.rest
 
     def factors(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Factors:
         """Compute the derivative of the residual in factors, whose size grows with the number of cells alone.
@@ -84,19 +84,19 @@ class Mortar:
         The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
         the tangent, or that knows the pressures as unknowns of their own, does not need it.
         """
-        x, weighted, state = self._node_state(interface, pairing, z)
-        return self.weighting.factors(interface, pairing["active"], weighted, x, state)
+        return self.weighting.factors(interface, *self._node_state(interface, pairing, z))
 
     def _node_state(
         self, interface: Interface, pairing: Pairing, z: FloatArray
-    ) -> tuple[FloatArray, Weighted, NodeState]:
-        """Return positions (n_nodes, 2), the points at them, and the pressures and gaps of the slave nodes."""
+    ) -> tuple[Cells, BoolArray, StateWeights, FloatArray, NodeState]:
+        """Return the cells that carry pressures, which nodes are active, weights, positions and the slave nodes."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
-        weighted = self.weighting.carrying(interface, pairing, x[None])
-        areas = np.where(active, weighted.areas[0], 1.0)
-        gaps = np.where(active, weighted.with_gap[0] / areas, 0.0)
+        cells = Cells.from_pairing(pairing).near(active, interface)
+        integrals = self.weighting.weigh(interface, cells, x)
+        areas = np.where(active, integrals.areas, 1.0)
+        gaps = np.where(active, integrals.with_gap / areas, 0.0)
         weights = np.where(active, -self.penalty, 0.0)
-        return x, weighted, NodeState(weights * gaps, weights, gaps, areas)
+        return cells, active, integrals, x, NodeState(weights * gaps, weights, gaps, areas)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
@@ -145,17 +145,17 @@ class MortarMultipliers:
         rows = np.where(active, -weighted.with_gap, multipliers * own_lengths(interface, reference))
         return join_rows(forces, rows, z)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]]; lengths if not active."""
         x, multipliers = split_state(interface, z)
         active = pairing["active"]
-        weighted = self.weighting.carrying(interface, pairing, x[None])
-        derivative, influence, d_gaps = self.weighting.saddle(
-            interface, active, weighted, x, np.where(active, multipliers, 0.0)
+        cells = Cells.from_pairing(pairing).near(active, interface)
+        derivative, influence, _, d_gaps = self.weighting.saddle(
+            interface, cells, active, x, np.where(active, multipliers, 0.0)
         )
-        in_contact = sparse.diags_array(active.astype(np.float64))
-        idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)))
-        return sparse.block_array([[derivative, influence @ in_contact], [-(in_contact @ d_gaps), idle]]).tocoo()
+        idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)), format="csr")
+        upper = sparse.hstack([derivative, influence.T.tocsr()], format="csr")
+        return sparse.vstack([upper, sparse.hstack([-d_gaps, idle], format="csr")], format="csr")
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and multiplier, ∫N_j as weight."""

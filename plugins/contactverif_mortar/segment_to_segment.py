@@ -21,7 +21,7 @@ from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import tangent_of_cells
+from contactverif_mortar.cell_tangent import springs_at_points
 from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
@@ -68,14 +68,14 @@ class SegmentToSegment:
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        cells, active = _in_contact(pairing, len(self.quadrature))
-        x = np.array(z).reshape(-1, 2)
-        points = self.quadrature.points(interface, cells, x[None])
-        by_gap = np.where(active, -self.penalty, 0.0)
-        pressure = by_gap * points[..., GAP]
-        forces = cell_forces.forces(points, pressure, cells.local_nodes(interface), interface.n_nodes)
-        pressures = (pressure[0], np.zeros(len(active)), by_gap)
-        return forces.ravel(), tangent_of_cells(interface, cells, self.quadrature, x, points[0], pressures)
+        return springs_at_points(
+            interface,
+            Cells.from_pairing(pairing),
+            self.quadrature,
+            np.array(z).reshape(-1, 2),
+            self.penalty,
+            pairing["active"],
+        )
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with their own gaps and pressures."""

@@ -14,10 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import Vector, minus
 from contactverif_mortar.cell_geometry import SlaveView
 
+AHEAD = 8  # A region reaches so many strips ahead.
 LEAF = 4  # The number of segments in a leaf of `search_tree`.
 
 
@@ -48,16 +49,73 @@ def make_strip(view: SlaveView, reach: float) -> Strip:
     return Strip(a, b, n_a, n_b, reach, low, high, straight)
 
 
-@compile_kernel
-def collect_segments(strip: Strip, order: IntArray, boxes: FloatArray, waiting: IntArray, members: IntArray) -> int:
-    """Write the segments that may meet the strip into `members`, and return how many there are.
+class Region(NamedTuple):
+    """A rectangle, and the smallest box of the tree that holds all segments which meet it.
 
-    The cost is O(log n) for each of them. `order` and `boxes` are those of `search_tree`, `waiting` (64,) is room for
-    the boxes still to open, and `members` has room for all segments of the surface.
+    The strips of slave segments that follow each other lie in one region, so that a search for them begins there and
+    not with the box of all segments.
+    """
+
+    origin: Vector  # A node nearby.
+    low: Vector  # Corners of the rectangle, measured from the origin.
+    high: Vector
+    box: int
+
+
+@compile_inline
+def holds(region: Region, strip: Strip) -> bool:
+    """Return whether a strip lies in a region, by more than roundoff."""
+    d = minus(strip.a, region.origin)
+    doubt = 16 * UNIT_ROUNDOFF * (abs(d[0]) + abs(d[1]) + strip.reach)
+    for axis in range(2):
+        if (
+            d[axis] + strip.low[axis] - doubt < region.low[axis]
+            or d[axis] + strip.high[axis] + doubt > region.high[axis]
+        ):
+            return False
+    return True
+
+
+@compile_kernel
+def make_region(strip: Strip, boxes: FloatArray) -> Region:
+    """Return the region that is `AHEAD` times as large as the box around a strip, on each side of it.
+
+    One goes down the tree as long as one half of the box alone meets the rectangle.
+    """
+    around = AHEAD * max(strip.high[0] - strip.low[0], strip.high[1] - strip.low[1])
+    low = (strip.low[0] - around, strip.low[1] - around)
+    high = (strip.high[0] + around, strip.high[1] + around)
+    box, n_leaves = 1, len(boxes) // 2
+    while box < n_leaves:
+        near = _in_rectangle(strip.a, low, high, boxes[2 * box])
+        far = _in_rectangle(strip.a, low, high, boxes[2 * box + 1])
+        if near == far:
+            break
+        box = 2 * box if near else 2 * box + 1
+    return Region(strip.a, low, high, box)
+
+
+@compile_inline
+def _in_rectangle(origin: Vector, low: Vector, high: Vector, box: FloatArray) -> bool:
+    """Return whether a box meets a rectangle; `holds` leaves room for the roundoff of both."""
+    for axis in range(2):
+        if box[axis] - origin[axis] > high[axis] or box[2 + axis] - origin[axis] < low[axis]:
+            return False
+    return True
+
+
+@compile_inline
+def collect_segments(
+    strip: Strip, begin: int, order: IntArray, boxes: FloatArray, waiting: IntArray, members: IntArray
+) -> int:
+    """Write the segments below a box that may meet the strip into `members`, and return how many there are.
+
+    The cost is O(log n) for each of them, n the number of segments below the box `begin`. `order` and `boxes` are those
+    of `search_tree`, `waiting` (64,) is room for the boxes still to open, and `members` has room for all segments.
     """
     n_leaves = len(boxes) // 2
     count, n_waiting = 0, 1
-    waiting[0] = 1
+    waiting[0] = begin
     while n_waiting > 0:
         n_waiting -= 1
         box = waiting[n_waiting]

@@ -18,40 +18,45 @@ Source: Duong, De Lorenzis & Sauer (2018), arXiv 1712.01179, after Sauer & De Lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
 from contactverif.contract.traits import Traits
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE
+from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.covered_ranges import Ranges
-from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
-from contactverif_mortar.pressure_shapes import Rows, Shapes, integrals
-from contactverif_mortar.weighted_gaps import UNCOVERED, at_fixed_pressures, own_lengths
+from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
+from contactverif_mortar.node_factors import NodeRows
+from contactverif_mortar.node_groups import RowGroups, group_nodes
+from contactverif_mortar.node_rows import NodeState
+from contactverif_mortar.pressure_shapes import Shapes, integrals
+from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
+from contactverif_mortar.weighted_gaps import divide_covered, own_lengths
 
 STEEPEST = -0.5  # The cosine between two segments that see each other; −1 where they are parallel.
 PREFIXES = ("slave.", "master.")  # The surface that is pushed in each half pass.
-HalfPasses = tuple[tuple[str, Interface, IntArray], ...]  # The prefix, the interface in its roles, the places in z.
 _SOURCE = "Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Weighted:
-    """The points of a half pass at some states, with ∫N_j and ∫N_j g (n_states, n_slave_nodes)."""
+class _HalfPass(NamedTuple):
+    """The points of a half pass at some states, with ∫N_j and ∫N_j g of all nodes; zero off the surface it pushes."""
 
+    sides: Sides
     ranges: Ranges
-    points: Array
+    points: Array  # (n_states, n_points, 6)
     shapes: Shapes
-    ends: IntArray
-    areas: Array
-    with_gap: Array
+    ends: IntArray  # (n_points, 2)
+    areas: Array  # (n_states, n_nodes)
+    with_gap: Array  # (n_states, n_nodes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,108 +76,115 @@ class TwoHalfPasses:
     traits: Traits
     penalty: float
     rule: Quadrature
-    _last: list[tuple[Interface, HalfPasses]] = field(default_factory=list, init=False, repr=False)
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """Find cells, ranges and active nodes of both half passes; each name begins with the surface that is pushed."""
-        arrays = {}
-        for prefix, sides, places in self._half_passes(interface):
-            x = np.array(z)[places].reshape(-1, 2)
+        """Find cells and ranges of both half passes, by the surface that is pushed, and the active nodes of both."""
+        x, arrays = np.array(z).reshape(-1, 2), {}
+        active = np.zeros(interface.n_nodes, dtype=np.bool_)
+        for prefix, sides in _both_sides(interface):
             cells = _find_cells(sides, x)
             ranges = Ranges.find(sides, x, cells, self.rule)
             _, gaps = self._gaps(sides, ranges, x)
+            active |= gaps <= 0  # false where NaN
             stored = {f"{prefix}cells.{name}": array for name, array in cells.as_arrays().items()}
-            arrays.update({**stored, **ranges.as_arrays(prefix), f"{prefix}active": gaps <= 0})  # false where NaN
-        return Pairing(arrays)
+            arrays.update({**stored, **ranges.as_arrays(prefix)})
+        return Pairing({**arrays, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
-        total = np.zeros_like(z)
-        for prefix, sides, places in self._half_passes(interface):
-            x = np.array(z)[..., places].reshape(-1, interface.n_nodes, 2)
-            active = pairing[f"{prefix}active"]
-            weighted = self._carrying(sides, pairing, prefix, x)
-            pressure = np.zeros_like(weighted.areas)
-            pressure[:, active] = -self.penalty * weighted.with_gap[:, active] / weighted.areas[:, active]
-            at_points = weighted.shapes.at(pressure, weighted.ends)
-            nodes = weighted.ranges.local_nodes(sides)
-            forces = cell_forces.forces(weighted.points, at_points, nodes, interface.n_nodes)
-            n_own = 2 * sides.n_slave_nodes  # A half pass pushes its own surface alone.
-            total[..., places[:n_own]] += forces[:, : sides.n_slave_nodes].reshape(*z.shape[:-1], n_own)
-        return total
+        x, active = np.array(z).reshape(-1, interface.n_nodes, 2), pairing["active"]
+        total = np.zeros_like(x)
+        for half_pass in self._carrying(interface, pairing, x):
+            pressure = np.zeros_like(half_pass.areas)
+            own = active & (half_pass.areas != 0).any(axis=0)
+            pressure[:, own] = -self.penalty * half_pass.with_gap[:, own] / half_pass.areas[:, own]
+            at_points = half_pass.shapes.at(pressure, half_pass.ends)
+            nodes = half_pass.ranges.local_nodes(half_pass.sides)
+            forces = cell_forces.forces(half_pass.points, at_points, nodes, interface.n_nodes)
+            pushed = half_pass.sides.slave.nodes  # A half pass pushes its own surface alone.
+            total[:, pushed] += forces[:, pushed]
+        return total.reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.coo_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
-        parts = [self._half_tangent(interface, pairing, z, *half_pass) for half_pass in self._half_passes(interface)]
-        rows, columns, values = (np.concatenate(both) for both in zip(*parts, strict=True))
-        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+        return self.residual_and_tangent(interface, pairing, z)[1]
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, /
+    ) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute forces (n_unknowns,) and their derivative, Σ p_j ΔB_j + B Δp on the rows of the pushed surface."""
+        x, active = np.array(z).reshape(-1, 2), pairing["active"]
+        half_passes = self._carrying(interface, pairing, x[None])
+        groups = [
+            group_nodes(interface.n_nodes, each.sides.slave.segments, each.ranges.slave, local, active, dual=False)
+            for each in half_passes
+            for local in [each.ranges.local_nodes(each.sides)]
+        ]
+        matrix = zero_matrix(interface.n_nodes, 0, _couple(active, half_passes, groups))
+        forces: FloatArray = np.zeros(interface.n_unknowns)
+        for each, of_rows in zip(half_passes, groups, strict=True):
+            areas = np.where(active & (each.areas[0] != 0), each.areas[0], 1.0)
+            gaps = each.with_gap[0] / areas
+            weights = np.where(active, -self.penalty, 0.0)
+            state = NodeState(weights * gaps, weights, gaps, areas)
+            shaped = self._shape_points(each, x)
+            left, right = add_shaped_rows(shaped, of_rows, state, 2, forces, matrix)
+            NodeRows(forces, matrix, of_rows, left, right).multiply(weights, 0, interface.n_nodes)
+        return forces, matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the nodes of both surfaces with weighted gap and nodal pressure; the master's are a second pass."""
-        half_passes = []
-        for prefix, sides, places in self._half_passes(interface):
-            x = np.array(z)[places].reshape(-1, 2)
+        x, half_passes = np.array(z).reshape(-1, 2), []
+        for prefix, sides in _both_sides(interface):
             areas, gaps = self._gaps(sides, Ranges.from_pairing(pairing, prefix), x)
-            active = pairing[f"{prefix}active"]
+            active, numbers = pairing["active"], sides.slave.nodes
             pressure = np.where(active, -self.penalty * gaps, 0.0)
             cells = Cells(*(pairing[f"{prefix}cells.{entry.name}"] for entry in fields(Cells)))
             points = at_nodes(sides, cells, x, areas, gaps, pressure, active)
-            half_passes.append(replace(points, on_master=np.full(len(gaps), prefix == PREFIXES[1])))
+            on_master = np.full(interface.n_nodes, prefix == PREFIXES[1])
+            half_passes.append((replace(points, on_master=on_master), numbers))
         names = [entry.name for entry in fields(ContactPoints)]
-        return ContactPoints(**{name: np.concatenate([getattr(each, name) for each in half_passes]) for name in names})
-
-    def _half_passes(self, interface: Interface) -> HalfPasses:
-        """Return both half passes. The last ones are kept: exchanging the roles costs as much as finding the cells."""
-        if not self._last or self._last[0][0] is not interface:
-            self._last[:] = [(interface, _make_half_passes(interface))]
-        return self._last[0][1]
-
-    def _half_tangent(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, prefix: str, sides: Interface, places: IntArray
-    ) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return rows, columns and values of the derivative of one half pass: Σ p_j ΔB_j + B Δp on its own rows."""
-        x, active = np.array(z)[places].reshape(-1, 2), pairing[f"{prefix}active"]
-        weighted = self._carrying(sides, pairing, prefix, x[None])
-        areas = np.where(active, weighted.areas[0], 1.0)
-        gaps = np.where(active, weighted.with_gap[0] / areas, 0.0)
-        stiffness = np.where(active, self.penalty, 0.0)
-        rows = Rows(
-            weighted.ranges.gains(sides, x, self.rule),
-            weighted.points[0],
-            weighted.shapes,
-            weighted.ranges.slave,
-            weighted.ends,
-            weighted.ranges.local_nodes(sides),
-            len(sides.slave),
-            interface.n_unknowns,
-            dual=False,
+        return ContactPoints(
+            **{name: np.concatenate([getattr(each, name)[numbers] for each, numbers in half_passes]) for name in names}
         )
-        derivative, influence = at_fixed_pressures(rows, -stiffness * gaps)
-        whole = derivative - influence @ sparse.diags_array(stiffness) @ rows.weighted_gaps(gaps, areas)
-        block = whole.tocsr()[: 2 * sides.n_slave_nodes].tocoo()
-        return places[block.row], places[block.col], block.data
 
-    def _carrying(self, sides: Interface, pairing: Pairing, prefix: str, x: Array) -> _Weighted:
-        """Compute the points on the slave segments with an active node; the others carry no pressure."""
-        ranges = Ranges.from_pairing(pairing, prefix).near(pairing[f"{prefix}active"], sides)
-        return self._at(sides, ranges, x)
+    def _carrying(self, interface: Interface, pairing: Pairing, x: Array) -> list[_HalfPass]:
+        """Compute the points on the segments with an active node; the others carry no pressure."""
+        active = pairing["active"]
+        return [
+            self._at(sides, Ranges.from_pairing(pairing, prefix).near(active, sides), x)
+            for prefix, sides in _both_sides(interface)
+        ]
 
-    def _at(self, sides: Interface, ranges: Ranges, x: Array) -> _Weighted:
+    def _at(self, sides: Sides, ranges: Ranges, x: Array) -> _HalfPass:
         """Compute points, shapes and weighted gaps at the positions x (n_states, n_nodes, 2)."""
         points, ends = ranges.points(sides, x, self.rule), sides.slave.segments[ranges.slave]
         shapes = Shapes.standard(points)
-        return _Weighted(ranges, points, shapes, ends, *integrals(shapes, points, ends, sides.n_slave_nodes))
+        return _HalfPass(sides, ranges, points, shapes, ends, *integrals(shapes, points, ends, x.shape[1]))
 
-    def _gaps(self, sides: Interface, ranges: Ranges, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
-        weighted = self._at(sides, ranges, x[None])
-        covered = weighted.areas[0] > UNCOVERED * own_lengths(sides, x if self.rule.current else sides.nodes)
-        gaps = np.full(len(covered), np.nan)
-        gaps[covered] = weighted.with_gap[0, covered] / weighted.areas[0, covered]
-        return np.where(covered, weighted.areas[0], 0.0), gaps
+    def _shape_points(self, half_pass: _HalfPass, x: FloatArray) -> ShapedPoints:
+        """Return the points of one state, with their Δ at x (n_nodes, 2)."""
+        sides, ranges = half_pass.sides, half_pass.ranges
+
+        def make_gains(begin: int, end: int) -> FloatArray:
+            return ranges.select(slice(begin, end)).gains(sides, x, self.rule)
+
+        return ShapedPoints(half_pass.points[0], half_pass.shapes, ranges.slave, sides.slave.segments, make_gains)
+
+    def _gaps(self, sides: Sides, ranges: Ranges, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ∫N_j and G_j (n_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
+        half_pass = self._at(sides, ranges, x[None])
+        lengths = own_lengths(sides, x if self.rule.current else sides.nodes)
+        return divide_covered(half_pass.areas[0], half_pass.with_gap[0], lengths)
 
 
-def _find_cells(sides: Interface, x: FloatArray) -> Cells:
+def _both_sides(interface: Interface) -> tuple[tuple[str, Sides], ...]:
+    """Return for each half pass its prefix, and the surfaces in their roles."""
+    nodes, slave, master = interface.nodes, interface.slave, interface.master
+    return (PREFIXES[0], Sides(nodes, slave, master)), (PREFIXES[1], Sides(nodes, master, slave))
+
+
+def _find_cells(sides: Sides, x: FloatArray) -> Cells:
     """Return the cells of segments that meet at no more than 60°, at the positions x (n_nodes, 2)."""
     cells = Cells.find(sides, x, averaged=False)
     slave = np.diff(x[sides.slave.segments[cells.slave]], axis=1)[:, 0]
@@ -181,14 +193,40 @@ def _find_cells(sides: Interface, x: FloatArray) -> Cells:
     return cells.select((slave * master).sum(axis=1) <= STEEPEST * sizes)
 
 
-def _make_half_passes(interface: Interface) -> HalfPasses:
-    """Return for each half pass its prefix, the interface in its roles, and the places of its positions in z."""
-    positions = np.arange(interface.n_unknowns)
-    swapped = interface.swap_roles()
-    return (
-        (PREFIXES[0], interface, positions),
-        (PREFIXES[1], swapped, np.roll(positions, -2 * interface.n_slave_nodes)),
-    )
+def _couple(active: BoolArray, half_passes: list[_HalfPass], groups: list[RowGroups]) -> Couplings:
+    """Return the couplings of both half passes: around an active node, the nodes of its segments feel its group."""
+    parts = [
+        _couple_half_pass(active, each.sides.slave.segments, of_rows.nodes, of_rows.starts)
+        for each, of_rows in zip(half_passes, groups, strict=True)
+    ]
+    nodes = np.concatenate([part[0] for part in parts])
+    shift = len(parts[0][0])
+    starts = np.concatenate([parts[0][1][:-1], parts[1][1] + shift])
+    return Couplings(nodes, starts, np.concatenate([parts[0][2], parts[1][2] + shift]))
+
+
+@compile_kernel
+def _couple_half_pass(
+    active: BoolArray, slave: IntArray, nodes: NumberArray, starts: IntArray
+) -> tuple[NumberArray, IntArray, IntArray]:
+    """Return the couplings of one half pass; each holds a group, and behind it once more the nodes that are pushed."""
+    around = np.full((len(active), 3), -1, dtype=np.int64)
+    for s in range(len(slave)):
+        a, b = slave[s, 0], slave[s, 1]
+        around[a, 1], around[b, 1], around[a, 2], around[b, 0] = a, b, b, a
+    together, count = np.empty(len(nodes) + 3 * len(active), dtype=np.int32), 0
+    begins, first_row = np.zeros(len(active) + 1, dtype=np.int64), np.empty(len(active), dtype=np.int64)
+    for j in range(len(active)):
+        for place in range(starts[j], starts[j + 1]):
+            together[count] = nodes[place]
+            count += 1
+        first_row[j] = count
+        for side in range(3):
+            if starts[j + 1] > starts[j] and around[j, side] >= 0:
+                together[count] = around[j, side]
+                count += 1
+        begins[j + 1] = count
+    return together[:count].copy(), begins, first_row
 
 
 def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -> TwoHalfPasses:

@@ -8,35 +8,30 @@ Source: Puso & Laursen (2004); Popp, Gitterle, Gee & Wall (2010).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import Couplings
+from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif_mortar import cell_forces
-from contactverif_mortar.cell_geometry import D_C
-from contactverif_mortar.integration_cells import Cells, Quadrature
-from contactverif_mortar.node_factors import (
-    Factors,
-    check_product,
-    fixed_pressures,
-    group_nodes,
-    multiply,
-    rows_of_nodes,
-)
-from contactverif_mortar.pressure_shapes import Rows, Shapes, integrals
+from contactverif_mortar.integration_cells import Cells, Quadrature, Sides
+from contactverif_mortar.node_factors import Factors, NodeRows
+from contactverif_mortar.node_groups import RowGroups, check_product, group_nodes
+from contactverif_mortar.node_rows import NodeState, Weights, node_rows, weigh
+from contactverif_mortar.pressure_shapes import Shapes, integrals
+from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
 
 # The smallest covered share of a node's own length that counts. Below it the node would carry less than the roundoff of
 # its neighbour's force, and the row of its multiplier would vanish.
 UNCOVERED = 64 * UNIT_ROUNDOFF
 
 
-def own_lengths(interface: Interface, x: FloatArray) -> FloatArray:
+def own_lengths(interface: Interface | Sides, x: FloatArray) -> FloatArray:
     """Return half of the length of the segments at each slave node (n_slave_nodes,), at x (n_nodes, 2)."""
     halves = np.repeat(interface.slave.lengths(x) / 2, 2)
     ends, n_nodes = interface.slave.segments.ravel(), interface.n_slave_nodes
@@ -44,23 +39,25 @@ def own_lengths(interface: Interface, x: FloatArray) -> FloatArray:
     return lengths
 
 
-class NodeState(NamedTuple):
-    """The slave nodes of a method at one state.
+def divide_covered(areas: FloatArray, with_gap: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ∫N_j and G_j (n_slave_nodes,) of nodes with own `lengths`; zero and NaN where nothing is covered."""
+    covered = areas > UNCOVERED * lengths
+    gaps = np.full(len(covered), np.nan)
+    gaps[covered] = with_gap[covered] / areas[covered]
+    return np.where(covered, areas, 0.0), gaps
 
-    Attributes
-    ----------
-    pressure : FloatArray, shape (n_slave_nodes,)
-        The pressures p_j, zero where a node is not active.
-    weights : FloatArray, shape (n_slave_nodes,)
-        Δp_j for each unit of row j of `Factors.right`.
-    gaps, divisor : FloatArray, shape (n_slave_nodes,)
-        G_j and ∫φ_j, if that row is ΔG_j. Zero and one, if it is Δ∫φ_j g.
-    """
 
-    pressure: FloatArray
-    weights: FloatArray
-    gaps: FloatArray
-    divisor: FloatArray
+class WeightedState(NamedTuple):
+    """The points of some cells at one state, the slave nodes' shapes there, and the integrals of the shapes."""
+
+    areas: FloatArray  # (n_slave_nodes,)
+    with_gap: FloatArray  # (n_slave_nodes,)
+    points: FloatArray  # (n_points, 6)
+    shapes: Shapes
+    segment: IntArray  # (n_points,)
+
+
+StateWeights = Weights | WeightedState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +76,7 @@ class Weighted:
         The slave nodes of each point.
     segment : IntArray, shape (n_points,)
         The slave segment of each point.
-    nodes : IntArray, shape (n_cells, n_local)
+    nodes : NumberArray, shape (n_cells, n_local)
         The nodes of `Cells.local_nodes`.
     areas, with_gap : Array, shape (n_states, n_slave_nodes)
         ∫φ_j and ∫φ_j g.
@@ -90,9 +87,13 @@ class Weighted:
     shapes: Shapes
     ends: IntArray
     segment: IntArray
-    nodes: IntArray
+    nodes: NumberArray
     areas: Array
     with_gap: Array
+
+    def one_state(self) -> WeightedState:
+        """Return what there is of the first state."""
+        return WeightedState(self.areas[0], self.with_gap[0], self.points[0], self.shapes, self.segment)
 
     def forces(self, pressure: Array, n_nodes: int) -> Array:
         """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_slave_nodes) of the slave nodes."""
@@ -130,14 +131,17 @@ class Weighting:
         """Do so on the cells whose slave segment has an active node; the others carry no pressure."""
         return self.at(interface, Cells.from_pairing(pairing).near(pairing["active"], interface), x)
 
+    def weigh(self, interface: Interface, cells: Cells, x: FloatArray) -> StateWeights:
+        """Compute the integrals of the shapes on some cells at one state, x (n_nodes, 2)."""
+        if not self.averaged:
+            return weigh(interface, cells, self.quadrature, x, self.dual)
+        return self.at(interface, cells, x[None]).one_state()
+
     def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
-        weighted = self.at(interface, cells, x[None])
+        weights = self.weigh(interface, cells, x)
         lengths = own_lengths(interface, x if self.quadrature.current else interface.nodes)
-        covered = weighted.areas[0] > UNCOVERED * lengths
-        gaps = np.full(len(covered), np.nan)
-        gaps[covered] = weighted.with_gap[0, covered] / weighted.areas[0, covered]
-        return np.where(covered, weighted.areas[0], 0.0), gaps
+        return divide_covered(weights.areas, weights.with_gap, lengths)
 
     def pairing(self, interface: Interface, x: FloatArray, penalty: float, multipliers: FloatArray | float) -> Pairing:
         """Find the cells, and the active slave nodes: those that are covered and have λ_j − ε̂ G_j ≥ 0."""
@@ -145,121 +149,84 @@ class Weighting:
         _, gaps = self.gaps(interface, cells, x)
         return Pairing({**cells.as_arrays(), "active": multipliers - penalty * gaps >= 0})  # false where the gap is NaN
 
-    @property
-    def plain(self) -> bool:
-        """True for standard shapes on slaves that look along their own normal: `node_factors` serves them."""
-        return not (self.averaged or self.dual)
-
     def tangent(
-        self, interface: Interface, active: BoolArray, weighted: Weighted, x: FloatArray, state: NodeState
-    ) -> sparse.csr_array:
-        """Compute the assembled tangent (n_unknowns, n_unknowns) at a state of the slave nodes."""
-        if not self.plain:
-            return self.factors(interface, active, weighted, x, state).assemble()
-        groups = group_nodes(interface, weighted.cells, active)
-        check_product(groups)
-        factors = self._plain_factors(interface, groups, weighted, x, state, groups)
-        return multiply(factors, groups)
-
-    def factors(
-        self, interface: Interface, active: BoolArray, weighted: Weighted, x: FloatArray, state: NodeState
-    ) -> Factors:
-        """Compute the tangent in factors at a state of the slave nodes."""
-        if self.plain:
-            groups = group_nodes(interface, weighted.cells, active)
-            return self._plain_factors(interface, groups, weighted, x, state, None)
-        rows = self.rows(interface, weighted, x)
-        rest, left = at_fixed_lengths(rows, state.pressure)
-        right, weights = rows.weighted_gaps(state.gaps, state.divisor), state.weights
-        if self.dual:
-            left = sparse.hstack([left, by_lengths(rows, state.pressure)])
-            right = sparse.vstack([right, rows.segment_moments()])
-            weights = np.append(weights, np.ones(right.shape[0] - len(weights)))
-        return Factors(rest, left.T.tocsr(), weights, right.tocsr())
-
-    def saddle(
-        self, interface: Interface, active: BoolArray, weighted: Weighted, x: FloatArray, multipliers: FloatArray
-    ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-        """Compute Σ λ_j ΔB_j, B (n_unknowns, n_slave_nodes) and Δ∫φ_j g (n_slave_nodes, n_unknowns)."""
-        zeros, ones = np.zeros(len(active)), np.ones(len(active))
-        if self.plain:
-            state = NodeState(multipliers, ones, zeros, ones)
-            rest, left, _, right = self.factors(interface, active, weighted, x, state)
-            return rest, left.T.tocsr(), right
-        rows = self.rows(interface, weighted, x)
-        return *at_fixed_pressures(rows, multipliers), rows.weighted_gaps(zeros, ones)
-
-    def _plain_factors(
         self,
         interface: Interface,
-        groups: Couplings,
-        weighted: Weighted,
+        cells: Cells,
+        active: BoolArray,
+        weights: StateWeights,
         x: FloatArray,
         state: NodeState,
-        pattern: Couplings | None,
+    ) -> NodeRows:
+        """Compute forces and the assembled tangent, which is the `rest` of the result, at a state of the slave nodes.
+
+        Raises
+        ------
+        MisuseError
+            If the assembled tangent would not fit into memory.
+        """
+        n_nodes = len(active)
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            check_product(groups.starts[: n_nodes + 1])
+            return groups.pattern(0, n_nodes)
+
+        rows = self._rows(interface, cells, active, weights, x, state, choose_pattern)
+        rows.multiply(state.weights, 0, len(rows.groups.starts) - 1)
+        return rows
+
+    def factors(
+        self,
+        interface: Interface,
+        cells: Cells,
+        active: BoolArray,
+        weights: StateWeights,
+        x: FloatArray,
+        state: NodeState,
     ) -> Factors:
-        """Compute the factors for standard shapes, with `pattern` for the rest if it is to have more entries."""
-        arguments = (interface, weighted.cells, self.quadrature, x, weighted.points[0])
-        rest = fixed_pressures(*arguments, state.pressure, pattern)
-        left, right = rows_of_nodes(*arguments, groups, state.gaps, state.divisor)
-        return Factors(rest, left, state.weights, right)
+        """Compute the tangent in factors at a state of the slave nodes."""
+        rows = self._rows(interface, cells, active, weights, x, state, RowGroups.pattern_of_cells)
+        return rows.factors(state.weights)
 
-    def rows(self, interface: Interface, weighted: Weighted, x: FloatArray) -> Rows:
-        """Compute all Δ of the points of one state, x (n_nodes, 2)."""
-        return Rows(
-            self.quadrature.gains(interface, weighted.cells, x),
-            weighted.points[0],
-            weighted.shapes,
-            weighted.segment,
-            weighted.ends,
-            weighted.nodes,
-            len(interface.slave),
-            interface.n_nodes * 2,
-            self.dual,
+    def saddle(
+        self, interface: Interface, cells: Cells, active: BoolArray, x: FloatArray, multipliers: FloatArray
+    ) -> Factors:
+        """Compute Σ λ_j ΔB_j, B and Δ∫φ_j g: the `rest`, and `left` and `right` of the slave nodes alone."""
+        zeros, ones, n_nodes = np.zeros(len(active)), np.ones(len(active)), len(active)
+        state, weights = NodeState(multipliers, ones, zeros, ones), self.weigh(interface, cells, x)
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            if self.dual:
+                return groups.pattern(n_nodes, len(groups.starts) - 1)
+            return groups.pattern_of_cells()
+
+        rows = self._rows(interface, cells, active, weights, x, state, choose_pattern)
+        rows.multiply(ones, n_nodes, len(rows.groups.starts) - 1)
+        rest, left, _, right = rows.factors(ones)
+        return Factors(rest, left[:n_nodes], ones, right[:n_nodes])
+
+    def _rows(
+        self,
+        interface: Interface,
+        cells: Cells,
+        active: BoolArray,
+        weights: StateWeights,
+        x: FloatArray,
+        state: NodeState,
+        choose_pattern: Callable[[RowGroups], Couplings],
+    ) -> NodeRows:
+        """Compute forces and factors, with a pattern for the rest that depends on the groups of the rows."""
+        groups = group_nodes(
+            interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, self.dual
         )
+        pattern = choose_pattern(groups)
+        if isinstance(weights, Weights):
+            return node_rows(interface, cells, self.quadrature, x, weights.shapes, state, groups, pattern)
 
+        def make_gains(begin: int, end: int) -> FloatArray:
+            return self.quadrature.gains(interface, cells.select(slice(begin, end)), x)
 
-def at_fixed_pressures(rows: Rows, pressure: FloatArray) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Compute the derivative of the forces at fixed nodal pressures, and the forces of unit pressures.
-
-    Parameters
-    ----------
-    rows : Rows
-        The Δ of the points of one state.
-    pressure : FloatArray, shape (n_slave_nodes,)
-        Pressures p_j of the slave nodes.
-
-    Returns
-    -------
-    derivative : sparse.csr_array, shape (n_unknowns, n_unknowns)
-        Σ p_j ΔB_j.
-    influence : sparse.csr_array, shape (n_unknowns, n_slave_nodes)
-        B, whose columns are the forces of a unit pressure at one node.
-    """
-    derivative, influence = at_fixed_lengths(rows, pressure)
-    if rows.dual:
-        derivative = derivative + by_lengths(rows, pressure) @ rows.segment_moments()
-    return derivative, influence
-
-
-def at_fixed_lengths(rows: Rows, pressure: FloatArray) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Compute the same, but for what the mean and the variance of c on a slave segment add to ΔB of dual shapes."""
-    points, shapes, size = rows.points, rows.shapes, rows.n_unknowns
-    difference = pressure[rows.ends[:, 1]] - pressure[rows.ends[:, 0]]
-    d_pressure = (difference * shapes.slope[0])[:, None, None] * rows.gains[:, D_C]
-    at_points = shapes.at(pressure[None], rows.ends)[0]
-    derivative = cell_forces.tangent(points, rows.gains, at_points, d_pressure, rows.nodes, size).tocsr()
-    ends = rows.by_cell(rows.ends)
-    influence = cell_forces.influence(points, shapes.values[0], ends, rows.nodes, (size, len(pressure))).tocsr()
-    return derivative, influence
-
-
-def by_lengths(rows: Rows, pressure: FloatArray) -> sparse.csr_array:
-    """Compute the forces of a unit of c̄ and, behind them, of v of all slave segments, (n_unknowns, 2 n_segments)."""
-    shapes = rows.shapes
-    difference = pressure[rows.ends[:, 1]] - pressure[rows.ends[:, 0]]
-    by = np.column_stack([difference * shapes.by_mean[0], difference * shapes.by_variance[0]])
-    segment = rows.by_cell(rows.segment)
-    places = np.column_stack([segment, segment + rows.n_segments])
-    shape = (rows.n_unknowns, 2 * rows.n_segments)
-    return cell_forces.influence(rows.points, by, places, rows.nodes, shape).tocsr()
+        shaped = ShapedPoints(weights.points, weights.shapes, weights.segment, interface.slave.segments, make_gains)
+        forces, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
+        left, right = add_shaped_rows(shaped, groups, state, 4, forces, rest)
+        return NodeRows(forces, rest, groups, left, right)

@@ -6,21 +6,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from readable_mortar import half_pass_tangent, mortar_tangent
+from readable_mortar import tangent as cell_tangent
 from surfaces import make_bent
 
 import contactverif_mortar
 from contactverif import Interface, MisuseError
-from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_geometry import D_GAP
 from contactverif_mortar.cell_search import find_cells, longest_of_chain
-from contactverif_mortar.cell_tangent import tangent_of_cells
+from contactverif_mortar.cell_tangent import springs_at_points
 from contactverif_mortar.integration_cells import GAP, Cells, Quadrature
-from contactverif_mortar.node_factors import check_product, group_nodes
-from contactverif_mortar.weighted_gaps import at_fixed_pressures
+from contactverif_mortar.node_groups import check_product
 
 PENALTY = 8.0
 ROUNDINGS = 256 * 2.0**-53  # Some hundred sums and products, each rounded once.
-MORTARS = [("mortar", {}), ("mortar", {"area": "reference"}), ("mortar_dual", {}), ("mortar", {"normals": "averaged"})]
+MORTARS = [
+    ("mortar", {}),
+    ("mortar", {"area": "reference"}),
+    ("mortar_dual", {}),
+    ("mortar_dual", {"area": "reference"}),
+    ("mortar", {"normals": "averaged"}),
+    ("mortar_dual", {"normals": "averaged"}),
+]
 
 
 def largest_error(computed: Any, expected: Any) -> float:
@@ -34,25 +41,40 @@ def test_the_frame_of_the_slave_gives_the_derivative_of_the_global_frame(seed: i
     x, rule = z.reshape(-1, 2), Quadrature.gauss(3, current)
     cells = Cells.find(interface, x, averaged=False)
     points, gains = rule.points(interface, cells, x[None])[0], rule.gains(interface, cells, x)
-    pressure, by_c = np.random.default_rng(seed).uniform(1, 2, (2, len(points)))
-    by_gap = -PENALTY * points[:, GAP]
-    d_pressure = by_c[:, None, None] * gains[:, 0] + by_gap[:, None, None] * gains[:, D_GAP]
-    readable = cell_forces.tangent(points, gains, pressure, d_pressure, cells.local_nodes(interface), z.size)
-    written = tangent_of_cells(interface, cells, rule, x, points, (pressure, by_c, by_gap))
+    active = np.random.default_rng(seed).random(len(points)) < 0.7
+    by_gap = np.where(active, -PENALTY, 0.0)
+    readable = cell_tangent(
+        points,
+        gains,
+        by_gap * points[:, GAP],
+        by_gap[:, None, None] * gains[:, D_GAP],
+        cells.local_nodes(interface),
+        z.size,
+    )
+    _, written = springs_at_points(interface, cells, rule, x, PENALTY, active)
     assert largest_error(written.toarray(), readable.toarray()) <= ROUNDINGS
 
 
+@pytest.mark.parametrize(("name", "options"), MORTARS)
 @pytest.mark.parametrize("seed", range(4))
-def test_mortar_writes_what_sparse_products_make(seed: int) -> None:
+def test_mortar_writes_what_sparse_products_make(seed: int, name: str, options: dict[str, str]) -> None:
     interface, z = make_bent(seed)
-    plugin = contactverif_mortar.mortar(penalty=PENALTY)
+    plugin = getattr(contactverif_mortar, name)(penalty=PENALTY, **options)
     pairing = plugin.pair(interface, z)
     assert pairing["active"].any()
-    x, weighted, state = plugin._node_state(interface, pairing, z)
-    rows = plugin.weighting.rows(interface, weighted, x)
-    derivative, influence = at_fixed_pressures(rows, state.pressure)
-    readable = derivative + (influence * state.weights) @ rows.weighted_gaps(state.gaps, state.divisor)
-    assert largest_error(plugin.tangent(interface, pairing, z).toarray(), readable.toarray()) <= ROUNDINGS
+    readable = mortar_tangent(plugin, interface, pairing, z)
+    assert largest_error(plugin.tangent(interface, pairing, z).toarray(), readable) <= ROUNDINGS
+
+
+@pytest.mark.parametrize("area", ["current", "reference"])
+@pytest.mark.parametrize("seed", range(4))
+def test_two_half_passes_write_what_sparse_products_make(seed: int, area: str) -> None:
+    interface, z = make_bent(seed)
+    plugin = contactverif_mortar.mortar_two_half_pass(penalty=PENALTY, area=area)
+    pairing = plugin.pair(interface, z)
+    assert pairing["active"].any()
+    readable = half_pass_tangent(plugin, interface, pairing, z)
+    assert largest_error(plugin.tangent(interface, pairing, z).toarray(), readable) <= ROUNDINGS
 
 
 @pytest.mark.parametrize(("name", "options"), MORTARS)
@@ -93,21 +115,25 @@ def test_a_tangent_that_fits_into_no_memory_is_refused_with_its_size() -> None:
     with pytest.raises(MisuseError, match=r"tangent: found about 161 GiB .* 60003 nodes .* at most 32 GiB; use"):
         plugin.tangent(interface, pairing, z)
     assert np.isfinite(plugin.factors(interface, pairing, z) @ z).all()
-    check_product(group_nodes(interface, Cells.from_pairing(pairing), np.zeros(2, dtype=np.bool_)))
+    check_product(np.zeros(3, dtype=np.int64))  # Nobody is active.
 
 
+@pytest.mark.parametrize("n_finer", [72, 400])
+@pytest.mark.parametrize("finer_is_slave", [False, True])
 @pytest.mark.parametrize("averaged", [False, True])
-def test_a_search_that_stops_early_finds_the_cells_of_one_that_looks_at_all(averaged: bool) -> None:
+def test_a_search_that_stops_early_finds_the_cells_of_one_that_looks_at_all(
+    averaged: bool, finer_is_slave: bool, n_finer: int
+) -> None:
     """Two turns of a spiral, its two sides being the surfaces: the outer turn is behind the inner one."""
     angle = np.linspace(0, 4 * np.pi, 61)
     radius = 1 + 0.04 * angle
     outline = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    finer = np.column_stack([np.interp(np.linspace(0, 60, 72), np.arange(61), 1.01 * axis) for axis in outline.T])
-    interface = Interface.from_chains(outline, finer[::-1])
+    finer = np.column_stack([np.interp(np.linspace(0, 60, n_finer), np.arange(61), 1.01 * axis) for axis in outline.T])
+    interface = Interface.from_chains(*((finer, outline[::-1]) if finer_is_slave else (outline, finer[::-1])))
     x = interface.nodes
     cells = Cells.find(interface, x, averaged)
     order, n = interface.master.chain_order, len(interface.master)
-    one_box = (np.append(order, [-1] * (4 - n % 4)) if n % 4 else order, np.tile([-10.0, -10.0, 10.0, 10.0], (64, 1)))
+    one_box = (np.append(order, [-1] * (4 - n % 4)) if n % 4 else order, np.tile([-10.0, -10.0, 10.0, 10.0], (256, 1)))
     lengths = [longest_of_chain(surface, x) for surface in (interface.slave, interface.master)]
     segments = (interface.slave.segments, interface.master.segments, cells.before, cells.behind)
     everything = find_cells(x, *segments, *lengths, one_box)
