@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from contactverif.contract.subject import CheckedFormulation, Subject
     from contactverif.contract.traits import Traits
     from contactverif.mechanics.mesh_bodies import body_from_mesh
-    from contactverif.mechanics.newton import End, Trace, solve
+    from contactverif.mechanics.newton import solve
     from contactverif.mechanics.scene import Scene
     from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
+    from contactverif.mechanics.trace import End, Trace
     from contactverif.meshes.mesh_file import read_interface
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import judge_case

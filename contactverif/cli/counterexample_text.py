@@ -69,7 +69,7 @@ def ending_lines(outcome: Outcome) -> list[str]:
 
 
 def _ending(value: float, iterations: float) -> str:
-    from contactverif.mechanics.newton import End  # It brings scipy, and is needed only where a property solved.
+    from contactverif.mechanics.trace import End  # It brings scipy, and is needed only where a property solved.
 
     end = End(int(value))
     after = f"after {iterations:g} iteration{'s' * (iterations != 1)}"

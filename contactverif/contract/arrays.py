@@ -27,7 +27,8 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
     """Return a contiguous read-only copy of an array.
 
-    The copy stands on immutable bytes, so that nobody can make it writeable again.
+    The copy stands on immutable bytes, so that nobody can make it writeable again. An array that already does is
+    returned as it is.
 
     Parameters
     ----------
@@ -42,11 +43,21 @@ def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
         The copy, of the same shape.
     """
     array = np.asarray(values, dtype=dtype)
+    if _is_frozen(array):
+        return array
     if array.size == 0:
         array = array.copy()
         array.setflags(write=False)
         return array
     return np.frombuffer(array.tobytes(), dtype=dtype).reshape(array.shape)
+
+
+def _is_frozen(array: NDArray[Any]) -> bool:
+    """Return whether an array is contiguous and stands on immutable bytes."""
+    base: Any = array.base
+    while type(base) is np.ndarray:
+        base = base.base
+    return type(base) is bytes and type(array) is np.ndarray and array.flags.c_contiguous
 
 
 def dense(matrix: Any) -> FloatArray:

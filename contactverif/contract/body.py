@@ -8,6 +8,7 @@ roller on an inclined side is a fixed component like any other.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -87,21 +88,23 @@ class Body:
         self._set_array("start", np.float64, (2,))
         if abs(np.hypot(*self.axis) - 1) > 1e-12:
             self._refuse("axis", f"({self.axis[0]}, {self.axis[1]})", "a unit vector")
-        self._check_node_numbers()
         frame = [[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]]
         object.__setattr__(self, "frame", freeze(frame, np.float64))
-        object.__setattr__(self, "contact_nodes", freeze(np.unique(self.contact), np.int64))
+        check = _check_small_mesh if self.cells.size <= _SMALL else _check_mesh
+        mesh = check(n_nodes, self.cells.shape, self.cells.tobytes(), self.contact.tobytes())
+        if mesh.fault is not None and not mesh.is_numbered:
+            self._refuse(*mesh.fault)
+        object.__setattr__(self, "contact_nodes", mesh.contact_nodes)
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
         self._set_material("young", 0.0, np.inf, "Young's modulus > 0")
         self._set_material("poisson", -1.0, 0.5, _POISSON)
         if not self.rigid:
-            self._check_cells()
-            self._check_contact()
+            self._check_turns()
         elif not self.fixed.all():
             self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
-        if any(len(set(ends)) < len(ends) for ends in self.contact.T.tolist()):
-            self._refuse("contact", "two edges that begin or end at one node", "each edge once, in chains")
+        if mesh.fault is not None:
+            self._refuse(*mesh.fault)
 
     @property
     def rigid(self) -> bool:
@@ -119,8 +122,8 @@ class Body:
 
     def _set_array(self, name: str, dtype: Any, shape: tuple[int, ...], default: Any = None) -> None:
         """Make the attribute a read-only array of that dtype and shape; an empty one becomes the default everywhere."""
-        argument = f"{self.name}: {name}"
-        raw = as_array(argument, getattr(self, name))
+        argument, values = f"{self.name}: {name}", getattr(self, name)
+        raw = as_array(argument, values)
         if default is not None and raw.size == 0:
             raw = np.full(shape, default)
         if name == "cells" and raw.size == 0:
@@ -140,42 +143,88 @@ class Body:
             self._refuse(name, f"{getattr(self, name)!r}", needed)
         object.__setattr__(self, name, float(number))
 
-    def _check_node_numbers(self) -> None:
-        n_nodes = len(self.nodes)
-        for name in ("cells", "contact"):
-            numbers = getattr(self, name)
-            if numbers.size and not 0 <= numbers.min() <= numbers.max() < n_nodes:
-                outlier = numbers.min() if numbers.min() < 0 else numbers.max()
-                self._refuse(name, f"node number {outlier}", f"numbers from 0 to {n_nodes - 1}")
-        if not len(self.contact):
-            self._refuse("contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)")
-
-    def _check_cells(self) -> None:
+    def _check_turns(self) -> None:
         corners = self.nodes[self.cells]  # (n_cells, n_corners, 2)
-        to_next = np.roll(corners, -1, axis=1) - corners
-        turn = to_next[:, :, 0] * np.roll(to_next, -1, axis=1)[:, :, 1]
-        turn = turn - to_next[:, :, 1] * np.roll(to_next, -1, axis=1)[:, :, 0]
-        bad = np.flatnonzero((turn <= 0).any(axis=1))
-        if len(bad):
+        n_corners = self.cells.shape[1]
+        to_next = corners[:, _following(n_corners)] - corners
+        after = to_next[:, _following(n_corners)]
+        turn = to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0]
+        if not (turn > 0).all():
+            bad = np.flatnonzero((turn <= 0).any(axis=1))
             self._refuse("cells", f"cell {bad[0]}, which is clockwise, folded or flat", "convex, counter-clockwise")
-        unused = np.setdiff1d(np.arange(len(self.nodes)), self.cells)
-        if len(unused):
-            self._refuse("nodes", f"node {unused[0]} in no cell", "every node in a cell")
-
-    def _check_contact(self) -> None:
-        n_nodes = len(self.nodes)
-        following = np.roll(self.cells, -1, axis=1)
-        edges = self.cells * n_nodes + following  # Each edge as one number, the cell on its left.
-        ordered = np.sort(edges, axis=None)
-        if (ordered[1:] == ordered[:-1]).any():
-            self._refuse("cells", "two cells on the same side of an edge", "cells that do not overlap")
-        inside = np.isin(edges, following * n_nodes + self.cells)
-        outer = edges[~inside]
-        wrong = np.flatnonzero(~np.isin(self.contact[:, 0] * n_nodes + self.contact[:, 1], outer))
-        if len(wrong):
-            first, second = self.contact[wrong[0]]
-            needed = "edges of the boundary, each with the body on its left"
-            self._refuse("contact", f"the edge from node {first} to node {second}", needed)
 
     def _refuse(self, name: str, found: str, needed: str) -> None:
         raise MisuseError(f"{self.name}: {name}", found, needed)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _MeshCheck:
+    """The part of a check of a mesh for which node numbers are enough.
+
+    Attributes
+    ----------
+    contact_nodes : IntArray, shape (n_contact_nodes,)
+        The numbers of the nodes on the contact boundary, ascending.
+    is_numbered : bool
+        Cells and contact edges are there, and no number is beyond the nodes.
+    fault : tuple[str, str, str] | None
+        The attribute of `Body` that is wrong, what was found and what is needed; None if nothing is.
+    """
+
+    contact_nodes: IntArray
+    is_numbered: bool
+    fault: tuple[str, str, str] | None
+
+
+def _check_mesh(n_nodes: int, shape: tuple[int, int], cell_bytes: bytes, contact_bytes: bytes) -> _MeshCheck:
+    """Check the node numbers of cells, of that shape, and of contact edges, both given as the bytes of int64 arrays."""
+    cells = np.frombuffer(cell_bytes, np.int64).reshape(shape)
+    contact = np.frombuffer(contact_bytes, np.int64).reshape(-1, 2)
+    fault = _find_wrong_number(n_nodes, cells, contact)
+    is_numbered = fault is None
+    if fault is None and len(cells):
+        fault = _find_wrong_cell(n_nodes, cells) or _find_wrong_edge(n_nodes, cells, contact)
+    if fault is None and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
+        fault = "contact", "two edges that begin or end at one node", "each edge once, in chains"
+    return _MeshCheck(freeze(np.unique(contact), np.int64), is_numbered, fault)
+
+
+_SMALL = 512  # Number of node numbers of a mesh that is remembered: random meshes share few ways to hang together.
+_check_small_mesh = lru_cache(maxsize=1024)(_check_mesh)
+
+
+def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
+    for name, numbers in (("cells", cells), ("contact", contact)):
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() < n_nodes:
+            outlier = numbers.min() if numbers.min() < 0 else numbers.max()
+            return name, f"node number {outlier}", f"numbers from 0 to {n_nodes - 1}"
+    if not len(contact):
+        return "contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)"
+    return None
+
+
+def _find_wrong_cell(n_nodes: int, cells: IntArray) -> tuple[str, str, str] | None:
+    unused = np.setdiff1d(np.arange(n_nodes), cells)
+    if len(unused):
+        return "nodes", f"node {unused[0]} in no cell", "every node in a cell"
+    ordered = np.sort(cells * n_nodes + cells[:, _following(cells.shape[1])], axis=None)
+    if (ordered[1:] == ordered[:-1]).any():
+        return "cells", "two cells on the same side of an edge", "cells that do not overlap"
+    return None
+
+
+def _find_wrong_edge(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
+    following = cells[:, _following(cells.shape[1])]
+    edges = cells * n_nodes + following  # Each edge as one number, the cell on its left.
+    outer = edges[~np.isin(edges, following * n_nodes + cells)]
+    wrong = np.flatnonzero(~np.isin(contact[:, 0] * n_nodes + contact[:, 1], outer))
+    if not len(wrong):
+        return None
+    first, second = contact[wrong[0]]
+    needed = "edges of the boundary, each with the body on its left"
+    return "contact", f"the edge from node {first} to node {second}", needed
+
+
+def _following(n_corners: int) -> list[int]:
+    """Return the number of the next corner of each corner of a cell."""
+    return [*range(1, n_corners), 0]

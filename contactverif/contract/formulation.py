@@ -132,12 +132,14 @@ class Pairing(Mapping[str, NDArray[Any]]):
         ContractError
             If an integer is below −1, or larger than both the number of unknowns and the longest array of the pairing.
         """
-        pattern = max((values.size for values in self._arrays.values()), default=0)
-        most = max(interface.n_unknowns, pattern)
-        for name, values in self._arrays.items():
-            if values.dtype == np.int64 and values.size and not -1 <= values.min() <= values.max() <= most:
-                outlier = values.min() if values.min() < -1 else values.max()
-                raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
+        most = max([interface.n_unknowns, *(values.size for values in self._arrays.values())])
+        numbers = {name: values for name, values in self._arrays.items() if values.dtype == np.int64}
+        together = np.concatenate([[0], *(values.reshape(-1) for values in numbers.values())])
+        lowest, highest = together.min(), together.max()
+        if not -1 <= lowest <= highest <= most:
+            outlier = lowest if lowest < -1 else highest
+            name = next(name for name, values in numbers.items() if (values == outlier).any())
+            raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
 
     def same_as(self, other: Pairing) -> bool:
         """Return whether names, shapes and all values agree."""

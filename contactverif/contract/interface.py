@@ -8,6 +8,7 @@ knows how segments hang together and nothing of positions; `Interface` adds the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +34,8 @@ class Surface:
     chain_order : IntArray, shape (n_segments,)
         The numbers of the segments in the order of a walk along the chains: open chains from their free ends, then
         closed chains.
+    nodes : IntArray, shape (n_nodes,)
+        The numbers of the nodes of this surface, ascending.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class Surface:
     segments: IntArray
     neighbours: IntArray = field(init=False)
     chain_order: IntArray = field(init=False)
+    nodes: IntArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         raw = as_array("segments", self.segments)
@@ -59,18 +63,15 @@ class Surface:
         if not np.issubdtype(raw.dtype, np.integer):
             raise MisuseError("segments", f"dtype {raw.dtype}", "integer node numbers")
         segments = freeze(raw, np.int64)
-        _check_chains(segments)
+        link = _link_small if segments.size <= _SMALL else _link
+        neighbours, chain_order, nodes = link(segments.tobytes())
         object.__setattr__(self, "segments", segments)
-        object.__setattr__(self, "neighbours", freeze(_neighbours(segments), np.int64))
-        object.__setattr__(self, "chain_order", freeze(_chain_order(self.neighbours), np.int64))
+        object.__setattr__(self, "neighbours", neighbours)
+        object.__setattr__(self, "chain_order", chain_order)
+        object.__setattr__(self, "nodes", nodes)
 
     def __len__(self) -> int:
         return len(self.segments)
-
-    @property
-    def nodes(self) -> IntArray:
-        """The numbers of the nodes of this surface (n_nodes,), ascending."""
-        return np.unique(self.segments)
 
     def lengths(self, nodes: FloatArray) -> FloatArray:
         """Return the lengths of the segments.
@@ -86,7 +87,8 @@ class Surface:
             The lengths, in the unit of the positions.
         """
         ends = nodes[self.segments]  # (n_segments, 2, dim)
-        lengths: FloatArray = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
+        along = ends[:, 1] - ends[:, 0]
+        lengths: FloatArray = np.sqrt((along * along).sum(axis=-1))
         return lengths
 
 
@@ -203,7 +205,7 @@ class Interface:
     @property
     def n_slave_nodes(self) -> int:
         """The number of slave nodes, which are the first nodes."""
-        return int(self.slave.segments.max()) + 1
+        return len(self.slave.nodes)
 
     @property
     def n_unknowns(self) -> int:
@@ -223,6 +225,18 @@ class Interface:
     def at(self, nodes: ArrayLike) -> Interface:
         """Return the interface with the same segments on other reference positions, shape (n_nodes, dim)."""
         return Interface(as_array("nodes", nodes), self.slave, self.master)
+
+
+def _link(data: bytes) -> tuple[IntArray, IntArray, IntArray]:
+    """Check the segments (n_segments, 2) whose bytes are given; return neighbours, chain order and nodes."""
+    segments = np.frombuffer(data, np.int64).reshape(-1, 2)
+    _check_chains(segments)
+    neighbours = freeze(_neighbours(segments), np.int64)
+    return neighbours, freeze(_chain_order(neighbours), np.int64), freeze(np.unique(segments), np.int64)
+
+
+_SMALL = 128  # Number of node numbers of a surface that is remembered: random meshes share few ways to hang together.
+_link_small = lru_cache(maxsize=1024)(_link)
 
 
 def _check_chains(segments: IntArray) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import lru_cache
 
 from contactverif.contract.errors import ContractError
 
@@ -48,6 +49,9 @@ def format_forces(slave: Fractions, master: Fractions) -> str:
     return "; ".join(" ".join(map(str, row)) for row in (slave, master))
 
 
+_parse_once = lru_cache(maxsize=64)(parse_forces)  # Traits are made anew for each penalty.
+
+
 def check_published_forces(forces: object) -> None:
     """Raise a `ContractError` unless this maps names of cases to forces."""
     if not isinstance(forces, Mapping):
@@ -55,4 +59,4 @@ def check_published_forces(forces: object) -> None:
             f"Traits.published_forces: found a {type(forces).__name__}; needed {{name of a flat case: forces}}"
         )
     for text in forces.values():
-        parse_forces(text)
+        (_parse_once if isinstance(text, str) else parse_forces)(text)

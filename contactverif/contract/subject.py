@@ -95,9 +95,16 @@ class Subject:
         float
             The stiffness ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference.
         """
+        return self._convert(case.interface, case.penalty)
+
+    def _convert(self, interface: Interface, penalty: float) -> float:
         if self.traits.penalty != "nodal":
-            return case.penalty
-        return case.penalty * float(case.interface.slave.lengths(case.interface.nodes).mean())
+            return penalty
+        return penalty * float(interface.slave.lengths(interface.nodes).mean())
+
+    def for_interface(self, interface: Interface, penalty: float) -> CheckedFormulation:
+        """Return the formulation with a distributed penalty ε̂ on the meshes of an interface."""
+        return self.with_penalty(self._convert(interface, penalty))
 
     def for_case(self, case: Case) -> CheckedFormulation:
         """Return the formulation with the penalty of a case."""

@@ -22,8 +22,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.newton import End, Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.trace import End, Trace
 
 Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), or to numbers (n,).
 

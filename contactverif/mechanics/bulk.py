@@ -30,6 +30,8 @@ DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is fact
 # A pivot below this share of its diagonal entry is zero: a loose part leaves less than 1e2 u, a long thin bar 1e6 u.
 _PIVOT_FLOOR = 2.0**-40
 _RESISTANCE_FLOOR = 1e-9  # A rigid motion of the body's size that meets less resistance than this is free.
+# A smallest resistance of supports, squared, above this share of the largest is far from the floor and from roundoff.
+_SAFE_RESISTANCE = 1e-6
 _MOTION_FLOOR = 1e-6  # A smaller part of a free motion is not mentioned.
 _MOTIONS = ("move along its first axis", "move along its second axis", "turn")
 
@@ -132,11 +134,12 @@ def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
     strains = unit.reshape(n_cells, n_points, 3, 2 * n_corners)
     blocks = np.matmul(strains.swapaxes(2, 3), elasticity(body) @ strains * areas[..., None, None]).sum(axis=1)
     unknowns = (2 * body.cells[:, :, None] + np.arange(2)).reshape(n_cells, -1)
-    rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+    rows, columns = unknowns[:, :, None], unknowns[:, None, :]
     size = 2 * len(body.nodes)
     if size <= DENSE_LIMIT:
         places = (rows * size + columns).ravel()
         return np.bincount(places, weights=blocks.ravel(), minlength=size * size).reshape(size, size), gradients
+    rows, columns = np.broadcast_arrays(rows, columns)
     return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), gradients
 
 
@@ -162,9 +165,9 @@ def _reference_cell(corners: int) -> tuple[FloatArray, FloatArray]:
 
 def free_on_contact(body: Body) -> IntArray:
     """Return the free components (n,) on the contact boundary: 2 × node + component, in the body's axes, ascending."""
-    on_contact = np.zeros(body.fixed.shape, bool)
-    on_contact[body.contact_nodes] = True
-    return np.flatnonzero((on_contact & ~body.fixed).reshape(-1))
+    nodes = body.contact_nodes
+    components: IntArray = 2 * nodes[:, None] + np.arange(2)
+    return components[~body.fixed[nodes]]
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -324,10 +327,14 @@ def loose_modes(body: Body) -> list[str]:
     modes = np.zeros((*nodes.shape, 3))
     modes[:, 0, 0] = modes[:, 1, 1] = 1
     modes[:, 0, 2], modes[:, 1, 2] = -offset[:, 1], offset[:, 0]
+    supported = modes[body.fixed]
+    sizes = np.linalg.eigvalsh(supported.T @ supported)
+    if sizes[0] > _SAFE_RESISTANCE * sizes[-1]:  # The supports alone hold the body.
+        return []
     along = nodes[body.contact[:, 1]] - nodes[body.contact[:, 0]]
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     pressed = [np.einsum("ec,ecm->em", normals, modes[body.contact[:, end]]) for end in (0, 1)]
-    resisted = np.concatenate([modes[body.fixed], *pressed])
+    resisted = np.concatenate([supported, *pressed])
     # The triangle of QR has the same singular values, and at most three rows however many supports there are.
     _, sizes, motions = np.linalg.svd(np.linalg.qr(resisted, mode="r"), full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])

@@ -157,7 +157,9 @@ class Scene:
         """The stiffness S (n_free, n_free) of all bodies within reach: dense if it is small, else sparse."""
         blocks = [body.stiffness for body in self.condensed_bodies]
         if self.n_free <= DENSE_LIMIT:
-            matrix: FloatArray = linalg.block_diag(*blocks)
+            matrix = np.zeros((self.n_free, self.n_free))
+            for part, block in zip(self.slices, blocks, strict=True):
+                matrix[part, part] = block
             return matrix
         return sparse.csr_array(sparse.block_diag(blocks))
 
@@ -219,10 +221,8 @@ class Scene:
         FloatArray, shape (n_unknowns,)
             The positions z, flat, a length each.
         """
-        positions: FloatArray = (
-            self.interface.nodes.reshape(-1) + factor * self.imposed_displacements + self.transformation @ q
-        )
-        return positions
+        nodes: FloatArray = self.interface.nodes.reshape(-1)
+        return nodes + factor * self.imposed_displacements + self.transformation @ q
 
     def bulk_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return S q − g: the forces that contact must supply.
@@ -311,7 +311,7 @@ class Scene:
         arrays = {_BODIES + name: values for name, values in _pack(self).items()}
         z = self.positions(self.start)
         case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
-        is_slave = np.isin(np.arange(len(self.bodies)), self.slave).astype(np.float64)
+        is_slave = np.array([index in self.slave for index in range(len(self.bodies))], dtype=np.float64)
         if all(body.name == _body_name(is_slave, index) for index, body in enumerate(self.bodies)):
             _ORIGINS.remember(case, self)
         return case
@@ -443,9 +443,13 @@ def _pack(scene: Scene) -> dict[str, FloatArray]:
 
 def _pack_cells(bodies: Sequence[Body], first: Sequence[int]) -> FloatArray:
     """Return the cells of all bodies (n_cells, 4), each body's nodes numbered from its first."""
-    cells = [np.pad(body.cells, ((0, 0), (0, 4 - body.cells.shape[1])), constant_values=-1) for body in bodies]
-    numbers = [np.where(corners < 0, -1, corners + start) for corners, start in zip(cells, first, strict=True)]
-    return np.vstack(numbers).astype(np.float64)
+    cells = np.full((sum(len(body.cells) for body in bodies), 4), -1.0)
+    row = 0
+    for body, start in zip(bodies, first, strict=True):
+        n_cells, n_corners = body.cells.shape
+        cells[row : row + n_cells, :n_corners] = body.cells + start
+        row += n_cells
+    return cells
 
 
 def _unpack(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], tuple[int, ...], tuple[int, ...]]:

@@ -7,11 +7,12 @@ Both are drawn upright, in a plane of their own, and then placed: rotated, shift
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contactverif.contract.arrays import FloatArray, IntArray, as_floats
+from contactverif.contract.arrays import FloatArray, IntArray, as_floats, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
@@ -135,11 +136,12 @@ def block(
     as_floats(f"{name}: shift", placing.shift, (2,))
     if contact not in ("bottom", "top"):
         raise MisuseError(f"{name}: contact", repr(contact), "'bottom' or 'top'")
-    number = np.arange(len(x) * len(y)).reshape(len(y), len(x))
+    number = _node_numbers(len(y), len(x))
     near, far = (number[0], number[-1]) if contact == "bottom" else (number[-1], number[0])
     walk = near if contact == "bottom" else near[::-1]  # The body is on the left.
     towards_contact, scale = -1.0 if contact == "bottom" else 1.0, placing.scale
-    nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    nodes = np.empty((number.size, 2))
+    nodes[:, 0], nodes[:, 1] = np.tile(x, len(y)), np.repeat(y, len(x))
     fixed, imposed, load = np.zeros(nodes.shape, bool), np.zeros(nodes.shape), np.zeros(nodes.shape)
     fixed[far[0] if free_sides else number[:, [0, -1]], 0] = True
     if approach is not None:
@@ -147,12 +149,12 @@ def block(
         fixed[far, 1], imposed[far, 1] = True, towards_contact * (approach + lean) * scale
     else:
         load[far, 1] = towards_contact * pressure * scale * _weights(x, x[0], x[-1])
-    if contact_range is not None:
+    if contact_range is not None and pressure != 0:
         outside = _weights(x, x[0], contact_range[0]) + _weights(x, contact_range[1], x[-1])
         load[near, 1] -= towards_contact * pressure * scale * outside
     return Body(
         nodes=placing.place(nodes),
-        cells=grid_cells(number),
+        cells=_cells_of_grid(len(y), len(x)),
         contact=np.column_stack([walk[:-1], walk[1:]]),
         young=rectangle.young,
         poisson=rectangle.poisson,
@@ -217,6 +219,17 @@ def _grid_lines(argument: str, values: ArrayLike) -> FloatArray:
     if len(coordinates) < 2 or not (np.isfinite(coordinates).all() and (np.diff(coordinates) > 0).all()):
         raise MisuseError(argument, f"{coordinates.tolist()}", "at least two ascending coordinates")
     return coordinates
+
+
+def _node_numbers(n_rows: int, n_columns: int) -> IntArray:
+    """Return the numbers of the nodes of a rectangle (n_rows, n_columns), row by row."""
+    return np.arange(n_rows * n_columns).reshape(n_rows, n_columns)
+
+
+@lru_cache(maxsize=256)
+def _cells_of_grid(n_rows: int, n_columns: int) -> IntArray:
+    """Return the cells (n_cells, 4) of a rectangle with so many rows and columns of nodes."""
+    return freeze(grid_cells(_node_numbers(n_rows, n_columns)), np.int64)
 
 
 def grid_cells(number: IntArray) -> IntArray:

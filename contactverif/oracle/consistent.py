@@ -36,22 +36,22 @@ def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> li
     """
     places, scale = integers(np.asarray(along, dtype=np.float64))
     weights = [Fraction(0)] * len(places)
+    halves = [0] * len(places)  # The lengths of the segments that are covered as a whole: half of each is a weight.
     for surface, other in ((interface.slave, interface.master), (interface.master, interface.slave)):
         ordered = sorted(sorted(ends, key=places.__getitem__) for ends in surface.segments.tolist())
         ordered.sort(key=lambda ends: places[ends[0]])
         starts = [places[low] for low, _ in ordered]
         for low, high in _stretches(other, places):
             for first, second in ordered[max(bisect_right(starts, low) - 1, 0) : bisect_right(starts, high)]:
-                begin, length = places[first], places[second] - places[first]
-                a, b = (
-                    max(low, begin) - begin,
-                    min(high, places[second]) - begin,
-                )  # The covered part, from the first node.
-                if a < b:
-                    towards_second = Fraction(b * b - a * a, 2 * length)
+                begin, end = places[first], places[second]
+                if low <= begin and end <= high:
+                    halves[first] += end - begin
+                    halves[second] += end - begin
+                elif (a := max(low, begin) - begin) < (b := min(high, end) - begin):  # From the first node.
+                    towards_second = Fraction(b * b - a * a, 2 * (end - begin))
                     weights[second] += towards_second
                     weights[first] += b - a - towards_second
-    return [weight / scale for weight in weights]
+    return [weight / scale + Fraction(half, 2 * scale) for weight, half in zip(weights, halves, strict=True)]
 
 
 def uniform_pressure_weights(interface: Interface, along: ArrayLike) -> FloatArray:

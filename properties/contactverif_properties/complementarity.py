@@ -23,8 +23,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.newton import System, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_without_multipliers
 from contactverif_properties.shared.newton_solution import (

@@ -17,8 +17,7 @@ follow from it (`docs/concepts/tolerances.md`). Newton's method differentiates t
 tangent does no harm. A formulation with multipliers has no penalty and is asked once; its multipliers are compared
 with p.
 
-**Undecided.** Never: where Newton's method ends elsewhere, it starts again at the exact solution, where a formulation
-that passes is in balance.
+**Undecided.** Never: Newton's method starts at the exact solution, where a formulation that passes is in balance.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.scenes.blocks import exact_unknowns, pressure_of
 from contactverif.scenes.hard_scenes import vanishing_overlap_scenes
 from contactverif_properties.dead_zone import DEAD_ZONE, measure_overhang

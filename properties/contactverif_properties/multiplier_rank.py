@@ -23,8 +23,8 @@ import numpy as np
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.scenes.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases
 from contactverif_properties.shared.applicability import refuse_without_multipliers

@@ -36,8 +36,8 @@ from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.changed_scenes import move, snap
 from contactverif.mechanics.linear import scale_factors
-from contactverif.mechanics.newton import ROUNDOFF_FACTOR, System
 from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.conditioning import (

@@ -25,8 +25,10 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.newton_solution import LOAD_STEPS, is_untouched, solution_details

@@ -32,8 +32,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.directions import random_directions

@@ -30,8 +30,10 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics import linear
 from contactverif.mechanics.changed_scenes import change_units
-from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.directions import random_directions

@@ -13,8 +13,8 @@ kink, or a slave node at a kink that is pushed along one facet alone, gives wron
   error of the reported pressures, with the plugin's weights, over p are at most 4 (g/ℓ) tan(φ/2) + u (8X/g + 4N) at p =
   1e-6 E: penetration moves the slave's kink along the facet by g tan(φ/2), and gaps are differences of positions. The
   reported pressure may count current or reference lengths, which differ by the contraction of the blocks. As in
-  `patch.flat.solve` the residual alone is asked, by differences, and Newton's method starts again at the exact solution
-  where it ends elsewhere.
+  `patch.flat.solve` the residual alone is asked, by differences. Newton's method starts at the first guess, and where
+  it ends elsewhere, again at the exact solution.
 - *Three normals.* The ridge is cut off. Springs cannot give way uniformly along three normals, so that the stress error
   falls like 1/ε̂. At ε̂ = 3e4 E/ℓ it is at most 4 E/(ε̂ ℓ). From 3e3 to 3e4 E/ℓ, or from there to 3e5 E/ℓ, it falls by at
   least 0.95 decades: earlier the part of second order counts, later roundoff may. Where the error is below
@@ -37,14 +37,16 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.trace import Trace
 from contactverif.scenes.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details
-from contactverif_properties.shared.solved_patch import solve_patch
+from contactverif_properties.shared.solved_patch import ITERATIONS, SAME_SOLUTION
 
 LINES = {
     "roof of 41°": ((0.0, 0.0), (4.0, 1.5), (8.0, 0.0)),
@@ -114,7 +116,7 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     traits, pressure, gap = subject.traits, problem.pressure, problem.pressure / penalty
     start = Case(scene.interface, scene.positions(scene.start), penalty)
     formulation, multiplier = subject.for_case(start), traits.enforcement == "multiplier"
-    trace, u = solve_patch(scene, formulation, exact_unknowns(problem, scene, 0.0 if multiplier else gap), gap)
+    trace, u = _solve(scene, formulation, exact_unknowns(problem, scene, 0.0 if multiplier else gap), gap)
     q, multipliers = u[: scene.n_free], u[scene.n_free :]
     z = np.concatenate([scene.positions(q), multipliers])
     pairing = formulation.pair(scene.interface, z)
@@ -137,6 +139,43 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
             tolerances[PRESSURE.name] = tolerances[STRESS.name] + problem.contraction
     idle = not by_contact.any()
     return Measurement(values, tolerances, details=end_details(trace), idle=idle)
+
+
+def _solve(
+    scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
+) -> tuple[Trace, FloatArray]:
+    """Solve a scene and return Newton's trace and the solution that is judged.
+
+    Newton's method may end elsewhere than at the exact solution, since large motions have other solutions too. Then it
+    starts again at the exact solution, where a formulation that passes is in balance and does not move. A formulation
+    that is not in balance there is judged where it comes nearest to balance afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene to solve.
+    formulation : CheckedFormulation
+        The formulation, with its penalty.
+    exact : FloatArray, shape (n_free + n_multipliers,)
+        The exact solution.
+    penetration : float
+        The exact penetration p/ε̂, a length; distances from the exact solution are measured by it.
+
+    Returns
+    -------
+    trace : Trace
+        The first solution.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns that are judged.
+    """
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    if trace.converged:
+        distance = np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0)
+        if distance <= SAME_SOLUTION * penetration:
+            return trace, trace.u[-1]
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    balanced = again.roundings[0] <= NEAR_CONVERGENCE or len(again.u) == 1
+    return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
 
 
 def _add_three_normals(

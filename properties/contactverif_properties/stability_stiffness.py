@@ -31,8 +31,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.scenes.blocks import exact_unknowns, pressure_of
 from contactverif.scenes.stability_states import stability_scenes
 from contactverif_properties.shared.conditioning import Conditioning, forces_quantity, measure_conditioning

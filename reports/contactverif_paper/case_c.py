@@ -15,6 +15,7 @@ import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.mechanics import newton
+from contactverif.mechanics.trace import End
 from contactverif.scenes import catalogue
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.force_transmission import (
@@ -48,7 +49,7 @@ class CaseC:
     Attributes
     ----------
     ends : IntArray, shape (n_scenes, n_penalties)
-        The `newton.End` of VTS-ME on case C and on C′, whose virtual slave nodes lie beside master nodes.
+        The `End` of VTS-ME on case C and on C′, whose virtual slave nodes lie beside master nodes.
     """
 
     forces: ForceTable
@@ -71,7 +72,7 @@ def statements(case: CaseC) -> tuple[Statement, ...]:
 
 def datasets(case: CaseC) -> dict[str, xr.Dataset]:
     """Return the numbers of the case."""
-    meanings = {end.label.replace(" ", "_"): int(end) for end in newton.End}
+    meanings = {end.label.replace(" ", "_"): int(end) for end in End}
     ends = {
         "scene": words(["scene"], SCENES, "scene, as on the command line"),
         "stiffness": numbers(["penalty"], STIFFNESS, "penalty over E", "m-1"),
@@ -91,7 +92,7 @@ def _end(scene_name: str, stiffness: float) -> int:
 
 def _convergence_statement(case: CaseC) -> Statement:
     curve = case.patch.curve(formulations.VTS_ME)
-    printed, beside = case.ends == newton.End.CONVERGED
+    printed, beside = case.ends == End.CONVERGED
     result = f"at ε̂ = {PATCH.stiffness:g} × E Newton’s method ends: {curve.solution.end}"
     if not printed.all():
         result += (

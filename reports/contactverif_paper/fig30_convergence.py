@@ -21,6 +21,8 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.mechanics import newton
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import Trace
 from contactverif.scenes import catalogue
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import (
@@ -137,7 +139,7 @@ def compute(report_progress: Progress) -> Convergence:
     return Convergence(histories, rates[:, 0], rates[:, 1])
 
 
-def solve(formulation: PaperFormulation, ratio: float, stiffness: float) -> newton.Trace:
+def solve(formulation: PaperFormulation, ratio: float, stiffness: float) -> Trace:
     """Solve case C with free sides, from the slave just touching, at ε̂ = stiffness × E."""
     scene = catalogue.make_scene(
         "c", young=YOUNG, ratio=ratio, pressure=PRESSURE, penalty=stiffness * YOUNG, lowered=0.0, sides="free"
@@ -153,7 +155,7 @@ def late_rate(residuals: FloatArray, floor: float) -> float:
 
 def _history(formulation: PaperFormulation, ratio: float) -> History:
     trace = solve(formulation, ratio, 1.0)
-    system = newton.System(trace.scene, subject_of(formulation).for_case(trace.scene.case()))
+    system = System(trace.scene, subject_of(formulation).for_case(trace.scene.case()))
     q, beyond = trace.solution, []
     for _ in range(_STEPS_BEYOND):
         pairing = system.pair(q)
@@ -172,7 +174,7 @@ def _rate(stiffness: float) -> tuple[float, float]:
     q, case = trace.solution, trace.scene.case()
     matrices = []
     for formulation in (formulations.BASIC, formulations.VTS_PPT):
-        system = newton.System(trace.scene, subject_of(formulation).for_case(case))
+        system = System(trace.scene, subject_of(formulation).for_case(case))
         matrices.append(dense(system.matrix(q, system.pair(q))[0]))
     basic, consistent = matrices
     iteration = np.eye(len(q)) - np.linalg.solve(basic, consistent)

@@ -18,6 +18,7 @@ import xarray as xr
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.result import NotLoaded
 from contactverif.mechanics import newton
+from contactverif.mechanics.trace import Trace
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
 from contactverif.scenes import catalogue
@@ -123,7 +124,7 @@ def _row(formulation: PaperFormulation) -> tuple[float, float, float, int]:
     return error, asymmetry, _order(formulation, trace), trace.n_iterations
 
 
-def _order(formulation: PaperFormulation, trace: newton.Trace) -> float:
+def _order(formulation: PaperFormulation, trace: Trace) -> float:
     """Return what the property `newton.order` measures on this scene; NaN if it decides nothing."""
     (question,) = load_properties(["newton.order"])
     assert not isinstance(question, NotLoaded)

@@ -17,7 +17,7 @@ from contactverif.cli import scene_drawing
 from contactverif.cli.gallery import MEANINGS
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import End
+from contactverif.mechanics.trace import End
 from contactverif.run import judging
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene

@@ -20,9 +20,11 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics import bulk
 from contactverif.mechanics import scene as scene_module
-from contactverif.mechanics.newton import End, System, Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import End, Trace
 from contactverif.run.registry import load_formulation
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import two_blocks
@@ -560,3 +562,15 @@ def test_a_kept_matrix_leads_to_the_same_solution(name: str) -> None:
     assert all(trace.converged for trace in traces)
     size = np.abs(traces[0].solution).max()
     assert np.abs(traces[1].solution - traces[0].solution).max() <= 1e-12 * size
+
+
+def test_a_kept_matrix_stops_where_the_matrix_of_that_state_would() -> None:
+    """The first guess penetrates 60 times too deep. Its floor is 50 times that of the solution."""
+    slave, master = Rectangle([0, 0.125], [2, 3]), Rectangle([0, 0.125], [-3, -2, 2])
+    scene = two_blocks(slave, master, penalty=80, approach=0.75)
+    trace = solve(scene, on("vts-ppt", scene), use_tangent=False, keep_matrix=True)
+    system = System(scene, on("vts-ppt", scene), use_tangent=False)
+    pairing = system.pair(trace.solution)
+    _, floor = system.matrix(trace.solution, pairing)
+    assert trace.converged
+    assert (np.abs(system.residual(trace.solution, pairing)) <= floor).all()

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.mechanics import newton
+from contactverif.mechanics.trace import End
 from contactverif.scenes import catalogue
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
 from contactverif_paper.figure_style import new_figure
@@ -117,7 +118,7 @@ def test_vts_me_cycles_on_case_c_and_converges_beside_it() -> None:
     for name in case_c.SCENES:
         scene = catalogue.make_scene(name, penalty=case_c.PATCH.stiffness * YOUNG)
         ends[name] = newton.solve(scene, subject_of(paper_formulations.VTS_ME).for_case(scene.case())).end
-    assert ends == {"c": newton.End.CYCLE, "c-prime": newton.End.CONVERGED}
+    assert ends == {"c": End.CYCLE, "c-prime": End.CONVERGED}
 
 
 # --- Fig. 30 ----------------------------------------------------------------------------------------------------

@@ -15,9 +15,10 @@ from contactverif import Interface, MisuseError
 from contactverif.contract.subject import Subject
 from contactverif.geometry import block_rows, projection
 from contactverif.geometry.compiled import python_function
-from contactverif.mechanics.newton import Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.trace import Trace
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error

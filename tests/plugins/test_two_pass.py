@@ -14,9 +14,10 @@ import contactverif_nts
 from contactverif import Interface, Pairing, Traits
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import Trace, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.trace import Trace
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene

@@ -13,8 +13,8 @@ import contactverif_nts
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.changed_scenes import snap
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
 from contactverif.run.runner import judge_case
 from contactverif.scenes.catalogue import load_scene_case
 from contactverif_properties.newton_attainable import (

@@ -14,9 +14,11 @@ import contactverif_nts
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import End, System, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import End
 from contactverif.run.runner import judge_case, run
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import load_scene_case

@@ -13,8 +13,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
-from contactverif.mechanics.newton import System
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.system import System
 from contactverif.run.registry import load_formulation
 from contactverif.scenes import catalogue
 from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, pressure_of

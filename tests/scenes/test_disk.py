@@ -13,8 +13,8 @@ from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
-from contactverif.mechanics.newton import End
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.trace import End
 from contactverif.run.registry import load_formulation
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, grade

@@ -17,7 +17,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import End, solve
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.trace import End
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.comparison_study import find_differing, run_comparison

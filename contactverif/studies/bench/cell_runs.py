@@ -23,7 +23,7 @@ import numpy as np
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solution_of, solve_in_tries
-from contactverif.mechanics.newton import Trace
+from contactverif.mechanics.trace import Trace
 from contactverif.studies.bench.bench_scenes import Task, is_solved, make_task
 from contactverif.studies.bench.meter import Meter, add_meter
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome

@@ -10,7 +10,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.formulation import Pairing
-from contactverif.mechanics.newton import System
+from contactverif.mechanics.system import System
 
 MOST_STEPS = 12
 

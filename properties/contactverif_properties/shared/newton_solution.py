@@ -11,7 +11,9 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.formulation import Pairing
 from contactverif.mechanics.linear import scale_factors
-from contactverif.mechanics.newton import System, Trace, solve
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import Trace
 
 LOAD_STEPS = (4, 16)  # The numbers of load steps that are tried where a solution in one step is not found.
 

@@ -8,16 +8,13 @@ from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Surface
-from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics.scene import Scene
 from contactverif.scenes.blocks import overhangs
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import consistent_forces
 
 
-def force_errors(
-    case: Case, scene: Scene, formulation: CheckedFormulation, q: FloatArray, pressure: float
-) -> tuple[float, float]:
+def force_errors(case: Case, scene: Scene, forces: FloatArray, q: FloatArray, pressure: float) -> tuple[float, float]:
     """Return the largest error of a nodal force on the slave and on the master, over p L.
 
     Forces are judged twice: those that the bodies need to be in balance, and those that the formulation gives. They
@@ -29,8 +26,8 @@ def force_errors(
         The solved state.
     scene : Scene
         The scene that was solved.
-    formulation : CheckedFormulation
-        The formulation, with the penalty of the solution.
+    forces : FloatArray, shape (n_unknowns + n_multipliers,)
+        The residual of the formulation in that state.
     q : FloatArray, shape (n_free,)
         The unknowns of the bodies in that state.
     pressure : float
@@ -44,8 +41,7 @@ def force_errors(
         The same over the master's nodes.
     """
     by_bodies = scene.nodal_forces(q)
-    pairing = formulation.pair(case.interface, case.z)
-    by_contact = -formulation.residual(case.interface, pairing, case.z)[: case.interface.n_unknowns].reshape(-1, 2)
+    by_contact = -forces[: case.interface.n_unknowns].reshape(-1, 2)
     first = 0
     for index in scene.bodies_in_reach:
         last = first + len(scene.bodies[index].contact_nodes)

@@ -14,7 +14,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import shape_integrals
-from contactverif.mechanics.newton import System
+from contactverif.mechanics.system import System
 from contactverif.scenes.blocks import exact_unknowns
 from contactverif.scenes.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
 from contactverif_properties.shared.exact_multipliers import exact_multipliers

@@ -1,0 +1,249 @@
+"""The equations of a scene and a formulation: residual, derivative, and what roundoff alone may do to the residual.
+
+With multipliers the unknowns u are those of the scene, q, and the multipliers behind them; the system is a saddle
+point. Rule for the next editor: each number comes from the scene or from the formulation, and nothing decides here how
+an iteration goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy import linalg, sparse
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.subject import CheckedFormulation
+from contactverif.mechanics import linear
+from contactverif.mechanics.scene import Scene
+
+ROUNDOFF_FACTOR = 8.0  # A residual is zero if it is at most this many units of roundoff of its largest terms.
+
+TIMED_PARTS = ("pair", "residual", "tangent", "solve")
+
+
+@dataclass(slots=True)
+class System:
+    """The equations S q − g + R(z(u)) = 0 of a scene and a formulation.
+
+    S is the stiffness of the bodies, g their load, and R the contact forces on the unknowns. The scene's symbols are
+    those of `contactverif.mechanics.scene`.
+
+    Attributes
+    ----------
+    scene : Scene
+        The bodies.
+    formulation : CheckedFormulation
+        The formulation with its penalty.
+    factor : float
+        The share of loads and imposed displacements.
+    use_tangent : bool
+        False differentiates the residual on the frozen pairing, even if the formulation has a tangent.
+    difference_step : float | None
+        The step of differences in positions, a length; None for the one that suits smooth residuals.
+    seconds : dict[str, float]
+        The time spent in "pair", "residual", "tangent" and "solve" so far.
+    n_multipliers : int
+        The number of multipliers of the formulation on the scene's interface.
+    transformation : FloatArray or scipy.sparse array, shape (n_unknowns + n_multipliers, n)
+        The scene's transformation from unknowns to positions, with the multipliers behind both.
+    stiffness : FloatArray or scipy.sparse array, shape (n, n)
+        The scene's stiffness, 0 for multipliers.
+    """
+
+    scene: Scene
+    formulation: CheckedFormulation
+    factor: float = 1.0
+    use_tangent: bool = True
+    difference_step: float | None = None
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED_PARTS, 0.0))
+    n_multipliers: int = field(init=False)
+    transformation: Any = field(init=False)
+    stiffness: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
+        self.n_multipliers, self.transformation, self.stiffness = count, scene.transformation, scene.stiffness
+        if count:
+            if isinstance(scene.transformation, np.ndarray):
+                self.transformation = linalg.block_diag(scene.transformation, np.eye(count))
+                self.stiffness = linalg.block_diag(scene.stiffness, np.zeros((count, count)))
+            else:
+                unit, nothing = sparse.eye_array(count), sparse.csr_array((count, count))
+                self.transformation = sparse.csr_array(sparse.block_diag([scene.transformation, unit]))
+                self.stiffness = sparse.csr_array(sparse.block_diag([scene.stiffness, nothing]))
+
+    @property
+    def size(self) -> int:
+        """The number n of unknowns u: n_free + n_multipliers."""
+        return self.scene.n_free + self.n_multipliers
+
+    def state(self, u: FloatArray) -> FloatArray:
+        """Return the state z that a formulation gets at the unknowns u (n,): positions, then multipliers."""
+        n_free = self.scene.n_free
+        return np.concatenate([self.scene.positions(u[:n_free], self.factor), u[n_free:]])
+
+    def pair(self, u: FloatArray) -> Pairing | None:
+        """Return the pairing at the unknowns u (n,), None if the formulation has none."""
+        start = perf_counter()
+        pairing = self.formulation.pair(self.scene.interface, self.state(u))
+        self.seconds["pair"] += perf_counter() - start
+        return pairing
+
+    def forces(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+        """Return the residual of the formulation alone, (n_unknowns + n_multipliers,), at the unknowns u (n,)."""
+        start = perf_counter()
+        forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
+        self.seconds["residual"] += perf_counter() - start
+        return forces
+
+    def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
+        """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
+        start, z = perf_counter(), self.state(u)
+        if self._asks_tangent:
+            tangent = self.formulation.tangent(self.scene.interface, pairing, z)
+        else:
+            tangent = self.differences(pairing, z)
+        self.seconds["tangent"] += perf_counter() - start
+        return tangent
+
+    def forces_and_tangent(
+        self, u: FloatArray, pairing: Pairing | None, *, later: bool = False
+    ) -> tuple[FloatArray, Any]:
+        """Return `forces` and `tangent` at the unknowns u (n,), in one call where the formulation offers that.
+
+        The time of one call counts as that of the tangent, which is the larger part. With `later`, the tangent is None:
+        it may not be needed.
+        """
+        if later:
+            return self.forces(u, pairing), None
+        if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
+            return self.forces(u, pairing), self.tangent(u, pairing)
+        start = perf_counter()
+        both = self.formulation.residual_and_tangent(self.scene.interface, pairing, self.state(u))
+        self.seconds["tangent"] += perf_counter() - start
+        return both
+
+    @property
+    def _asks_tangent(self) -> bool:
+        return self.use_tangent and "tangent" in self.formulation.provides
+
+    def residual(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
+        """Return the residual (n,) at the unknowns u (n,): forces out of balance, then constraint rows."""
+        return self.balance(u, self.forces(u, pairing))
+
+    def balance(self, u: FloatArray, forces: FloatArray) -> FloatArray:
+        """Return the residual (n,) at the unknowns u (n,) where the formulation returns these forces."""
+        start, n_free = perf_counter(), self.scene.n_free
+        residual: FloatArray = self.transformation.T @ forces
+        residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
+        self.seconds["residual"] += perf_counter() - start
+        return residual
+
+    def is_balanced(self, residual: FloatArray, forces: FloatArray, tolerance: float) -> bool:
+        """Return whether a residual (n,) is at most `tolerance` of the largest contact force; False with multipliers.
+
+        Without any contact force nothing is balanced. `forces` are those of the formulation at the same unknowns.
+        """
+        if self.n_multipliers or tolerance == 0:
+            return False
+        largest = float(np.abs(self.transformation.T @ forces).max(initial=0.0))
+        return bool(largest > 0 and np.abs(residual).max(initial=0.0) <= tolerance * largest)
+
+    def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
+        """Return the derivative of the residual, and the part of the residual that roundoff alone may cause.
+
+        The residual of a formulation without a tangent is differentiated on the frozen pairing.
+
+        Parameters
+        ----------
+        u : FloatArray, shape (n,)
+            The unknowns.
+        pairing : Pairing | None
+            The frozen pairing.
+
+        Returns
+        -------
+        matrix : FloatArray or scipy.sparse array, shape (n, n)
+            The derivative.
+        floor : FloatArray, shape (n,)
+            The effect of the roundoff of positions and forces on each entry of the residual.
+        """
+        return self.assemble(u, pairing, *self.forces_and_tangent(u, pairing))
+
+    def assemble(
+        self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
+    ) -> tuple[Any, FloatArray]:
+        """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u (n,); None asks for that."""
+        contact = self.contact_stiffness(u, pairing, tangent)
+        return self.stiffness + contact, self.floor(u, contact, forces)
+
+    def contact_stiffness(self, u: FloatArray, pairing: Pairing | None, tangent: Any) -> Any:
+        """Return the derivative (n, n) of the contact forces on the unknowns, of a `tangent`; None asks for that."""
+        tangent = self.tangent(u, pairing) if tangent is None else tangent
+        start = perf_counter()
+        tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
+        contact = self.transformation.T @ tangent @ self.transformation
+        self.seconds["tangent"] += perf_counter() - start
+        return contact
+
+    def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
+        """Return the part of the residual (n,) that roundoff of positions and forces alone may cause.
+
+        Parameters
+        ----------
+        u : FloatArray, shape (n,)
+            The unknowns.
+        contact : FloatArray or scipy.sparse array, shape (n, n)
+            The derivative of the contact forces there, or nearby.
+        forces : FloatArray, shape (n_unknowns + n_multipliers,)
+            The contact forces.
+        """
+        start = perf_counter()
+        scene, n_free = self.scene, self.scene.n_free
+        # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
+        largest = np.abs(scene.positions(u[:n_free], self.factor)).max()
+        sizes = np.full(self.size, largest)
+        sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
+        # A force along an inclined normal is rounded in both of its components.
+        terms = abs(contact) @ sizes + abs(self.transformation).T @ np.abs(forces)
+        # A displacement below uX moves no node. Displacements of a body that nothing presses shrink by 1e-16 in each
+        # iteration, and so do its forces: counted over those displacements alone, they would never be small.
+        displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
+        terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
+        self.seconds["tangent"] += perf_counter() - start
+        floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
+        return floor
+
+    def row_factors(self, matrix: Any) -> FloatArray | float:
+        """Return the factors (n,) that make constraint rows comparable with forces; 1 without multipliers."""
+        return linear.scale_factors(matrix, self.scene.n_free)[0] if self.n_multipliers else 1.0
+
+    def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
+        """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
+        start = perf_counter()
+        step = linear.solve_step(matrix, right, self.scene.n_free, floor)
+        self.seconds["solve"] += perf_counter() - start
+        return step
+
+    def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
+        """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""
+        n_positions = self.scene.interface.n_unknowns
+        positions, multipliers = z[:n_positions], z[n_positions:]
+        shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
+        smooth = shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3)
+        steps = np.full(z.size, smooth if self.difference_step is None else self.difference_step)
+        if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
+            size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
+            steps[n_positions:] = size or 1.0
+        shifts = np.diag(steps)
+        states = np.concatenate([z + shifts, z - shifts])
+        forces = self.formulation.residual(self.scene.interface, pairing, states)
+        derivative: FloatArray = (forces[: z.size] - forces[z.size :]).T / (2 * steps)
+        return derivative
+
+    def _sides(self) -> tuple[Any, Any]:
+        return self.scene.interface.slave, self.scene.interface.master
