@@ -53,6 +53,9 @@ def bench(
         ),
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Draw the figures into this folder.", metavar="FOLDER")] = None,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", help="1: solutions side by side would disturb their times.", metavar="N")
+    ] = 1,
 ) -> None:
     """Measure speed against error, on scenes whose exact solution is known.
 
@@ -72,6 +75,8 @@ def bench(
       contactverif bench vts-ppt --quick --against bench.nc
       contactverif bench bench.nc --out bench.html
     """
+    if jobs != 1:
+        raise MisuseError("--jobs", str(jobs), "1: solutions side by side would disturb their times")
     pinned = pin_threads()
     files = OutputFiles.check(out, (REPORT, PAGE, MARKDOWN))
     folder = PictureFolder.make(pictures)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import End
+from contactverif.run.workers import worker_pool
 from contactverif.scenes import catalogue
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
 from contactverif_paper.figure_style import new_figure
@@ -20,6 +21,7 @@ from contactverif_paper.paper_formulations import subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_paper.paper_page import write
 from contactverif_paper.paper_run import compute, steps
+from contactverif_paper.paper_tree import tree_of
 from contactverif_paper.patch_solutions import YOUNG
 from contactverif_reports.netcdf.variables import numbers
 
@@ -229,3 +231,16 @@ def test_a_thinned_line_stays_within_the_tolerance() -> None:
     assert few[-1].tolist() == arc[-1].tolist()
     radius = np.hypot(*((few[1:] + few[:-1]) / 2).T)
     assert 1 - radius.min() <= 1.1e-3
+
+
+def test_two_processes_compute_the_same_numbers_and_sentences(tmp_path: Path) -> None:
+    items = (*(item for item in ITEMS if item.name in ("case_a1", "case_c")), EGGS)
+    reported: list[str] = []
+    with worker_pool(2) as executor:
+        shared = compute(reported.append, items=items, executor=executor)
+    alone = compute(items=items)
+    assert len(reported) == sum(item.n_steps for item in items)
+    assert [result.item for result in shared.results] == list(items)
+    assert shared.statements == alone.statements
+    assert [result.tables for result in shared.results] == [result.tables for result in alone.results]
+    xr.testing.assert_identical(tree_of(shared), tree_of(alone))
