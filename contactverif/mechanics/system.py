@@ -8,7 +8,7 @@ an iteration goes on.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class System:
     difference_step : float | None
         The step of differences in positions, a length; None for the one that suits smooth residuals.
     seconds : dict[str, float]
-        The time spent in "pair", "residual", "tangent" and "solve" so far.
+        The processor's time spent in "pair", "residual", "tangent" and "solve" so far.
     n_multipliers : int
         The number of multipliers of the formulation on the scene's interface.
     transformation : FloatArray or scipy.sparse array, shape (n_unknowns + n_multipliers, n)
@@ -88,26 +88,26 @@ class System:
 
     def pair(self, u: FloatArray) -> Pairing | None:
         """Return the pairing at the unknowns u (n,), None if the formulation has none."""
-        start = perf_counter()
+        start = process_time()
         pairing = self.formulation.pair(self.scene.interface, self.state(u))
-        self.seconds["pair"] += perf_counter() - start
+        self.seconds["pair"] += process_time() - start
         return pairing
 
     def forces(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
         """Return the residual of the formulation alone, (n_unknowns + n_multipliers,), at the unknowns u (n,)."""
-        start = perf_counter()
+        start = process_time()
         forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
-        self.seconds["residual"] += perf_counter() - start
+        self.seconds["residual"] += process_time() - start
         return forces
 
     def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
         """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
-        start, z = perf_counter(), self.state(u)
+        start, z = process_time(), self.state(u)
         if self._asks_tangent:
             tangent = self.formulation.tangent(self.scene.interface, pairing, z)
         else:
             tangent = self.differences(pairing, z)
-        self.seconds["tangent"] += perf_counter() - start
+        self.seconds["tangent"] += process_time() - start
         return tangent
 
     def forces_and_tangent(
@@ -122,9 +122,9 @@ class System:
             return self.forces(u, pairing), None
         if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
             return self.forces(u, pairing), self.tangent(u, pairing)
-        start = perf_counter()
+        start = process_time()
         both = self.formulation.residual_and_tangent(self.scene.interface, pairing, self.state(u))
-        self.seconds["tangent"] += perf_counter() - start
+        self.seconds["tangent"] += process_time() - start
         return both
 
     @property
@@ -137,10 +137,10 @@ class System:
 
     def balance(self, u: FloatArray, forces: FloatArray) -> FloatArray:
         """Return the residual (n,) at the unknowns u (n,) where the formulation returns these forces."""
-        start, n_free = perf_counter(), self.scene.n_free
+        start, n_free = process_time(), self.scene.n_free
         residual: FloatArray = self.transformation.T @ forces
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
-        self.seconds["residual"] += perf_counter() - start
+        self.seconds["residual"] += process_time() - start
         return residual
 
     def is_balanced(self, residual: FloatArray, forces: FloatArray, tolerance: float) -> bool:
@@ -184,10 +184,10 @@ class System:
     def contact_stiffness(self, u: FloatArray, pairing: Pairing | None, tangent: Any) -> Any:
         """Return the derivative (n, n) of the contact forces on the unknowns, of a `tangent`; None asks for that."""
         tangent = self.tangent(u, pairing) if tangent is None else tangent
-        start = perf_counter()
+        start = process_time()
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
         contact = self.transformation.T @ tangent @ self.transformation
-        self.seconds["tangent"] += perf_counter() - start
+        self.seconds["tangent"] += process_time() - start
         return contact
 
     def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
@@ -202,7 +202,7 @@ class System:
         forces : FloatArray, shape (n_unknowns + n_multipliers,)
             The contact forces.
         """
-        start = perf_counter()
+        start = process_time()
         scene, n_free = self.scene, self.scene.n_free
         # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
         largest = np.abs(scene.positions(u[:n_free], self.factor)).max()
@@ -214,7 +214,7 @@ class System:
         # iteration, and so do its forces: counted over those displacements alone, they would never be small.
         displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
         terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
-        self.seconds["tangent"] += perf_counter() - start
+        self.seconds["tangent"] += process_time() - start
         floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
         return floor
 
@@ -224,9 +224,9 @@ class System:
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
-        start = perf_counter()
+        start = process_time()
         step = linear.solve_step(matrix, right, self.scene.n_free, floor)
-        self.seconds["solve"] += perf_counter() - start
+        self.seconds["solve"] += process_time() - start
         return step
 
     def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:

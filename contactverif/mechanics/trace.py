@@ -92,7 +92,7 @@ class Trace:
     deficiencies : IntArray, shape (n_iterates,)
         The number of multipliers that were not unique in the step from the iterate; 0 where none was taken.
     seconds : dict[str, float]
-        The time spent in "pair", "residual", "tangent" and "solve".
+        The processor's time spent in "pair", "residual", "tangent" and "solve".
     pairing : Pairing | None
         The pairing at the last iterate; None if the formulation has none.
     forces : FloatArray, shape (n_unknowns + n_multipliers,)

@@ -92,3 +92,10 @@ def test_a_shell_completes_commands_formulations_and_properties(words: str, expe
         COMP_CWORD=str(last),
     )
     assert set(answer.split()) == expected
+
+
+def test_a_run_imports_no_other_family_whose_kernels_it_might_compile() -> None:
+    """Numba compiles a kernel when it is first called; a family that is not imported is not even read."""
+    modules = modules_after("verify", "nts", "-p", "balance.force", "--examples", "2", "--jobs", "1")
+    assert "contactverif_nts" in modules
+    assert not [name for name in modules if name.partition(".")[0] == "contactverif_mortar"]
