@@ -47,6 +47,27 @@ def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tupl
     return segments_and_cells, (rule.places, rule.weights)
 
 
+def touching_points(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray) -> BoolArray:
+    """Return the points (n_points,) of cells whose gap is zero or negative, at the positions x (n_nodes, 2)."""
+    touching = np.empty(len(cells.slave) * len(rule), dtype=np.bool_)
+    _write_touching(x, *cell_arguments(interface, cells, rule), touching)
+    return touching
+
+
+@compile_kernel
+def _write_touching(x: FloatArray, segments_and_cells: Fields, rule: Fields, touching: BoolArray) -> None:
+    """Write whether each point touches."""
+    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
+    places, weights = rule
+    for i in range(len(cell_slave)):
+        s, m = cell_slave[i], cell_master[i]
+        view = slave_view(x, slave, s, -1, -1)
+        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
+        cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
+        for q in range(len(places)):
+            touching[i * len(places) + q] = place_point(cell, view, x_1, x_2, places[q], weights[q]).gap <= 0
+
+
 def springs_at_points(
     interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, penalty: float, active: BoolArray
 ) -> tuple[FloatArray, sparse.csr_array]:

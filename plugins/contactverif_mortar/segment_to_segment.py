@@ -21,7 +21,7 @@ from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import springs_at_points
+from contactverif_mortar.cell_tangent import springs_at_points, touching_points
 from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
@@ -49,8 +49,7 @@ class SegmentToSegment:
         """Find the cells, and which of their points are in contact (n_cells × 3, flat)."""
         x = np.array(z).reshape(-1, 2)
         cells = Cells.find(interface, x, averaged=False)
-        points = self.quadrature.points(interface, cells, x[None])[0]
-        return Pairing({**cells.as_arrays(), "active": points[:, GAP] <= 0})
+        return Pairing({**cells.as_arrays(), "active": touching_points(interface, cells, self.quadrature, x)})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
