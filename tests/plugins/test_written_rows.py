@@ -108,9 +108,10 @@ def test_factors_grow_with_the_cells_and_the_assembled_tangent_with_their_square
     assert squares[1] >= 3.5 * squares[0]
 
 
-def test_a_tangent_that_fits_into_no_memory_is_refused_with_its_size() -> None:
+@pytest.mark.parametrize(("name", "options"), [MORTARS[0], MORTARS[2], MORTARS[4]])
+def test_a_tangent_that_fits_into_no_memory_is_refused_with_its_size(name: str, options: dict[str, str]) -> None:
     interface, z = make_one_over_many(60_000)
-    plugin = contactverif_mortar.mortar(penalty=PENALTY)
+    plugin = getattr(contactverif_mortar, name)(penalty=PENALTY, **options)
     pairing = plugin.pair(interface, z)
     with pytest.raises(MisuseError, match=r"tangent: found about 161 GiB .* 60003 nodes .* at most 32 GiB; use"):
         plugin.tangent(interface, pairing, z)
