@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from compare_runs import compare, lines_of_changes, lines_of_run
+
+STORED = Path(__file__).parents[2] / "reports" / "bench" / "benchmarks.json"
 
 
 def a_run(factor: float = 1.0, reference: str = "a copy") -> dict[tuple[str, str], dict[str, Any]]:
@@ -36,3 +40,11 @@ def test_another_reference_is_not_compared_and_counted() -> None:
 def test_the_tables_name_each_benchmark() -> None:
     assert any("mine" in line and "a copy" in line for line in lines_of_run(a_run()))
     assert "slower" in lines_of_changes(compare(a_run(), a_run(2.0)), 0)[1]
+
+
+def test_the_stored_run_names_the_processor_and_no_machine() -> None:
+    text = STORED.read_text()
+    facts = json.loads(text)
+    assert set(facts) == {"processor", "machine", "python", "versions", "commit", "created", "turns", "benchmarks"}
+    assert not [word for word in (str(STORED.parents[2]), "/home", "/root", "/tmp") if word in text]
+    assert {entry["ratio"].keys() == {"least", "median", "greatest"} for entry in facts["benchmarks"]} == {True}
