@@ -114,10 +114,13 @@ def matching_answer(n_columns: int, distributed: float) -> WaveAnswer:
     gaps = gaps @ dense(scene.transformation)
     mass = length / 6 * (np.diag(np.r_[2, np.full(n_columns - 1, 4.0), 2]) + np.eye(n_columns + 1, k=1))
     mass += length / 6 * np.eye(n_columns + 1, k=-1)
-    stiffness = dense(scene.stiffness) + distributed * gaps.T @ mass @ gaps
+    # The pressure p is an unknown too, with M (g − p/ε̂) = 0: the matrix stays regular however stiff the springs are.
+    transfer = gaps.T @ mass
+    matrix = np.block([[dense(scene.stiffness), transfer], [transfer.T, -mass / distributed]])
     wavy = replace(scene, bodies=_wavy_bodies(n_columns, n_columns, WAVE), facts={})
-    change: FloatArray = linalg.solve(stiffness, wavy.load - scene.load, assume_a="pos")
-    return WaveAnswer(wave_work(scene, wavy, np.zeros_like(change), change), distributed * np.ptp(gaps @ change) / WAVE)
+    load = np.append(wavy.load - scene.load, np.zeros(len(mass)))
+    change, pressures = np.split(linalg.solve(matrix, load, assume_a="sym"), [scene.n_free])
+    return WaveAnswer(wave_work(scene, wavy, np.zeros_like(change), change), float(np.ptp(pressures)) / WAVE)
 
 
 def wave_work(scene: Scene, wavy: Scene, before: FloatArray, after: FloatArray) -> float:

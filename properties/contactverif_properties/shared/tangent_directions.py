@@ -9,12 +9,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csgraph, csr_array
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 from contactverif_properties.shared.directions import random_directions
 
-_SMALLEST_SHARE = 1e-6  # Combinations of directions that are shorter than this share of the longest are left out.
+# Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
+# exact to u^(2/3), and its noise grows by 1/s as the combination is made as long as the others. Both are equal at
+# s = u^(1/3): what is left out is no larger than the noise of what stays.
+_SMALLEST_SHARE = UNIT_ROUNDOFF ** (1 / 3)
 
 
 def first_directions(case: Case, n_random: int) -> FloatArray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
@@ -20,7 +20,9 @@ from contactverif.scenes.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_bl
 from contactverif_properties.shared.exact_multipliers import exact_multipliers
 from contactverif_properties.shared.frozen_solution import solve_frozen
 
-_LEAST_SHARE = 1e-8  # Springs that add less than this share to the compliance of the bodies count as adding so much.
+# Springs that add less than this share s to the compliance of the bodies count as adding so much. They are 1/s times as
+# stiff, which is the condition of the matrix, so that roundoff of the solution adds u/s. Both are equal at s = √u.
+_LEAST_SHARE = UNIT_ROUNDOFF**0.5
 
 
 @dataclass(frozen=True, slots=True)
