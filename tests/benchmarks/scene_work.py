@@ -1,0 +1,161 @@
+"""Count what the judge does for each kind of scene, beside the least that would do.
+
+Run with `python tests/benchmarks/scene_work.py FILE.csv`. Each property is asked on one case, and no body is remembered
+from before. Counts do not depend on the machine.
+
+What is least: each elastic body that differs in mesh, material or supports is assembled and factorised once; the
+formulation visits the facets that touch at the solution; Newton's method has the free components of their nodes.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from contactverif.contract.case import Case
+from contactverif.contract.property import Property
+from contactverif.contract.subject import Subject
+from contactverif.mechanics import bulk
+from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
+from contactverif.mechanics.trace import Record, Trace
+from contactverif.run.driver import draw_cases
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.runner import judge_case
+from contactverif.scenes import wave_blocks
+
+
+@dataclass(frozen=True)
+class Work:
+    """The work for one property on one case. Numbers of facets and unknowns are those of its largest solved scene."""
+
+    property_id: str
+    scenes: int = 0
+    assembled: int = 0
+    factorised: int = 0
+    least_bodies: int = 0
+    facets: int = 0
+    touching_facets: int = 0
+    unknowns: int = 0
+    least_unknowns: int = 0
+    all_unknowns: int = 0
+
+
+@dataclass
+class Counts:
+    """The counts of the instruments, and what they saw."""
+
+    assembled: int = 0
+    factorised: int = 0
+    scenes: dict[int, Scene] = field(default_factory=dict)
+    traces: list[Trace] = field(default_factory=list)
+
+
+@contextmanager
+def count_all() -> Iterator[Counts]:
+    """Count assemblies, factorisations, scenes and solutions while the context lasts."""
+    counts = Counts()
+    assemble, factorise = bulk.assemble_stiffness, bulk._interior_solver
+    bodies, finish = Scene.__dict__["condensed_bodies"], Record.trace
+    condense = bodies.func
+
+    def count_assembly(*arguments: Any) -> Any:
+        counts.assembled += 1
+        return assemble(*arguments)
+
+    def count_factorisation(*arguments: Any) -> Any:
+        counts.factorised += 1
+        return factorise(*arguments)
+
+    def count_scene(scene: Scene) -> Any:
+        counts.scenes[id(scene)] = scene
+        return condense(scene)
+
+    def count_solution(record: Record, *arguments: Any) -> Trace:
+        trace = finish(record, *arguments)
+        counts.traces.append(trace)
+        return trace
+
+    with ExitStack() as stack:
+        stack.enter_context(patch.object(bulk, "assemble_stiffness", count_assembly))
+        stack.enter_context(patch.object(bulk, "_interior_solver", count_factorisation))
+        stack.enter_context(patch.object(bodies, "func", count_scene))
+        stack.enter_context(patch.object(Record, "trace", count_solution))
+        yield counts
+
+
+def forget_everything() -> None:
+    """Let go of all that a process remembers of bodies."""
+    forget_bodies()
+    for remembered in (wave_blocks.wave_blocks, wave_blocks._uniform_blocks, wave_blocks.matching_answer):
+        remembered.cache_clear()
+
+
+def size_of(case: Case) -> tuple[bool, int]:
+    """Return a key by which scenes come after interfaces, and large cases after small ones."""
+    return has_bodies(case), case.z.size
+
+
+def measure_work(question: Property, subject: Subject) -> Work:
+    """Ask a property on the largest of some cases and return what was done."""
+    case = max(draw_cases(question.cases(None), seed="0", examples=20).cases[:20], key=size_of)
+    forget_everything()
+    with count_all() as counts:
+        judge_case(question, case, subject)
+    elastic = [
+        scene.bodies[index]
+        for scene in counts.scenes.values()
+        for index in scene.bodies_in_reach
+        if not scene.bodies[index].rigid
+    ]
+    work = {
+        "property_id": question.id,
+        "scenes": len(counts.scenes),
+        "assembled": counts.assembled,
+        "factorised": counts.factorised,
+        "least_bodies": len({bulk._ElasticPart.of_body(body) for body in elastic}),
+    }
+    if counts.traces:
+        work |= sizes_of(max(counts.traces, key=lambda trace: trace.scene.n_free))
+    return Work(**work)
+
+
+def sizes_of(trace: Trace) -> dict[str, int]:
+    """Return the numbers of facets and unknowns of a solved scene."""
+    scene = trace.scene
+    interface = scene.interface
+    pushed = trace.forces[: interface.n_unknowns].reshape(-1, 2).any(axis=1)
+    segments = np.vstack([interface.slave.segments, interface.master.segments])
+    touching = segments[pushed[segments].any(axis=1)]
+    rows = np.repeat(np.isin(np.arange(interface.n_nodes), touching), 2)
+    moved = abs(scene.transformation).T @ rows.astype(float)
+    return {
+        "facets": len(segments),
+        "touching_facets": len(touching),
+        "unknowns": scene.n_free,
+        "least_unknowns": int(np.count_nonzero(moved)),
+        "all_unknowns": sum(int((~scene.bodies[index].fixed).sum()) for index in scene.bodies_in_reach),
+    }
+
+
+def main(path: Path) -> None:
+    """Write the table of all properties that need a body."""
+    subject = load_formulation("vts-ppt")
+    assert isinstance(subject, Subject)
+    questions = [item for item in load_properties(["*"]) if isinstance(item, Property)]
+    rows = [measure_work(question, subject) for question in questions if not question.applicable(subject.traits)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [entry.name for entry in fields(Work)])
+        table.writeheader()
+        table.writerows(asdict(row) for row in rows if row.scenes)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,24 @@
+"""Each body that a property needs is assembled and factorised once, and only facets that may touch are visited."""
+
+from __future__ import annotations
+
+import pytest
+from scene_work import measure_work
+
+from contactverif.contract.property import Property
+from contactverif.contract.subject import Subject
+from contactverif.run.registry import load_formulation, load_properties
+
+WITH_BODIES = {item.id: item for item in load_properties(["*"]) if isinstance(item, Property) and item.bodies}
+MOST_VISITED = 1.5  # Facets that are visited for each one that touches: where contact ends must be found.
+
+
+@pytest.mark.parametrize("property_id", WITH_BODIES)
+def test_no_body_is_built_twice(property_id: str) -> None:
+    subject = load_formulation("vts-ppt")
+    assert isinstance(subject, Subject)
+    if WITH_BODIES[property_id].applicable(subject.traits):
+        pytest.skip("it does not apply to this formulation")
+    work = measure_work(WITH_BODIES[property_id], subject)
+    assert work.assembled == work.factorised == work.least_bodies > 0
+    assert work.facets <= MOST_VISITED * work.touching_facets or work.touching_facets == 0
