@@ -65,7 +65,7 @@ ROOMS = {
     "meshes": Room(("contract",), ("numpy", "meshio")),
     "scenes": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "scenes"), ("numpy", "hypothesis"), QUIET),
-    "run": Room(("contract", "scenes", "strategies"), ("numpy", "scipy", "hypothesis")),
+    "run": Room(("contract", "scenes", "strategies"), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room((*BELOW_RUN, "geometry", "run", *REPORTS), ("numpy", "scipy", "hypothesis")),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),

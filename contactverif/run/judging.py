@@ -16,6 +16,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.subject import Subject
+from contactverif.run.one_thread import one_thread
 
 
 def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
@@ -46,7 +47,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
 
     try:
-        with np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
+        with one_thread(), np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
             measurement = question.measure(case, subject)
             verdict, reason = judge(question, measurement)
     except PluginError as error:

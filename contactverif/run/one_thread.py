@@ -1,0 +1,25 @@
+"""One thread for linear algebra while a run judges.
+
+The matrices of a case are small, and threads of BLAS that share one of them wait for each other longer than they
+compute. Workers share the cores already. One thread also gives the same last bit on any number of cores.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any
+
+from threadpoolctl import ThreadpoolController
+
+
+@cache
+def _controller() -> Any:
+    """Return what knows the libraries that are loaded; to look for them takes some milliseconds."""
+    return ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Return a context in which numpy and scipy compute on one thread."""
+    context: AbstractContextManager[Any] = _controller().limit(limits=1, user_api="blas")
+    return context
