@@ -41,8 +41,8 @@ def check_penalty(penalty: float) -> float:
     return float(penalty)
 
 
-def check_count(n: int) -> int:
-    """Return the number n of points on a slave segment.
+def check_count(n: int, name: str = "n") -> int:
+    """Return the option n, the number of points on a slave segment, or another option that counts, by its name.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def check_count(n: int) -> int:
         If n is no whole number of at least one.
     """
     if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise MisuseError("n", repr(n), "a whole number ≥ 1")
+        raise MisuseError(name, repr(n), "a whole number ≥ 1")
     return n
 
 

@@ -26,7 +26,7 @@ TAKES_LONGDOUBLE = not ARE_KERNELS_COMPILED and bool(_IS_LONGER)
 
 def compile_kernel(function: Kernel) -> Kernel:
     """Compile a function for the types of each call; division by zero gives infinity or NaN, as in numpy."""
-    return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
+    return cast(Kernel, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 def compile_inline(function: Kernel) -> Kernel:

@@ -24,12 +24,12 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 
 Vector = tuple[float, float]
 Tree = tuple[IntArray, FloatArray]
 
-_LEAF = 4  # The number of segments in a leaf of the tree.
+LEAF = 4  # The number of segments in a leaf of the tree.
 
 
 class PointOnSegment(NamedTuple):
@@ -104,10 +104,10 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
     -------
     FloatArray, shape (n_boxes, 4)
         Low x, low y, high x, high y of each box. Box 1 holds all segments, and box i is halved into 2i and 2i + 1. The
-        second half of the list are the leaves, of `_LEAF` segments each.
+        second half of the list are the leaves, of `LEAF` segments each.
     """
     n_leaves = 1
-    while n_leaves * _LEAF < len(order):
+    while n_leaves * LEAF < len(order):
         n_leaves *= 2
     boxes = np.empty((2 * n_leaves, 4))
     boxes[:, :2] = np.inf
@@ -115,7 +115,7 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
     for place in range(len(order)):
         if order[place] < 0:  # padding
             continue
-        box = boxes[n_leaves + place // _LEAF]
+        box = boxes[n_leaves + place // LEAF]
         for end in range(2):
             for axis in range(2):
                 value = x[segments[order[place], end], axis]
@@ -129,7 +129,7 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
 
 
 @compile_kernel
-def _distance_to_box(origin: Vector, p: Vector, box: FloatArray) -> float:
+def distance_to_box(origin: Vector, p: Vector, box: FloatArray) -> float:
     """Return the squared distance of origin + p to a box, a little less than exact, so that roundoff loses no tie."""
     dx = max((box[0] - origin[0]) - p[0], 0.0, p[0] - (box[2] - origin[0]))
     dy = max((box[1] - origin[1]) - p[1], 0.0, p[1] - (box[3] - origin[1]))
@@ -184,39 +184,50 @@ def nearest_segment(v: PointOnSegment, x: FloatArray, segments: IntArray, order:
     boxes : FloatArray, shape (n_boxes, 4)
         The boxes of `search_tree` at these positions.
     """
+    place = nearest_place(v, x, segments, order, boxes)
+    return int(order[place]) if place >= 0 else -1  # A position that is no number has no nearest segment.
+
+
+@compile_kernel
+def nearest_place(v: PointOnSegment, x: FloatArray, segments: IntArray, order: IntArray, boxes: FloatArray) -> int:
+    """Return the place in `order` of the segment that `nearest_segment` returns, from the same arguments."""
     origin = v.a if v.c <= 0 else v.b
     p = arm(origin, v)
     n_leaves = len(boxes) // 2
-    best, best_distance, best_past = -1, np.inf, np.inf
+    best, best_distance, best_past, best_place = -1, np.inf, np.inf, -1
     waiting, distances = np.empty(64, dtype=np.int64), np.empty(64)  # the boxes still to open, one for each level
     n_waiting, box, distance = 0, 1, 0.0
     while True:
         while box < n_leaves and distance <= best_distance:  # down to a leaf, the nearer box first
-            near, far = 2 * box, 2 * box + 1
-            distance, to_far = _distance_to_box(origin, p, boxes[near]), _distance_to_box(origin, p, boxes[far])
-            if to_far < distance:
-                near, far, distance, to_far = far, near, to_far, distance
-            waiting[n_waiting], distances[n_waiting] = far, to_far
+            box, distance, waiting[n_waiting], distances[n_waiting] = _halves(box, origin, p, boxes)
             n_waiting += 1
-            box = near
         if distance <= best_distance:
-            start = (box - n_leaves) * _LEAF
-            for place in range(start, min(start + _LEAF, len(order))):
+            start = (box - n_leaves) * LEAF
+            for place in range(start, min(start + LEAF, len(order))):
                 segment = order[place]
-                if segment < 0:  # padding
-                    continue
-                x_1, x_2 = node(x, segments[segment, 0]), node(x, segments[segment, 1])
-                distance, past = distance_to_segment(origin, p, x_1, x_2)
-                if _is_nearer(distance, past, segment, best_distance, best_past, best):
-                    best, best_distance, best_past = segment, distance, past
+                if segment >= 0:  # no padding
+                    x_1, x_2 = node(x, segments[segment, 0]), node(x, segments[segment, 1])
+                    distance, past = distance_to_segment(origin, p, x_1, x_2)
+                    if is_nearer(distance, past, segment, best_distance, best_past, best):
+                        best, best_distance, best_past, best_place = segment, distance, past, place
         if n_waiting == 0:
-            return best
+            return best_place
         n_waiting -= 1
         box, distance = waiting[n_waiting], distances[n_waiting]
 
 
+@compile_inline
+def _halves(box: int, origin: Vector, p: Vector, boxes: FloatArray) -> tuple[int, float, int, float]:
+    """Return the nearer half of a box with its distance, and the farther one with its distance."""
+    first, second = 2 * box, 2 * box + 1
+    d_1, d_2 = distance_to_box(origin, p, boxes[first]), distance_to_box(origin, p, boxes[second])
+    if d_2 < d_1:
+        return second, d_2, first, d_1
+    return first, d_1, second, d_2
+
+
 @compile_kernel
-def _is_nearer(distance: float, past: float, segment: int, best_distance: float, best_past: float, best: int) -> bool:
+def is_nearer(distance: float, past: float, segment: int, best_distance: float, best_past: float, best: int) -> bool:
     """Return whether a segment comes before the best one so far, by distance, then by `past`, then by number.
 
     Where the foot of one lies past a node, distances that differ by some roundings are equal: both are functions of the
@@ -253,8 +264,8 @@ def segments_in_strip(
             waiting[n_waiting], waiting[n_waiting + 1] = 2 * box + 1, 2 * box
             n_waiting += 2
             continue
-        start = (box - n_leaves) * _LEAF
-        for place in range(start, min(start + _LEAF, len(order))):
+        start = (box - n_leaves) * LEAF
+        for place in range(start, min(start + LEAF, len(order))):
             if order[place] >= 0:  # no padding
                 members.append(order[place])
     return members
@@ -301,7 +312,7 @@ def _pad_chains(surface: Surface) -> IntArray:
         return order
     padded = np.full(0, -1, dtype=np.int64)
     for chain in np.split(order, begins):
-        width = _LEAF
+        width = LEAF
         while width < len(chain):
             width *= 2
         start = -(-len(padded) // width) * width

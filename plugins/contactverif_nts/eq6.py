@@ -24,11 +24,13 @@ Source: Zavarise & De Lorenzis (2009), Eq. 6.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
 from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
@@ -40,9 +42,9 @@ from contactverif.geometry.projection import (
     foot_on_surface,
     frame,
     minus,
-    nearest_segment,
     node,
 )
+from contactverif.geometry.threads import run_in_threads, split_range
 
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # The area of a point: 1, or lengths in one of two configurations.
 AREAS = {"current": CURRENT, "reference": REFERENCE}  # The words of the option `area`.
@@ -93,29 +95,71 @@ class Contact(NamedTuple):
     xi: float
 
 
-@compile_kernel
 def pair(
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
     tree: Tree,
-    segment: IntArray,
-    slot: IntArray,
-    c: FloatArray,
-    tau: float,
-    penalty: float,
+    points: Fields,
+    options: Fields,
+    threads: int = 1,
 ) -> tuple[IntArray, BoolArray]:
     """Return the nearest master segment of each point, and whether the point is active.
 
-    A point is active where `pressed` says so and its foot is on the surface, past a free end by at most τ.
+    Parameters
+    ----------
+    x : FloatArray, shape (n_nodes, 2)
+        Positions.
+    multipliers : FloatArray, shape (n_multipliers,)
+        Multipliers λ, empty for a penalty.
+    surfaces, tree : Fields
+        The fields of `Surfaces`, and a tree over the master.
+    points : Fields
+        Slave segment and slot of each point, (n_points,) each, and the places c (n_slots,) on a segment.
+    options : Fields
+        The part τ of a master segment by which a foot may lie past its free end, and the penalty.
+    threads : int
+        How many threads share the points.
+    """
+    n_points = len(points[0])
+    answers = np.empty(n_points, dtype=np.int64), np.empty(n_points, dtype=np.bool_)
+    run_in_threads(
+        [
+            partial(_pair_points, begin, end, answers, x, multipliers, surfaces, tree, points, options)
+            for begin, end in split_range(n_points, threads)
+        ]
+    )
+    return answers
+
+
+@compile_kernel
+def _pair_points(
+    begin: int,
+    end: int,
+    answers: Fields,
+    x: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    tree: Tree,
+    points: Fields,
+    options: Fields,
+) -> None:
+    """Write the answers for the points from begin to end.
+
+    A point is active where `is_pressed` says so and its foot is on the surface, past a free end by at most τ.
     """
     _, slave, master, neighbours = surfaces
     order, boxes = tree
-    nearest = np.empty(len(segment), dtype=np.int64)
-    active = np.empty(len(segment), dtype=np.bool_)
-    for i in range(len(segment)):
+    segment, slot, c = points
+    tau, penalty = options
+    nearest, active = answers
+    place = NO_PLACE
+    for i in range(begin, end):
+        if i > begin and not is_next(slave, segment[i - 1], segment[i]):
+            place = NO_PLACE
         v = PointOnSegment(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
-        m = nearest_segment(v, x, master, order, boxes)
+        place = nearest_place_from(place, v, x, master, order, boxes)
+        m = order[place]
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
         l_12, t, _ = frame(x_1, x_2)
         d = arm(x_1, v)
@@ -123,7 +167,6 @@ def pair(
         on_surface = foot_on_surface(dot(d, t), l_12, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
         nearest[i] = m
         active[i] = is_pressed(g, multipliers, i, penalty) and on_surface
-    return nearest, active
 
 
 @compile_kernel

@@ -74,7 +74,13 @@ def vts_me_lm(*, penalty: float, n: int = 2, area: str = "current", tau: float =
 
 
 def vts_ppt_lm(
-    *, penalty: float, n: int = 2, transmission: str = "printed", free_end: str = "", tau: float = 1e-2
+    *,
+    penalty: float,
+    n: int = 2,
+    transmission: str = "printed",
+    free_end: str = "",
+    tau: float = 1e-2,
+    threads: int = 1,
 ) -> PatchTestPassing:
     """VTS-PPT with a multiplier, a pressure, at each virtual slave node.
 
@@ -91,7 +97,7 @@ def vts_ppt_lm(
         As for `vts_ppt` or `vts_ppt_balanced`.
     transmission : str
         "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
-    free_end, tau : str or float
+    free_end, tau, threads : str or float or int
         As for `vts_ppt` or `vts_ppt_balanced`; an empty `free_end` is the default of the chosen transmission.
 
     References
@@ -99,7 +105,7 @@ def vts_ppt_lm(
     Zavarise & De Lorenzis (2009), Sections 6 and 7.1; rows and tangent: here.
     """
     make = choose("transmission", transmission, {"printed": vts_ppt, "balanced": vts_ppt_balanced})
-    springs = make(penalty=penalty, n=n, tau=tau, **({"free_end": free_end} if free_end else {}))
+    springs = make(penalty=penalty, n=n, tau=tau, threads=threads, **({"free_end": free_end} if free_end else {}))
     return replace(springs, traits=_with_multipliers(springs.traits, n))
 
 

@@ -20,6 +20,7 @@ Source: Zavarise & De Lorenzis (2009), Boxes 1–3, Appendix A.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -32,8 +33,11 @@ from contactverif.contract.state_vector import join_rows, split_state, split_sta
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
+from contactverif.geometry.local_matrix import NO_NODE, share_couplings
 from contactverif.geometry.projection import search_tree
+from contactverif.geometry.threads import run_in_threads, split_range
 from contactverif_nts import box3, box3_tangent, walk
+from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
 from contactverif_nts.point_contact import add_locking
 from contactverif_nts.walk import FREE_ENDS, Areas
@@ -99,6 +103,8 @@ class PatchTestPassing:
         `walk.TRUNCATE`, `walk.EXTEND` or `walk.COVER`.
     tau : float
         The part of a master segment by which a foot may lie past its free end and still count.
+    threads : int
+        How many threads share the pairing and the tangent of a large interface; the answers have the same bits.
     """
 
     traits: Traits
@@ -109,6 +115,7 @@ class PatchTestPassing:
     current_area: bool
     free_end: int
     tau: float
+    threads: int
 
     def n_multipliers(self, interface: Interface, /) -> int:
         """Return the number of multipliers: one for each virtual slave node, or 0 for a penalty."""
@@ -120,7 +127,8 @@ class PatchTestPassing:
         tree = search_tree(interface.master, x)
         surfaces = self._surfaces(interface, interface.nodes)
         balanced = self.transmission == box3.BALANCED
-        areas = walk.pair(x, multipliers, surfaces, tree, self.n, self.free_end, self.tau, self.penalty, balanced)
+        search = self.n, self.free_end, self.tau, self.penalty, balanced
+        areas = walk.pair(x, multipliers, surfaces, tree, search, self.threads)
         return Pairing(dict(zip(Areas._fields, areas, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -133,14 +141,31 @@ class PatchTestPassing:
         """Compute the derivative of the residual; that of Eq. 6 alone where the preset is not consistent."""
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
+        return self._sweep(interface, pairing, z)[1]
+
+    def residual_and_tangent(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, /
+    ) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute residual and tangent in one sweep, or one after the other where the preset is not consistent."""
+        if not self.consistent:
+            return self.residual(interface, pairing, z), self.tangent(interface, pairing, z)
+        return self._sweep(interface, pairing, z)
+
+    def _sweep(self, interface: Interface, pairing: Pairing, z: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
+        """Compute the residual and its exact derivative."""
         x, multipliers = split_state(interface, z)
         surfaces, areas, options = self._arguments(interface, pairing, z)
-        first_multiplier = interface.n_nodes if len(multipliers) else -1
-        couplings = box3_tangent.list_couplings(surfaces, areas, self.n, first_multiplier)
-        matrix = zero_matrix(interface.n_nodes, len(multipliers), Couplings(*couplings))
-        rows = matrix.indptr, matrix.indices, matrix.data
-        box3_tangent.add_tangent(*rows, x, multipliers, surfaces, areas, options)
-        return matrix
+        n_nodes = interface.n_nodes
+        group, first_multiplier = (1, n_nodes) if len(multipliers) else (self.n, NO_NODE)
+        couplings = list_couplings(surfaces, areas, self.n, group, first_multiplier)
+        matrix = zero_matrix(n_nodes, len(multipliers), Couplings(couplings[0], couplings[1], couplings[1][:-1]))
+        rows, csr = np.zeros(z.size), (matrix.indptr, matrix.indices, matrix.data)
+        parts = split_range(len(couplings[2]), self.threads)
+        shares = share_couplings(n_nodes + len(multipliers), couplings[0], couplings[1], parts)
+        arguments = rows, csr, x, multipliers, surfaces, areas, options, couplings
+        sweep = box3_tangent.add_forces_and_tangent
+        run_in_threads([partial(sweep, *arguments, tuple(share)) for share in shares])
+        return rows, matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return each virtual slave node with its gap, its pressure and the ends Q, P of its area of competence.
@@ -199,7 +224,9 @@ class PatchTestPassing:
         return self._surfaces(interface, reference), areas, (self.n, self.transmission, self.current_area, self.penalty)
 
 
-def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: float = 1e-2) -> PatchTestPassing:
+def vts_ppt(
+    *, penalty: float, n: int = 2, free_end: str = "truncate", tau: float = 1e-2, threads: int = 1
+) -> PatchTestPassing:
     """VTS-PPT as printed: each virtual slave node presses on all master segments under its area of competence.
 
     It passes the flat patch test on any mesh, because Box 3 integrates a uniform pressure exactly over the part of each
@@ -219,6 +246,8 @@ def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: floa
         nothing.
     tau : float
         The part of a master segment by which a foot may lie past its free end and still count.
+    threads : int
+        How many threads share the work on a large interface, ≥ 1; the answers have the same bits.
 
     References
     ----------
@@ -236,10 +265,13 @@ def vts_ppt(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: floa
         current_area=True,
         free_end=choose("free_end", free_end, FREE_ENDS),
         tau=check_tau(tau),
+        threads=check_count(threads, "threads"),
     )
 
 
-def vts_ppt_basic(*, penalty: float, n: int = 2, free_end: str = "truncate", tau: float = 1e-2) -> PatchTestPassing:
+def vts_ppt_basic(
+    *, penalty: float, n: int = 2, free_end: str = "truncate", tau: float = 1e-2, threads: int = 1
+) -> PatchTestPassing:
     """VTS-PPT as printed with the tangent of VTS-ME: Newton's method converges linearly.
 
     The forces and their promises are those of `vts_ppt`. The tangent is promised to be approximate: it treats each
@@ -247,21 +279,21 @@ def vts_ppt_basic(*, penalty: float, n: int = 2, free_end: str = "truncate", tau
 
     Parameters
     ----------
-    penalty, n, free_end, tau : float or int or str
+    penalty, n, free_end, tau, threads : float or int or str
         As for `vts_ppt`.
 
     References
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
-    consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau)
+    consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
     witnesses = {**consistent.traits.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
     traits = replace(consistent.traits, tangent="approximate", witnesses=witnesses)
     return replace(consistent, consistent=False, traits=traits)
 
 
 def vts_ppt_balanced(
-    *, penalty: float, n: int = 2, area: str = "current", free_end: str = "cover", tau: float = 1e-2
+    *, penalty: float, n: int = 2, area: str = "current", free_end: str = "cover", tau: float = 1e-2, threads: int = 1
 ) -> PatchTestPassing:
     """VTS-PPT with action equal to reaction on tilted and bent surfaces and at free ends (ours).
 
@@ -275,7 +307,7 @@ def vts_ppt_balanced(
         As for `vts_ppt`.
     area : str
         "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    free_end, tau : str or float
+    free_end, tau, threads : str or float or int
         As for `vts_ppt`; `free_end` is "cover" by default.
 
     References
@@ -294,7 +326,7 @@ def vts_ppt_balanced(
         witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"},
     )
     return replace(
-        vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau),
+        vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads),
         transmission=box3.BALANCED,
         current_area=current,
         traits=add_locking(traits, n),

@@ -85,7 +85,8 @@ class PointContact:
         x, multipliers = split_state(interface, z)
         segment, other, slot = self._points(interface)
         tree, surfaces = search_tree(interface.master, x), self._surfaces(interface, interface.nodes)
-        nearest, active = eq6.pair(x, multipliers, surfaces, tree, segment, slot, self.c, self.tau, self.penalty)
+        points, options = (segment, slot, self.c), (self.tau, self.penalty)
+        nearest, active = eq6.pair(x, multipliers, surfaces, tree, points, options)
         return Pairing({"segment": segment, "other": other, "slot": slot, "master": nearest, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:

@@ -24,12 +24,14 @@ Source: Zavarise & De Lorenzis (2009), Boxes 1 and 2, Fig. 23.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
+from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -40,9 +42,9 @@ from contactverif.geometry.projection import (
     foot_on_surface,
     frame,
     minus,
-    nearest_segment,
     node,
 )
+from contactverif.geometry.threads import run_in_threads, split_range
 from contactverif_nts.eq6 import Fields, is_pressed
 
 TRUNCATE, EXTEND, COVER = 0, 1, 2  # What happens to an area of competence that overhangs a free end.
@@ -73,40 +75,87 @@ def middle_of_part(i: int, n: int, unity: float) -> float:
     return (2 * (i % n) + 1) * unity / n - 1
 
 
-@compile_kernel
+class Search(NamedTuple):
+    """The options of the pairing, in this order."""
+
+    n: int  # virtual slave nodes on a slave segment
+    free_end: int  # TRUNCATE, EXTEND or COVER
+    tau: float  # the part of a master segment by which a foot may lie past its free end
+    penalty: float
+    balanced: bool
+
+
 def pair(
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
     tree: Tree,
-    n: int,
-    free_end: int,
-    tau: float,
-    penalty: float,
-    balanced: bool,
+    options: Fields,
+    threads: int = 1,
 ) -> Fields:
-    """Return the fields of `Areas` for the n virtual slave nodes on each slave segment, at x (n_nodes, 2).
+    """Return the fields of `Areas` for the virtual slave nodes on each slave segment, at x (n_nodes, 2).
 
-    A virtual slave node is active where `pressed` says so, its foot is on the surface and s(P) < s(Q). A balanced walk
-    does not begin where the whole area lies past one end of V's segment.
+    Parameters
+    ----------
+    x : FloatArray, shape (n_nodes, 2)
+        Positions.
+    multipliers : FloatArray, shape (n_multipliers,)
+        Multipliers λ, empty for a penalty.
+    surfaces, tree, options : Fields
+        The fields of `Surfaces`, a tree over the master and the fields of `Search`.
+    threads : int
+        How many threads share the virtual slave nodes.
+    """
+    n, n_segments = options[0], len(surfaces[1])
+    integers = np.full((8, n_segments * n), NOT_CUT, dtype=np.int64)
+    active = np.zeros(n_segments * n, dtype=np.bool_)
+    areas = *integers, active
+    run_in_threads(
+        [
+            partial(_pair_points, begin * n, end * n, areas, x, multipliers, surfaces, tree, options)
+            for begin, end in split_range(n_segments, threads)
+        ]
+    )
+    return areas
+
+
+@compile_kernel
+def _pair_points(
+    begin: int,
+    end: int,
+    areas: Fields,
+    x: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    tree: Tree,
+    options: Fields,
+) -> None:
+    """Write the entries of the virtual slave nodes from begin to end.
+
+    A virtual slave node is active where `is_pressed` says so, its foot is on the surface and s(P) < s(Q). A balanced
+    walk does not begin where the whole area lies past one end of V's segment.
     """
     _, slave, master, neighbours = surfaces
+    partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     order, boxes = tree
-    n_points = len(slave) * n
-    partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q = np.full((8, n_points), NOT_CUT, dtype=np.int64)
-    active = np.zeros(n_points, dtype=np.bool_)
-    for i in range(n_points):
+    n, free_end, tau, penalty, balanced = options
+    place = NO_PLACE
+    for i in range(begin, end):
+        if i > begin and not is_next(slave, (i - 1) // n, i // n):
+            place = NO_PLACE
         x_a, x_b = node(x, slave[i // n, 0]), node(x, slave[i // n, 1])
         c = middle_of_part(i, n, 1.0)
         c_p, c_q = c + 1 / n, c - 1 / n
-        m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
+        place = nearest_place_from(place, PointOnSegment(x_a, x_b, c), x, master, order, boxes)
+        m = order[place]
         if free_end == COVER:
             c_p, c_q, cut_p[i], cut_q[i] = _cover(x, master, neighbours, m, x_a, x_b, c_p, c_q)
             if max(cut_p[i], cut_q[i]) != NOT_CUT:
                 cutting[i] = m
                 if c_p > c_q:
                     c = (c_p + c_q) / 2
-                    m = nearest_segment(PointOnSegment(x_a, x_b, c), x, master, order, boxes)
+                    place = nearest_place_from(place, PointOnSegment(x_a, x_b, c), x, master, order, boxes)
+                    m = order[place]
 
         partner[i], first[i], last[i] = m, m, m
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
@@ -123,10 +172,9 @@ def pair(
         first[i], last[i] = _walk(x, p, q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
             clip_p[i], clip_q[i] = _truncate(x, p, q, first[i], last[i], t, master, neighbours)
-    return partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active
 
 
-@compile_kernel
+@compile_inline
 def _walk(
     x: FloatArray, p: PointOnSegment, q: PointOnSegment, m: int, t: Vector, master: IntArray, neighbours: IntArray
 ) -> tuple[int, int]:
@@ -145,7 +193,7 @@ def _walk(
     return first, last
 
 
-@compile_kernel
+@compile_inline
 def _lies_past_one_end(
     x: FloatArray, p: PointOnSegment, q: PointOnSegment, m: int, t: Vector, master: IntArray
 ) -> bool:
@@ -156,13 +204,13 @@ def _lies_past_one_end(
     )
 
 
-@compile_kernel
+@compile_inline
 def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) -> float:
     """Return the length of a master segment along t, negative where the segment runs backwards."""
     return dot(minus(node(x, master[segment, 1]), node(x, master[segment, 0])), t)
 
 
-@compile_kernel
+@compile_inline
 def _truncate(
     x: FloatArray,
     p: PointOnSegment,
@@ -182,7 +230,7 @@ def _truncate(
     return clip_p, clip_q
 
 
-@compile_kernel
+@compile_inline
 def _cover(
     x: FloatArray,
     master: IntArray,

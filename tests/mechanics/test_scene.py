@@ -19,7 +19,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import Subject
-from contactverif.geometry import projection
+from contactverif.geometry import chain_search, projection
 from contactverif.geometry.compiled import python_function
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
@@ -474,8 +474,13 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
 
     Counted inside the search itself: its own Python functions run, not compiled, with a counter for a distance.
     """
-    distance, search = python_function(projection.distance_to_segment), python_function(projection.nearest_segment)
-    pairs = [(module, python_function(module.pair)) for module in (eq6, walk)]
+    distance = python_function(projection.distance_to_segment)
+    searches = [(chain_search, "nearest_place", python_function(projection.nearest_place))]
+    searches += [
+        (chain_search, name, getattr(chain_search, name)) for name in ("_look_at", "_look_at_leaf", "_look_below")
+    ]
+    searches += [(module, "nearest_place_from", chain_search.nearest_place_from) for module in (eq6, walk)]
+    searches += [(module, "_pair_points", module._pair_points) for module in (eq6, walk)]
 
     def count(name: str, case: Case) -> Counts:
         evaluated: list[bool] = []
@@ -487,10 +492,10 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
         subject = load_formulation(name)
         assert isinstance(subject, Subject)
         with monkeypatch.context() as patched:
-            patched.setattr(projection, "distance_to_segment", counting)
-            for module, pair in pairs:
-                patched.setattr(module, "nearest_segment", search)
-                patched.setattr(module, "pair", pair)
+            for module in (projection, chain_search):
+                patched.setattr(module, "distance_to_segment", counting)
+            for module, function, compiled in searches:
+                patched.setattr(module, function, python_function(compiled))
             pairing = subject.for_case(case).pair(case.interface, case.z)
         assert pairing == subject.for_case(case).pair(case.interface, case.z)  # what was counted is what is compiled
         return len(evaluated), sum(evaluated)

@@ -145,7 +145,7 @@ MUTANTS = (
     line("gaps below 1e-9 closed", ACTIVITY, "eq6",
          "is_pressed(g,", "is_pressed(g - 1e-9,"),
     line("segments of the nearest node only", SEGMENT, "eq6",
-         "m = nearest_segment(v, x, master, order, boxes)", _BY_NEAREST_NODE),
+         "m = order[place]", _BY_NEAREST_NODE),
     # At a vertex of a flat master both segments meet the foot at their ends, and neither counts it as its own.
     line("force dropped where a slave node stands over a master node", RESULTANT, "eq6",
          "on_surface = foot_on_surface(", "on_surface = 0 < dot(d, t) < l_12 and foot_on_surface(", factory="nts_ar"),

@@ -13,7 +13,7 @@ from test_forces import TABLE, read_fractions
 import contactverif_nts
 from contactverif import Interface, MisuseError
 from contactverif.contract.subject import Subject
-from contactverif.geometry import block_rows, projection
+from contactverif.geometry import block_rows, chain_search, local_matrix, projection
 from contactverif.geometry.compiled import python_function
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
@@ -22,7 +22,7 @@ from contactverif.mechanics.trace import Trace
 from contactverif.scenes.blocks import two_blocks
 from contactverif.scenes.catalogue import make_scene
 from contactverif.scenes.uniform_stress import stress_error
-from contactverif_nts import box3, box3_tangent, eq6, eq6_tangent, turned_force, walk
+from contactverif_nts import box3, box3_couplings, box3_gains, box3_tangent, eq6, eq6_tangent, turned_force, walk
 
 METHODS = [
     ("nts_lm", {}),
@@ -205,7 +205,20 @@ def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatc
         return computed
 
     compiled = answers()
-    for module in (projection, block_rows, eq6, walk, box3, turned_force, eq6_tangent, box3_tangent):
+    for module in (
+        projection,
+        chain_search,
+        block_rows,
+        local_matrix,
+        eq6,
+        walk,
+        box3,
+        turned_force,
+        eq6_tangent,
+        box3_couplings,
+        box3_gains,
+        box3_tangent,
+    ):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
                 monkeypatch.setattr(module, attribute, python_function(value))

@@ -9,9 +9,9 @@ import pytest
 from surfaces import make_bent
 
 import contactverif_nts
-from contactverif.geometry import block_rows, projection
+from contactverif.geometry import block_rows, chain_search, local_matrix, projection
 from contactverif.geometry.compiled import python_function
-from contactverif_nts import box3, box3_tangent, eq6, eq6_tangent, turned_force, walk
+from contactverif_nts import box3, box3_couplings, box3_gains, box3_tangent, eq6, eq6_tangent, turned_force, walk
 
 METHODS = [
     ("nts", {}),
@@ -89,7 +89,20 @@ def test_uncompiled_kernels_agree(name: str, options: dict[str, Any], monkeypatc
         return computed
 
     compiled = answers()
-    for module in (projection, block_rows, eq6, walk, box3, turned_force, eq6_tangent, box3_tangent):
+    for module in (
+        projection,
+        chain_search,
+        block_rows,
+        local_matrix,
+        eq6,
+        walk,
+        box3,
+        turned_force,
+        eq6_tangent,
+        box3_couplings,
+        box3_gains,
+        box3_tangent,
+    ):
         for attribute, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
                 monkeypatch.setattr(module, attribute, python_function(value))
