@@ -1,6 +1,6 @@
 """Race the kernels against ipctk: search, residual and tangent as CSR, per slave segment, beside the memory bound.
 
-    python tests/benchmarks/beside_ipctk.py                      # 1e3, 1e4 and 1e5 segments, in a minute
+    python tests/benchmarks/beside_ipctk.py                      # 1e3 to 1e6 segments, in some minutes
     python tests/benchmarks/beside_ipctk.py --sizes 1e4 1e6 --only vts-ppt --out /tmp/race
 
 `tox -e beside-ipctk` does the same with ipctk installed. ipctk is no requirement of the project.
@@ -10,7 +10,10 @@ a barrier a gap, so the slave is pressed in for the ones and lifted for the othe
 partner. All run on one core, in turns, so that a slow moment of the machine hits all of them; the ratio belongs to one
 turn. Seconds are those of the processor, since other programs may wait for the same core. The memory bound is the time
 to write as many bytes as the tangent has, past the caches. Peak memory is that of a process of its own, above what it
-needs for the mesh; below 1e5 segments it hides in the peak of the imports.
+needs for the mesh; below 1e5 segments it hides in the peak of the imports. Above 1e5 segments ours run alone.
+
+Two threads are raced against one by the wall clock, on all cores. `steps.csv` says where the time of vts-ppt goes: each
+step of an evaluation in µs a segment, beside the memory bound.
 
 Rule for the next editor: nobody is measured alone, and what is printed is the spread of ratios, not the best of them.
 """
@@ -27,7 +30,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
 os.environ |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -36,6 +39,12 @@ import numpy as np
 from scipy import sparse
 
 from contactverif import Interface, Subject, evaluate_both, load_formulation
+from contactverif.contract.state_vector import split_state
+from contactverif.geometry.block_rows import Couplings, zero_matrix
+from contactverif.geometry.local_matrix import NO_NODE, share_couplings
+from contactverif.geometry.projection import search_tree
+from contactverif_nts.box3_couplings import list_couplings
+from contactverif_nts.box3_tangent import add_forces_and_tangent
 
 OURS = ("vts-ppt", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
 PEER = "ipctk"
@@ -45,6 +54,9 @@ LIFT = 0.5  # This lift gives the pressed slave a gap of 0.2 to 0.35 segments.
 BARRIER_REACH = 0.4  # The distance from which ipctk's barrier acts: each node feels one or two partners.
 STREAM_BYTES = 2**27  # Larger than the caches.
 LEAST_FOR_PEAK = 100_000  # Segments.
+LEAST_FOR_THREADS = 10_000  # Segments.
+MOST_FOR_PEER = 100_000  # Segments; ipctk needs 5 GB for 1e6.
+THREADED = ("vts-ppt", "vts-ppt-balanced")
 SHORTEST_TURN = 0.05  # Seconds: a call that is shorter is repeated within its turn.
 KILO = 1024  # Linux states the peak of a process in these bytes.
 COLUMNS = (
@@ -143,7 +155,7 @@ def race(names: list[str], n_slave: int, turns: int) -> list[dict[str, Any]]:
 def _rows(names: list[str], n_slave: int, parts_of: Any, bound_of: Any) -> list[dict[str, Any]]:
     """Return the rows of times (turns, racers, parts) and memory bounds (turns, racers), all in seconds."""
     totals = parts_of.sum(axis=2)  # (turns, racers)
-    peer = totals[:, names.index(PEER)]
+    peer = totals[:, names.index(PEER)] if PEER in names else np.full(len(totals), np.nan)
     rows = []
     for number, name in enumerate(names):
         seconds, micro = totals[:, number], 1e6 / n_slave
@@ -179,16 +191,65 @@ def _measure_peak(name: str, n_slave: int) -> int:
 
 
 def exponents(rows: list[dict[str, Any]]) -> dict[str, float]:
-    """Return the exponent of time against segments between the two largest meshes, for each name."""
+    """Return the exponent of time against segments between 1e4, or the least mesh above it, and the largest mesh."""
     table: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
         table.setdefault(row["formulation"], []).append((row["segments"], row["segments"] * row["median / µs"]))
     slopes = {}
     for name, points in table.items():
         if len(points) > 1:
-            (n, t), (m, s) = sorted(points)[-2:]
+            large = sorted(point for point in points if point[0] >= 10_000) or sorted(points)
+            (n, t), (m, s) = large[0], large[-1]
+            if n == m:
+                continue
             slopes[name] = float(np.log(s / t) / np.log(m / n))
     return slopes
+
+
+def race_threads(name: str, n_slave: int, turns: int) -> tuple[float, float, float]:
+    """Return least, median and greatest of the seconds with one thread over those with two, by the wall clock."""
+    racers = [our_racer(name, n_slave), our_racer(f"{name}:threads=2", n_slave)]
+    times = np.empty((turns, 2))
+    for racer in racers:
+        racer.call()
+    for turn in range(turns):
+        for number, racer in enumerate(racers):
+            start = perf_counter()
+            racer.call()
+            times[turn, number] = perf_counter() - start
+    return _spread(times[:, 0] / times[:, 1])
+
+
+def time_steps(n_slave: int, turns: int) -> dict[str, float]:
+    """Return the median µs a segment of each step of an evaluation of vts-ppt, and the memory bound."""
+    interface, subject = wavy(n_slave), load_formulation("vts-ppt")
+    assert isinstance(subject, Subject), subject
+    plugin, z, stream = subject.with_penalty(10.0).plugin, interface.nodes.ravel(), np.ones(STREAM_BYTES // 8)
+    n_nodes, table = interface.n_nodes, []
+    for _ in range(turns + 1):  # The first turn compiles.
+        x, multipliers = split_state(interface, z)
+        clock = [process_time()]
+        search_tree(interface.master, x)
+        clock.append(process_time())
+        pairing = plugin.pair(interface, z)
+        clock.append(process_time())
+        surfaces, areas, options = plugin._arguments(interface, pairing, z)
+        couplings = list_couplings(surfaces, areas, plugin.n, plugin.n, NO_NODE)
+        clock.append(process_time())
+        tangent = zero_matrix(n_nodes, 0, Couplings(couplings[0], couplings[1], couplings[1][:-1]))
+        clock.append(process_time())
+        rows, csr = np.zeros(z.size), (tangent.indptr, tangent.indices, tangent.data)
+        (share,) = share_couplings(n_nodes, couplings[0], couplings[1], [(0, len(couplings[2]))])
+        sweep = rows, csr, x, multipliers, surfaces, areas, options, couplings, tuple(share)
+        add_forces_and_tangent(*sweep)
+        clock.append(process_time())
+        add_forces_and_tangent(*sweep)
+        clock.append(process_time())
+        bound = time_writing(stream) * sum(part.nbytes for part in csr)
+        table.append([*np.diff(clock), bound])
+    names = ("tree of the master", "search and walk, with a tree", "which nodes feel which", "pattern of the tangent")
+    names += ("forces and tangent", "forces and tangent, into memory that is there", "memory bound")
+    return dict(zip(names, map(float, 1e6 / n_slave * np.median(table[1:], axis=0)), strict=True))
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -227,16 +288,31 @@ def write(rows: list[dict[str, Any]], folder: Path) -> None:
     draw(rows, folder / "kernels.svg")
 
 
+def write_steps(steps: dict[int, dict[str, float]], folder: Path) -> None:
+    """Write steps.csv: a row for each step, a column for each number of segments."""
+    with (folder / "steps.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["step of vts-ppt, µs a segment", *steps])
+        for name in next(iter(steps.values())):
+            writer.writerow([name, *(f"{step[name]:.4g}" for step in steps.values())])
+
+
 def main() -> None:
     """Measure, print the table, and write kernels.csv and kernels.svg."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--sizes", nargs="+", type=lambda text: int(float(text)), default=[1000, 10_000, 100_000])
+    parser.add_argument(
+        "--sizes", nargs="+", type=lambda text: int(float(text)), default=[1000, 10_000, 100_000, 1_000_000]
+    )
     parser.add_argument("--only", nargs="+", default=list(OURS), help="formulations")
     parser.add_argument("--turns", type=int, default=TURNS)
     parser.add_argument("--out", type=Path, default=Path("reports/bench"))
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--peak", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    speedups = {}
+    if not options.peak and (os.cpu_count() or 1) > 1:
+        sizes = [n for n in options.sizes if n >= LEAST_FOR_THREADS]
+        speedups = {(name, n): race_threads(name, n, options.turns) for name in THREADED for n in sizes}
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {cores[options.core % len(cores)]})  # A process for the peak inherits its one core.
@@ -246,14 +322,23 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     names = [*options.only, PEER]
     # A process begins with the peak of the one that started it, so this comes while this process is small.
-    peaks = {(name, n): peak_memory(name, n) / n for n in options.sizes for name in names}
+    racing = {n: names if n <= MOST_FOR_PEER else list(options.only) for n in options.sizes}
+    peaks = {(name, n): peak_memory(name, n) / n for n in options.sizes for name in racing[n]}
     print("  ".join(COLUMNS))
     for n_slave in options.sizes:
-        for measured in race(names, n_slave, options.turns):
+        for measured in race(racing[n_slave], n_slave, options.turns):
             row = measured | {COLUMNS[-1]: peaks[measured["formulation"], n_slave]}
             rows.append(row)
             print("  ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
         write(rows, options.out)  # After each size, so that a race that is stopped leaves what it measured.
+    steps = {n: time_steps(n, options.turns) for n in options.sizes}
+    write_steps(steps, options.out)
+    for n_slave, step in steps.items():
+        print(n_slave, {name: float(f"{value:.3g}") for name, value in step.items()})
+    for (name, n_slave), spread in speedups.items():
+        print(
+            f"{name}, {n_slave}: two threads are {' / '.join(f'{value:.2f}' for value in spread)} times as fast as one"
+        )
     print("exponent of the cost:", {name: round(slope, 3) for name, slope in exponents(rows).items()})
 
 
