@@ -20,6 +20,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.trace import End
 from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.workers import worker_pool
 from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs
@@ -243,6 +244,22 @@ def test_all_are_asked_the_same_cases() -> None:
     assert study.differing[0].reference_outcome.verdict is Verdict.PASS
     assert {cost.formulation for cost in study.costs} == {"vts-ppt", "vts-me"}
     assert all(cost.total > 0 for cost in study.costs)
+
+
+def test_two_processes_find_the_same_differences() -> None:
+    subjects = [load_formulation(name) for name in ("vts-ppt", "vts-me")]
+    assert isinstance(subjects[0], Subject)
+    questions = load_properties(["patch.flat.transmission", "balance.force"])
+    with worker_pool(2) as executor:
+        shared = run_comparison(subjects[0], subjects[1:], questions, examples=30, seed=1, executor=executor)
+    alone = run_comparison(subjects[0], subjects[1:], questions, examples=30, seed=1)
+    for ours, theirs in zip(shared.differing, alone.differing, strict=True):
+        assert (ours.info.id, ours.formulation, ours.number) == (theirs.info.id, theirs.formulation, theirs.number)
+        assert (ours.decades, ours.margin) == (theirs.decades, theirs.margin)
+        np.testing.assert_array_equal(ours.outcome.case.z, theirs.outcome.case.z)
+    assert shared.comparison.paired.keys() == alone.comparison.paired.keys()
+    for key, paired in shared.comparison.paired.items():
+        np.testing.assert_array_equal(paired.decades, alone.comparison.paired[key].decades)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
