@@ -72,7 +72,7 @@ def verify(
     from contactverif.cli.counterexample_text import how_to_keep
     from contactverif.cli.progress import Bar
     from contactverif.cli.run_tables import RunTable, summary
-    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.run.registry import load_formulation, load_properties, matching_ids
     from contactverif.run.runner import run
     from contactverif.run.workers import worker_pool
 
@@ -81,11 +81,11 @@ def verify(
     folder = PictureFolder.make(pictures)
     scene = place.make_scene()
     interface = place.read_interface()
-    questions = load_properties(properties or ["*"])
-    subjects = [load_formulation(name) for name in names]
     reasons = _known_failures(known or [])
-    jobs = workers.number(len(subjects), len(questions), sampling.planned_examples())
+    jobs = workers.number(len(names), len(matching_ids(properties or ["*"])), sampling.planned_examples())
     with worker_pool(jobs) as executor, Bar() as bar:
+        questions = load_properties(properties or ["*"])
+        subjects = [load_formulation(name) for name in names]
         result = run(
             subjects,
             questions,

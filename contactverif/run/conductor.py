@@ -1,7 +1,8 @@
 """The order in which the pieces of a run are done, and the report of its progress.
 
-Each formulation is called once before anything else. Then the cases of a property are drawn, once for all
-formulations, they are judged, and what failed is shrunk. Follow-ups come first, so that few drawn cases wait at a time.
+Each formulation is called once before anything else. Then the cases of a strategy are drawn, once for all formulations
+and all properties that have this strategy, they are judged, and what failed is shrunk. Many cases are drawn block by
+block. Follow-ups come first, so that few drawn cases wait at a time.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import SHRINK_CALLS, draw_cases
+from contactverif.run.driver import BLOCK, SHRINK_CALLS, draw_case, draw_cases
 from contactverif.run.open_row import OpenRow
 from contactverif.run.outcome_store import WHOLE
 from contactverif.run.packing import CaseChunk
@@ -26,7 +27,7 @@ from contactverif.run.pieces import (
     LIST_CHUNK,
     DrawnCases,
     call_first,
-    draw_property,
+    draw_chunks,
     in_chunks,
     judge_chunk,
     needed_parts,
@@ -113,9 +114,9 @@ class Conductor:
 
     def judge(self, rows: Sequence[OpenRow]) -> None:
         """Judge all cases of all rows, and shrink what fails."""
-        groups: dict[str, list[OpenRow]] = {}
+        groups: dict[tuple[str, bool], list[OpenRow]] = {}
         for row in rows:
-            groups.setdefault(row.question.id, []).append(row)
+            groups.setdefault(self._sampling.group(row.question), []).append(row)
             if row.witness is not None and not row.witness_is_listed:
                 piece = row.question, row.subject, CaseChunk([row.witness])
                 self._tasks.append(_Task(judge_chunk, piece, partial(self._add_witness, row)))
@@ -124,7 +125,7 @@ class Conductor:
             if isinstance(source, tuple):
                 self._plan_list(group, source)
             else:
-                self._plan_drawing(group)
+                self._tasks.append(self._drawing(group, 0))
         self._work()
 
     def close(self, row: OpenRow) -> Row:
@@ -134,28 +135,34 @@ class Conductor:
     def _plan_list(self, group: Sequence[OpenRow], source: tuple[Case, ...]) -> None:
         draw_cases(source, seed="", examples=0)  # It checks the names.
         for row in group:
-            self._tasks.extend(self._judge_tasks(row, len(source), in_chunks(source, LIST_CHUNK)))
+            self._tasks.extend(self._judge_tasks(row, in_chunks(source, LIST_CHUNK), planned=len(source), last=True))
 
-    def _plan_drawing(self, group: Sequence[OpenRow]) -> None:
-        """Plan to draw the cases of a property, once for all formulations."""
-        question = group[0].question
-        report = self._reporter(group[0].subject.name, question.id, "drawing", self._sampling.examples)
-        self._tasks.append(_Task(draw_property, (self._sampling, question), partial(self._add_drawn, group), report))
+    def _drawing(self, group: Sequence[OpenRow], number: int) -> _Task:
+        """Return the task to draw a block of the cases of a strategy, once for all rows that have it."""
+        row = group[0]
+        report = self._reporter(row.subject.name, row.question.id, "drawing", self._sampling.examples)
+        piece = self._sampling, row.question, number
+        return _Task(draw_chunks, piece, partial(self._add_drawn, group, number), report)
 
-    def _add_drawn(self, group: Sequence[OpenRow], answer: DrawnCases) -> None:
-        """Plan the judging of cases that were drawn."""
-        for chunk in answer.chunks[: -(-WHOLE // CHUNK)]:
-            chunk.keep()
-        planned = answer.count if answer.exhausted else self._sampling.examples
-        tasks = [task for row in group for task in self._judge_tasks(row, planned, answer.chunks)]
+    def _add_drawn(self, group: Sequence[OpenRow], number: int, answer: DrawnCases) -> None:
+        """Plan the judging of a block, then the next block."""
+        if number == 0:
+            for chunk in answer.chunks[: -(-WHOLE // CHUNK)]:
+                chunk.keep()
+        planned = number * BLOCK + answer.count if answer.exhausted else self._sampling.examples
+        tasks = [
+            task for row in group for task in self._judge_tasks(row, answer.chunks, planned=planned, last=answer.last)
+        ]
+        if not answer.last:
+            tasks.append(self._drawing(group, number + 1))
         self._tasks.extendleft(reversed(tasks))
 
-    def _judge_tasks(self, row: OpenRow, planned: int, chunks: Sequence[CaseChunk]) -> Iterable[_Task]:
-        row.expect(planned, chunks)
+    def _judge_tasks(self, row: OpenRow, chunks: Sequence[CaseChunk], *, planned: int, last: bool) -> Iterable[_Task]:
+        numbers = row.expect(chunks, planned=planned, last=last)
         if row.complete:  # There is no case at all.
             self._finish(row)
         report = self._reporter(row.subject.name, row.question.id, "judging", planned)
-        for number, chunk in enumerate(chunks):
+        for number, chunk in zip(numbers, chunks, strict=True):
             then = partial(self._add_outcomes, row, number)
             piece = row.question, row.subject, chunk
             yield _Task(judge_chunk, piece, then, lambda count: report(row.n_finished + count))
@@ -232,5 +239,7 @@ def with_case(sampling: Sampling, question: Property, number: int, outcome: Outc
     """
     if isinstance(outcome.case_or_summary, Case):
         return outcome
-    chunk = draw_property(sampling, question).chunks[number // CHUNK]
-    return replace(outcome, case_or_summary=chunk.cases[number % CHUNK])
+    source = sampling.source(question)
+    assert source is not None
+    case = draw_case(source, seed=sampling.key(question), examples=sampling.examples, number=number)
+    return replace(outcome, case_or_summary=case)

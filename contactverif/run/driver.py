@@ -1,65 +1,62 @@
-"""The use of hypothesis: it draws the planned cases of a property, and shrinks a case that fails.
+"""The planned cases of a strategy, block by block, and the search for a smaller case that fails.
 
-The planned cases are drawn first, all of them, by a function that never fails. So every formulation of a run is judged
-on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
+The planned cases are drawn before one of them is judged, by functions that never fail. So every formulation of a run is
+judged on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
 
-A property may have a strategy for each kind of situation. Then each kind gets the same share of the planned cases;
-hypothesis itself would draw many cases of some kinds and none of others, because it varies what it has drawn before.
+A block is drawn without the blocks before it, so that a run of a million cases never holds them all. The cases of a
+block are different; two blocks may, rarely, have a case in common.
+
+A property may have a strategy for each kind of situation. Then the kinds take turns, so that each gets the same share
+of the planned cases.
 
 A property may have a finite list of named cases instead of a strategy. Then all of them are planned, whatever the
 number of examples, and none is shrunk: its name says what it is.
-
-Rule: the same seed gives the same cases, in pytest and on the command line, from any folder and with any other modules
-imported. Therefore every setting is spelled out here (or the settings of a user's own tests would leak in), nothing is
-stored, and `_reproducible` takes away what depends on the imported modules.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from hypothesis import HealthCheck, Phase, Verbosity, given, settings
-from hypothesis import seed as seeded
-from hypothesis.errors import Flaky, Unsatisfiable
-from hypothesis.internal.conjecture import providers
-from hypothesis.internal.constants_ast import Constants
-from hypothesis.statistics import collector
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.run.engine import draw_all, reproducible, shrink_choices, shrink_drawn
+from contactverif.run.quick_draws import AVAILABLE, Draw, draw_different
 
 # A strategy, a strategy for each kind of situation, or a finite list of named cases.
 CaseSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]] | tuple[Case, ...]
 
+BLOCK = 500  # The number of cases that are drawn, and kept in memory, at a time.
 # The largest number of judgements for one counterexample. Hypothesis itself stops after 500 shrinks or 300 s.
 SHRINK_CALLS = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedCases:
-    """The planned cases of a property.
+    """Some or all of the planned cases of a strategy.
 
     Attributes
     ----------
     cases : tuple[Case, ...]
         The cases in the order in which they were drawn.
     exhausted : bool
-        Whether there are no other cases, so that there may be fewer or more than were asked for.
+        Whether the strategy has no other cases, so that there may be fewer or more than were asked for.
+    last : bool
+        Whether no further block follows.
     """
 
     cases: tuple[Case, ...]
     exhausted: bool
+    last: bool = True
 
 
 def draw_cases(
     source: CaseSource, *, seed: str, examples: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
-    """Draw different cases, or all cases if the strategy has fewer, or return the cases of a finite list.
+    """Draw all planned cases.
 
     Parameters
     ----------
@@ -68,7 +65,7 @@ def draw_cases(
     seed : str
         The same seed gives the same cases.
     examples : int
-        The number of cases.
+        The number of cases. There are fewer if the strategy has fewer.
     progress : Callable[[int], None] | None
         Called with the number of cases after each.
 
@@ -82,44 +79,130 @@ def draw_cases(
     MisuseError
         If a case of a finite list has no name, or two have the same.
     """
+    cases: list[Case] = []
+    for number in range(number_of_blocks(examples)):
+        block = draw_block(source, seed=seed, examples=examples, number=number, progress=progress)
+        cases += block.cases
+        if block.last:
+            break
+    return PlannedCases(tuple(cases), block.exhausted)
+
+
+def number_of_blocks(examples: int) -> int:
+    """Return the number of blocks of so many examples, at least one."""
+    return max(1, -(-examples // BLOCK))
+
+
+def draw_block(
+    source: CaseSource, *, seed: str, examples: int, number: int, progress: Callable[[int], None] | None = None
+) -> PlannedCases:
+    """Draw one block of the planned cases; the parameters of `draw_cases`, and the number of the block from 0.
+
+    Where the harness cannot draw by itself, the first block has all cases.
+    """
     if isinstance(source, tuple):
         _check_names([case.name for case in source])
         return PlannedCases(source, exhausted=True)
+    report = progress or (lambda _: None)
+    past = number * BLOCK
+    size = min(BLOCK, examples - past)
+    draws = _draw_block(source, seed, number, size, _counted_from(past, report))
+    if draws is None:
+        return _draw_with_engine(source, seed=seed, examples=examples, progress=report)
+    short = len(draws) < size
+    return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
+
+
+def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
+    """Return the case with this number of those of `draw_cases`."""
+    if isinstance(source, tuple):
+        return source[number]
+    draws = _block_of(source, seed, examples, number)
+    if draws is None:
+        return _draw_with_engine(source, seed=seed, examples=examples, progress=lambda _: None).cases[number]
+    return draws[number % BLOCK].case
+
+
+def _block_of(
+    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]], seed: str, examples: int, number: int
+) -> list[Draw] | None:
+    """Return the block that the case with this number belongs to; None if hypothesis' engine draws it."""
+    block = number // BLOCK
+    return _draw_block(source, seed, block, min(BLOCK, examples - block * BLOCK), lambda _: None)
+
+
+def _draw_block(
+    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
+    seed: str,
+    number: int,
+    size: int,
+    progress: Callable[[int], None],
+) -> list[Draw] | None:
+    """Return the first `size` cases of a block; None if hypothesis' engine must draw all blocks.
+
+    A strategy with few different cases may run out. Only the engine knows whether it has more, so it draws all of them;
+    where that shows late, the block is short.
+    """
+    if not AVAILABLE:
+        return None
+    strategies = _strategies_in_turn(source)
+    streams = [
+        draw_different(strategy, seed=f"{seed}/{kind}/{number}", simplest=number == 0) for kind, strategy in strategies
+    ]
+    draws: list[Draw] = []
+    with reproducible():
+        for place in range(number * BLOCK, number * BLOCK + size):
+            draw = next(streams[place % len(streams)], None)
+            if draw is None:
+                return None if number == 0 else draws
+            draws.append(draw)
+            progress(len(draws))
+    return draws
+
+
+def _counted_from(past: int, progress: Callable[[int], None]) -> Callable[[int], None]:
+    """Return a progress that also counts the cases of the past."""
+    return lambda count: progress(past + count)
+
+
+def _strategies_in_turn(
+    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
+) -> list[tuple[str, SearchStrategy[Case]]]:
+    """Return each kind and its strategy; one without a name if there are no kinds."""
     if isinstance(source, Mapping):
-        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=progress or (lambda _: None))
-        complete = zip(parts, _shares(source, examples), strict=True)
-        return PlannedCases(
-            tuple(parts[n].cases[place] for n, place in _deal(parts)),
-            exhausted=all(part.exhausted or len(part.cases) == share for part, (_, share) in complete),
-        )
-    cases: list[Case] = []
-    stopped: list[str] = []
+        return [(kind, _strategy_of_kind(source, kind)) for kind in source]
+    return [("", source)]
 
-    @seeded(seed)
-    @_settings(examples, Phase.generate)
-    @given(source)
-    def take(case: Case) -> None:
-        cases.append(case)
-        if progress is not None:
-            progress(len(cases))
 
-    statistics: Any = collector  # Hypothesis declares it as None.
-    with _reproducible(), statistics.with_value(lambda facts: stopped.append(facts.get("stopped-because", ""))):
-        try:
-            take()
-        except Unsatisfiable:  # The strategy filters out every case; the caller sees that there is nothing to judge.
-            return PlannedCases((), exhausted=False)
-    return PlannedCases(tuple(cases), exhausted=stopped == ["nothing left to do"])
+def _draw_with_engine(
+    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
+    *,
+    seed: str,
+    examples: int,
+    progress: Callable[[int], None],
+) -> PlannedCases:
+    """Return all cases, drawn by hypothesis' engine."""
+    if not isinstance(source, Mapping):
+        return PlannedCases(*draw_all(source, seed=seed, examples=examples, progress=progress))
+    parts = _draw_each_kind(source, seed=seed, examples=examples, progress=progress)
+    complete = zip(parts, _shares(source, examples), strict=True)
+    return PlannedCases(
+        tuple(parts[n].cases[place] for n, place in _deal(parts)),
+        exhausted=all(part.exhausted or len(part.cases) == share for part, (_, share) in complete),
+    )
 
 
 def _draw_each_kind(
     strategies: Mapping[str, SearchStrategy[Case]], *, seed: str, examples: int, progress: Callable[[int], None]
 ) -> list[PlannedCases]:
     """Return the cases of each kind that gets any."""
-    parts = []
+    parts: list[PlannedCases] = []
     for kind, share in _shares(strategies, examples):
-        parts.append(draw_cases(_strategy_of_kind(strategies, kind), seed=f"{seed}/{kind}", examples=share))
-        progress(sum(len(part.cases) for part in parts))
+        past = sum(len(part.cases) for part in parts)
+        strategy = _strategy_of_kind(strategies, kind)
+        report = _counted_from(past, progress)
+        part = draw_all(strategy, seed=f"{seed}/{kind}", examples=share, progress=report)
+        parts.append(PlannedCases(*part))
     return parts
 
 
@@ -171,7 +254,7 @@ def shrink(
     source : CaseSource
         The source of the planned cases.
     seed, examples : str or int
-        The arguments of `draw_cases`, so that the same cases are drawn again.
+        The arguments of `draw_cases`, so that the block of the case is drawn again.
     first : int
         The number of the first case that fails. The cases before it are not judged again.
     fails : Callable[[Case], bool]
@@ -187,92 +270,16 @@ def shrink(
     """
     if isinstance(source, tuple):
         return
-    if isinstance(source, Mapping):
+    draws = _block_of(source, seed, examples, first)
+    if draws is not None:
+        strategies = _strategies_in_turn(source)
+        _, strategy = strategies[first % len(strategies)]
+        shrink_choices(strategy, draws[first % BLOCK].stored_choices(), seed=seed, fails=fails, limit=limit)
+    elif isinstance(source, Mapping):
         parts = _draw_each_kind(source, seed=seed, examples=examples, progress=lambda _: None)
-        number, place = _deal(parts)[first]
-        kind, share = _shares(source, examples)[number]
+        n, place = _deal(parts)[first]
+        kind, share = _shares(source, examples)[n]
         strategy = _strategy_of_kind(source, kind)
-        shrink(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
-        return
-    n_drawn = n_judged = 0
-
-    @seeded(seed)
-    @_settings(examples, Phase.generate, Phase.shrink)
-    @given(source)
-    def attempt(case: Case) -> None:
-        nonlocal n_drawn, n_judged
-        n_drawn += 1
-        if n_drawn <= first:
-            return
-        n_judged += 1
-        if n_judged > limit:
-            raise _LimitReached
-        try:
-            failed = fails(case)
-        except Exception as error:
-            raise _ForeignError(error) from None
-        if failed:
-            raise _Failed
-
-    with _reproducible():
-        try:
-            attempt()
-        except _ForeignError as carrier:
-            raise carrier.error from None
-        except (_Failed, _LimitReached, Flaky):
-            pass
-
-
-class _Failed(Exception):
-    """The exception that hypothesis takes for the failure. It never leaves this file."""
-
-
-class _LimitReached(BaseException):
-    """The end of the search. It is no Exception, because hypothesis would take that for another failure."""
-
-
-class _ForeignError(BaseException):
-    """A carrier for an exception of `fails`. Hypothesis itself would run the case twice more and add its notes."""
-
-    def __init__(self, error: Exception) -> None:
-        self.error = error
-
-
-def _settings(examples: int, *phases: Phase) -> settings:
-    return settings(
-        max_examples=examples,
-        phases=phases,
-        database=None,
-        deadline=None,
-        derandomize=False,
-        verbosity=Verbosity.quiet,
-        print_blob=False,
-        report_multiple_bugs=False,
-        suppress_health_check=list(HealthCheck),
-        backend="hypothesis",
-    )
-
-
-@contextmanager
-def _reproducible() -> Iterator[None]:
-    """Keep hypothesis from drawing constants that stand in the source of imported modules.
-
-    Otherwise one integer in twenty is a literal of some imported module outside site-packages. Then the same seed would
-    mean other cases in pytest than on the command line, and other cases once a user edits a file; and hypothesis would
-    write the literals to a folder `.hypothesis` in the working folder. Hypothesis 6.131 to 6.170 have no setting for
-    it. If a later version lacks the function that is replaced here, nothing is replaced, and the test of determinism
-    shows whether that matters.
-    """
-    name = "_get_local_constants"
-    original = getattr(providers, name, None)
-    if original is None:
-        yield
-        return
-    none = Constants()
-    setattr(providers, name, lambda: none)
-    providers.CONSTANTS_CACHE.cache.clear()
-    try:
-        yield
-    finally:
-        setattr(providers, name, original)
-        providers.CONSTANTS_CACHE.cache.clear()
+        shrink_drawn(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
+    else:
+        shrink_drawn(source, seed=seed, examples=examples, first=first, fails=fails, limit=limit)

@@ -47,7 +47,9 @@ class OpenRow:
         self.outcomes = OutcomeStore(len(source) if isinstance(source, tuple) else WHOLE)
         self.planned = 0
         self.n_finished = 0
-        self._chunks: dict[int, CaseChunk] | None = None  # The chunks without outcomes, by number, once they are drawn.
+        self._chunks: dict[int, CaseChunk] = {}  # The drawn chunks without outcomes, by number.
+        self._n_drawn = 0
+        self._all_drawn = False
         self._flushed = 0
         self._waiting: dict[int, Sequence[Outcome]] = {}
         self._witness_outcome: Outcome | None = None
@@ -57,10 +59,22 @@ class OpenRow:
         """Return whether the witness is a case of the property's own finite list, which is judged anyway."""
         return isinstance(self.source, tuple) and any(case is self.witness for case in self.source)
 
-    def expect(self, planned: int, chunks: Sequence[CaseChunk]) -> None:
-        """Note how many cases were planned, and which chunks will be judged."""
-        self.planned = planned
-        self._chunks = dict(enumerate(chunks))
+    def expect(self, chunks: Sequence[CaseChunk], *, planned: int, last: bool) -> range:
+        """Note the chunks of a block that will be judged, and return their numbers.
+
+        Parameters
+        ----------
+        chunks : Sequence[CaseChunk]
+            The chunks in order.
+        planned : int
+            The number of cases that are planned for the whole row.
+        last : bool
+            No further block follows.
+        """
+        numbers = range(self._n_drawn, self._n_drawn + len(chunks))
+        self._chunks.update(zip(numbers, chunks, strict=True))
+        self._n_drawn, self._all_drawn, self.planned = numbers.stop, last, planned
+        return numbers
 
     def add(self, number: int, outcomes: Sequence[Outcome]) -> None:
         """Add the outcomes of a chunk; those behind a chunk that is not finished wait."""
@@ -71,7 +85,6 @@ class OpenRow:
             self._flushed += 1
 
     def _flush(self, number: int) -> None:
-        assert self._chunks is not None
         chunk, outcomes = self._chunks.pop(number), self._waiting.pop(number)
         wanted = [self.outcomes.keeps_whole(len(self.outcomes) + n, outcome) for n, outcome in enumerate(outcomes)]
         cases: Sequence[Case | None] = chunk.cases if any(wanted) else [None] * len(outcomes)
@@ -88,7 +101,7 @@ class OpenRow:
     def complete(self) -> bool:
         """Return whether all cases and the witness are judged."""
         witnessed = self.witness is None or self.witness_is_listed or self._witness_outcome is not None
-        return witnessed and self._chunks == {}
+        return witnessed and self._all_drawn and not self._chunks
 
     def judge(self, *, on_scene: bool) -> None:
         """Make the row of the outcomes.

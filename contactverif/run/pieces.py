@@ -1,4 +1,4 @@
-"""The pieces that a run is made of: draw the cases of a property, judge some, shrink one, call a formulation first.
+"""The pieces that a run is made of: draw a block of cases, judge some, shrink one, call a formulation first.
 
 A piece is a plain function of data that can be pickled. It runs in the parent or in a worker process, with the same
 result. Rule for the next editor: a piece knows nothing of other pieces, and nothing outside is changed by it.
@@ -15,8 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
-from contactverif.run import judging
-from contactverif.run.driver import draw_cases, shrink
+from contactverif.run import driver, judging
 from contactverif.run.packing import CaseChunk
 from contactverif.run.sampling import Sampling
 from contactverif.run.sign_check import has_opposite_sign
@@ -31,7 +30,7 @@ Badness = tuple[int, float]
 
 @dataclass(frozen=True, slots=True)
 class DrawnCases:
-    """The drawn cases of a property.
+    """A block of the cases of a strategy.
 
     Attributes
     ----------
@@ -39,10 +38,13 @@ class DrawnCases:
         The cases in order.
     exhausted : bool
         The strategy has no other cases.
+    last : bool
+        No further block follows.
     """
 
     chunks: tuple[CaseChunk, ...]
     exhausted: bool
+    last: bool
 
     @property
     def count(self) -> int:
@@ -50,12 +52,14 @@ class DrawnCases:
         return sum(chunk.count for chunk in self.chunks)
 
 
-def draw_property(sampling: Sampling, question: Property, count: Count | None = None) -> DrawnCases:
-    """Draw the cases of a property."""
+def draw_chunks(sampling: Sampling, question: Property, number: int, count: Count | None = None) -> DrawnCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
     source = sampling.source(question)
     assert source is not None
-    planned = draw_cases(source, seed=sampling.key(question), examples=sampling.examples, progress=count)
-    return DrawnCases(in_chunks(planned.cases, CHUNK), planned.exhausted)
+    block = driver.draw_block(
+        source, seed=sampling.key(question), examples=sampling.examples, number=number, progress=count
+    )
+    return DrawnCases(in_chunks(block.cases, CHUNK), block.exhausted, block.last)
 
 
 def in_chunks(cases: tuple[Case, ...], size: int) -> tuple[CaseChunk, ...]:
@@ -116,7 +120,7 @@ def shrink_case(
         smallest = outcome
         return True
 
-    shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    driver.shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
     return smallest
 
 

@@ -138,12 +138,22 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     MisuseError
         If a pattern matches nothing.
     """
+    return tuple(_load_property(name) for name in matching_ids(globs))
+
+
+def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
+    """Return the ids of the properties that `load_properties` loads; it imports none of them.
+
+    Raises
+    ------
+    MisuseError
+        If a pattern matches nothing.
+    """
     names = property_ids()
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in names):
             raise unknown_name_error("property", glob, names)
-    matching = [name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs)]
-    return tuple(_load_property(name) for name in matching)
+    return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
 
 
 def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:

@@ -3,7 +3,7 @@
 Rules for the next editor:
 
 - All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early.
-- The cases of a property depend on the seed and the property alone, neither on the formulation nor on other properties.
+- The cases of a property depend on the seed and its strategy alone, neither on the formulation nor on other properties.
 - A finite list of named cases is planned whole, whatever the number of examples.
 - The work is done in pieces (`pieces.py`), which any process may do in any order (`conductor.py`, `workers.py`).
 """
@@ -100,9 +100,15 @@ def run(
         interface=interface if scene is None else scene.interface,
         scene=scene,
     )
-    sources = {question.id: sampling.source(question) for question in questions}
+    sources = {sampling.group(question): sampling.source(question) for question in questions}
     rows = [
-        _open(subject, question, sources[question.id], known=known.get(question.id, ""), on_scene=scene is not None)
+        _open(
+            subject,
+            question,
+            sources[sampling.group(question)],
+            known=known.get(question.id, ""),
+            on_scene=scene is not None,
+        )
         for subject in loaded
         for question in questions
     ]

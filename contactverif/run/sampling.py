@@ -1,13 +1,15 @@
 """The cases that a run draws: the source of the cases of every property, and their seed.
 
-Rule for the next editor: the cases of a property depend on the seed of the run and on the property alone. So the choice
-of properties and formulations, their order and the number of processes change no case.
+Rule for the next editor: the cases of a property depend on the seed of the run and on its strategy alone. So the choice
+of properties and formulations, their order and the number of processes change no case, and properties with the same
+strategy share their cases.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
@@ -45,5 +47,23 @@ class Sampling:
         return cast("CaseSource | None", question.cases(self.scene))
 
     def key(self, question: Property) -> str:
-        """Return the seed of a property, which does not depend on the other properties of the run."""
-        return f"{self.seed}/{question.id}"
+        """Return the seed of the cases of a property, which properties with the same strategy have in common."""
+        return f"{self.seed}/{strategy_name(question)}"
+
+    def group(self, question: Property) -> tuple[str, bool]:
+        """Return what properties have in common if their cases are the same: the seed, and what makes them."""
+        return self.key(question), question.bodies
+
+
+def strategy_name(question: Property) -> str:
+    """Return a name for the strategy of a property: that of the function `cases`, or else the id of the property.
+
+    A function has a name if its module has it under that name: ``contactverif.strategies.flat.flat_cases``. Two
+    functions never share such a name. A lambda, a partial, a method and a function within a function have none,
+    because two of them may look the same and make different cases. So their property shares its cases with no other.
+    """
+    cases: Any = question.cases
+    module, name = str(getattr(cases, "__module__", "")), str(getattr(cases, "__qualname__", ""))
+    if module != "__main__" and getattr(sys.modules.get(module), name, None) is cases:
+        return f"{module}.{name}"
+    return question.id

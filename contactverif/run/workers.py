@@ -21,6 +21,8 @@ from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.run.packing import pack, unpack
 
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
+# The modules that the server of processes imports once for all workers: the judge, and libraries that import slowly.
+_PRELOAD = ["contactverif.run.pieces", "contactverif.mechanics.accuracy", "contactverif.strategies", "numba"]
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a piece refers to.
 
@@ -50,6 +52,8 @@ def default_jobs(planned: int) -> int:
 def worker_pool(jobs: int) -> Iterator[Executor | None]:
     """Yield an executor with so many worker processes; None for one job, which the parent does itself.
 
+    Enter it before plugins and properties are loaded: the workers import while the parent does.
+
     Raises
     ------
     MisuseError
@@ -76,8 +80,11 @@ def _context() -> Any:
     """Return the way to start processes: from a server that has imported the harness, where there is one."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
+    from multiprocessing import forkserver  # Windows has none.
+
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["contactverif.run.pieces"])
+    context.set_forkserver_preload(_PRELOAD)
+    forkserver.ensure_running()  # It imports while the parent goes on.
     return context
 
 

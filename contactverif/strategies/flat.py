@@ -28,7 +28,7 @@ MOST_MASTER_SEGMENTS = 100  # The most master segments in one chain.
 _DEPTHS = st.integers(1, 8)  # quarters
 _SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # The distance that the slave has slid from its reference.
 _REPEATS = st.sampled_from([1] * 15 + [2, 4, 12])  # The slave lengths are repeated so often, for long chains.
-_REFINEMENTS = st.sampled_from([0] * 12 + [1, 2, 4, 6])  # The master lengths are multiplied by 2^-this.
+_REFINEMENTS = st.sampled_from([0] * 8 + [1, 2, 4, 6])  # The master lengths are multiplied by 2^-this.
 
 
 @overload

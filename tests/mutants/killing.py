@@ -12,6 +12,7 @@ from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case
+from contactverif.run.sampling import Sampling
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
 OTHERS = 20  # Cases of each other property, which fill the matrix and decide nothing.
@@ -34,7 +35,8 @@ def properties() -> tuple[Property, ...]:
 def cases(property_id: str, seed: int = SEED, examples: int = EXAMPLES) -> tuple[Case, ...]:
     """Return the planned cases of a property, as a run with that seed draws them."""
     (question,) = (question for question in properties() if question.id == property_id)
-    return draw_cases(question.cases(None), seed=f"{seed}/{property_id}", examples=examples).cases
+    key = Sampling(examples=examples, seed=seed).key(question)
+    return draw_cases(question.cases(None), seed=key, examples=examples).cases
 
 
 def caught_at(question: Property, subject: Subject, examples: int | None) -> int:
