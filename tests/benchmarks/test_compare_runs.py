@@ -46,5 +46,6 @@ def test_the_stored_run_names_the_processor_and_no_machine() -> None:
     text = STORED.read_text()
     facts = json.loads(text)
     assert set(facts) == {"processor", "machine", "python", "versions", "commit", "created", "turns", "benchmarks"}
-    assert not [word for word in (str(STORED.parents[2]), "/home", "/root", "/tmp") if word in text]
+    assert str(STORED.parents[2]) not in text
+    assert not [word for word in text.replace('"', " ").split() if word.startswith("/")]
     assert {entry["ratio"].keys() == {"least", "median", "greatest"} for entry in facts["benchmarks"]} == {True}
