@@ -10,8 +10,9 @@ rarely have such places, and assemblies do.
 **How it is judged.** The point is formed in rationals from the stored nodes and c. The number is how much farther the
 reported segment is than the nearest, a length that is exact, over the lengths of which a gap is a difference. It must
 be at most 4u. So a tie needs no rule: of segments at the same distance any is right. Along the slave's normal, a
-segment must face the slave and be met by the line. For `cells` it may be the nearest at the point or in the middle of
-its overlap, and segments beyond two lengths of both are no rivals.
+segment must face the slave and be met by the line. Of one that is seen edge-on, rounding may leave an overlap: a point
+whose weight is at most 8u of those lengths may name it. For `cells` it may be the nearest at the point or in the middle
+of its overlap, and segments beyond two lengths of both are no rivals.
 
 **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
 """
@@ -35,6 +36,9 @@ from contactverif_properties.shared.exact_places import (
     projected_cases,
     refuse_without_rule,
 )
+
+# Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
+OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
 
 FARTHER = Quantity("distance beyond the nearest segment", "1", "4u", LOCAL_REASON)
 
@@ -68,7 +72,8 @@ def measure_segments(case: Case, subject: Subject) -> Measurement:
             excess = seen_excess(places.lattice, places.exact, carrier, segments, cells=rule in CELLS)
         facing = places.view.cosine > 0
         value = max(value, largest(excess[facing] / places.scale[facing]))
-        if not facing.all():
+        rounded = places.reported.weight <= OVERLAP_ROUNDOFF * (places.view.lengths + reported.distant)
+        if not (facing | rounded).all():
             broken = "a master segment does not face the slave segment of its point"
     return Measurement(
         {FARTHER.name: value},

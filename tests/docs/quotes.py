@@ -306,13 +306,10 @@ def renew_text(page: Path, results: dict[str, str]) -> str:
 
 
 def keep_pictures(folder: Path) -> None:
-    """Copy the pictures in a folder to those of the site."""
-    for path in sorted(folder.glob("*.svg")):
-        shutil.copyfile(path, PICTURES / path.name)
-        print(f"    {path.name}")
+    """Copy the pictures in a folder, and in folders of it, that some page shows to those of the site."""
     texts = [page.read_text(encoding="utf-8") for page in pages()]
-    for path in sorted(folder.glob("*/*.svg")):  # Of a folder of pictures a page may show some.
-        name = f"{path.parent.name}_{path.name}"
+    for path in sorted([*folder.glob("*.svg"), *folder.glob("*/*.svg")]):
+        name = "_".join(path.relative_to(folder).parts)
         if any(f"pictures/{name}" in text for text in texts):
             shutil.copyfile(path, PICTURES / name)
             print(f"    {name}")

@@ -12,9 +12,10 @@ import pytest
 from strangers import STRANGERS, PointsFirst, TurnedFrame
 from subjects import Changed, load_property, load_subject
 
+import contactverif_mortar
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.driver import draw_cases
@@ -76,6 +77,27 @@ def reporting(change: Callable[[ContactPoints], dict[str, Any]], make: Any = Poi
         return Changed(inner, contact_points=contact_points)
 
     return Subject("reporter", make_reporter)
+
+
+def beside_a_wall(weight: float) -> tuple[Case, Subject]:
+    """Return a slave segment that sees a master segment edge-on, and the formulation whose points there weigh this."""
+    positions = np.array([[-0.625, -0.3125], [0.125, 0.6875], [0, 0], [4, -3], [7, 1], [3, 4]])
+    interface = Interface(positions, Surface([[0, 1]]), Surface([[2, 3], [3, 4], [4, 5], [5, 2]]))
+
+    def weigh(points: ContactPoints) -> dict[str, Any]:
+        return {"weight": np.where(points.master_segment == 0, weight, points.weight)}
+
+    return Case(interface, positions.ravel(), 1.0), reporting(weigh, contactverif_mortar.sts)
+
+
+def test_an_overlap_that_rounding_leaves_of_an_edge_on_segment_is_no_wrong_segment() -> None:
+    """The slave runs along (3, 4), at right angles to the edge along (4, -3), but their product is rounded."""
+    case = beside_a_wall(0)[0]
+    points = load_subject("sts").for_case(case)
+    named = points.contact_points(case.interface, points.pair(case.interface, case.z), case.z).master_segment
+    assert 0 in named, "the rounding that this test is about does not happen any more"
+    assert outcome_of("projection.segment", case, load_subject("sts")).verdict is Verdict.PASS
+    assert outcome_of("projection.segment", *beside_a_wall(1e-12)).verdict is Verdict.FAIL
 
 
 def test_at_a_tie_either_segment_is_right() -> None:
