@@ -31,7 +31,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.roundoff import ratio, rounding_distance, segment_tolerance, sum_slave_forces
+from contactverif_properties.shared.roundoff import ratio, rounding_distance, segment_tolerance, sum_larger_forces
 
 N_STEPS = 12  # The steps of the way that are looked at first.
 MOST_JUMPS = 3  # So many jumps are looked for, from the largest on.
@@ -68,11 +68,11 @@ def measure_continuity(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The largest jump of a force over Σ|R| of the slave, and of a slope over the largest slope; both dimensionless.
+        The largest jump of a force over Σ|R| of a side, and of a slope over the largest slope; both dimensionless.
     """
     forces, slope = _functions(subject.for_case(case), case)
     samples = np.array([forces(t) for t in _places()])
-    size = max(sum_slave_forces(case, sample) for sample in samples)
+    size = max(sum_larger_forces(case, sample) for sample in samples)
     rounding = segment_tolerance(
         case, samples[int(np.abs(samples).sum(axis=1).argmax())], rounding_distance(case, subject.traits)
     )

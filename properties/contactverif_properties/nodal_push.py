@@ -46,7 +46,7 @@ from contactverif_properties.shared.roundoff import (
     SEGMENT_REASON,
     SEGMENT_TOLERANCE,
     segment_tolerance,
-    sum_slave_forces,
+    sum_larger_forces,
 )
 
 CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
@@ -66,7 +66,7 @@ def measure_nodal_push(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The largest pull of a node over Σ|R| of the slave, dimensionless.
+        The largest pull of a node over Σ|R| of a side, dimensionless.
     """
     opened = open_all_but_one_end(case, CLOSED) if "penetration" in case.parameters else case
     formulation, state = prepare_state(opened, subject)
@@ -74,7 +74,7 @@ def measure_nodal_push(case: Case, subject: Subject) -> Measurement:
         state = state.with_multipliers(release_some(state))
     pairing = formulation.pair(state.interface, state.z)
     residual = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
-    size = sum_slave_forces(state, residual)
+    size = sum_larger_forces(state, residual)
     if not size:
         return Measurement({PULL.name: 0.0}, {PULL.name: 0.0}, idle=True)
     forces = -residual.reshape(-1, 2)

@@ -6,7 +6,7 @@ turned?
 **Why it matters.** A formulation that prefers an axis gives another answer for the same part in another position in
 the assembly. In large rotations it creates energy.
 
-**How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of the slave, and the tangent K(Qx + c)
+**How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of a side, and the tangent K(Qx + c)
 with Q K Qᵀ over max|K|. Nothing turns multipliers; their constraint rows are compared too. The tolerance is
 u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment turns the segment and
 its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the turned positions to uX.
@@ -40,7 +40,7 @@ from contactverif_properties.shared.roundoff import (
     ratio,
     segment_tolerance,
     select_failures,
-    sum_slave_forces,
+    sum_larger_forces,
 )
 
 FORCES = Quantity("error of the forces after a rotation", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
@@ -82,7 +82,7 @@ def measure_objectivity(case: Case, subject: Subject) -> Measurement:
     Returns
     -------
     Measurement
-        The largest error of a force over Σ|R| of the slave, constraint rows included, and of an entry of the tangent
+        The largest error of a force over Σ|R| of a side, constraint rows included, and of an entry of the tangent
         over max|K|; both dimensionless.
     """
     formulation, case = prepare_state(case, subject)
@@ -97,7 +97,7 @@ def measure_objectivity(case: Case, subject: Subject) -> Measurement:
     one_pass = forces / _count_passes(case, subject, formulation, pairing)
     tolerance = segment_tolerance(case, one_pass, largest)
     errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
-    size = sum_slave_forces(case, forces) + float(np.abs(forces[n:]).sum())
+    size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
     values = {FORCES.name: ratio(errors["forces"], size)}
     if "tangent" in formulation.provides:
         tangent = dense(formulation.tangent(interface, pairing, case.z))

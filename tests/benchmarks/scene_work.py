@@ -29,7 +29,6 @@ from contactverif.mechanics.trace import Record, Trace
 from contactverif.run.driver import draw_cases
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import judge_case
-from contactverif.scenes import wave_blocks
 
 
 @dataclass(frozen=True)
@@ -94,8 +93,10 @@ def count_all() -> Iterator[Counts]:
 def forget_everything() -> None:
     """Let go of all that a process remembers of bodies."""
     forget_bodies()
-    for remembered in (wave_blocks.wave_blocks, wave_blocks._uniform_blocks, wave_blocks.matching_answer):
-        remembered.cache_clear()
+    for name, module in list(sys.modules.items()):
+        if name.startswith("contactverif.scenes."):
+            for remembered in vars(module).values():
+                getattr(remembered, "cache_clear", lambda: None)()
 
 
 def size_of(case: Case) -> tuple[bool, int]:

@@ -81,6 +81,22 @@ def test_springs_that_act_twice_need_half_of_the_penetration() -> None:
     assert outcome.measurement.values[name] > 0.55 * outcome.measurement.tolerances[name]
 
 
+def test_half_passes_that_push_the_master_alone_are_objective() -> None:
+    """The slave's mean gaps are open, and the master's are closed: forces count over those of the side that has any."""
+    slave = [[4.08319197, 0.0117645], [2.05083952, 3.53190229], [0.01848707, 4.0764694], [-3.50165071, 2.04411695]]
+    master = [[-3.46410179, 2.0], [-0.66782475, 3.94385719], [2.59914017, 3.04047203], [4.0, 0.0]]
+    interface = Interface.from_chains(slave, master)
+    formulation = load_subject("mortar-two-half-pass")
+    for seed in SEEDS:
+        state = Case(interface, interface.nodes.reshape(-1), penalty=1.0, seed=seed)
+        half_passes = formulation.for_case(state)
+        forces = half_passes.residual(interface, half_passes.pair(interface, state.z), state.z).reshape(-1, 2)
+        assert not forces[:4].any()
+        assert forces[4:].any()
+        outcome = judge_case(OBJECTIVITY, state, formulation)
+        assert outcome.verdict is Verdict.PASS, outcome.reason
+
+
 class Nearest(Handmade):
     """Pushes the slave away from the master segment that is nearest to its middle: twice as much from one of them."""
 

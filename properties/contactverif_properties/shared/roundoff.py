@@ -45,9 +45,27 @@ def sum_slave_forces(case: Case, forces: Array) -> float:
     return float(np.abs(forces.reshape(-1)[: 2 * case.interface.n_slave_nodes]).sum())
 
 
+def sum_larger_forces(case: Case, forces: Array) -> float:
+    """Return Σ|R| over the entries of the slave or of the master, the larger: half passes may push one side alone.
+
+    Parameters
+    ----------
+    case : Case
+        The case that the forces belong to.
+    forces : Array, shape (n_unknowns,) or (n_nodes, 2)
+        The residual; what stands behind the entries of the nodes is not read.
+    """
+    slave = sum_slave_forces(case, forces)
+    return max(slave, float(np.abs(forces.reshape(-1)[: case.interface.n_unknowns]).sum()) - slave)
+
+
 def mean_penetration(case: Case, forces: Array) -> float:
-    """Return the uniform penetration, a length, that would need the same Σ|R| over the slave: Σ|R| / (ε̂ L)."""
-    return sum_slave_forces(case, forces) / (case.penalty * case.slave_length)
+    """Return the uniform penetration, a length, that would need the same Σ|R| over the slave: Σ|R| / (ε̂ L).
+
+    Where half passes push the master alone, Σ|R| is that of the master.
+    """
+    whole = sum_slave_forces(case, forces) or sum_larger_forces(case, forces)
+    return whole / (case.penalty * case.slave_length)
 
 
 def rounding_distance(case: Case, traits: Traits) -> float:

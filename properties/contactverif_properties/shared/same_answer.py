@@ -25,7 +25,7 @@ from contactverif_properties.shared.roundoff import (
     rounding_distance,
     segment_tolerance,
     select_failures,
-    sum_slave_forces,
+    sum_larger_forces,
 )
 
 TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
@@ -136,7 +136,7 @@ def compare(
         The largest change of a force over Σ|R| of a side, and of an entry of the tangent over max|K|, each the largest
         of both states; both dimensionless. The detail `BITS` counts entries that are not equal to the last bit.
     """
-    case, size = first.case, max(_size(answer) for answer in (first, second))
+    case, size = first.case, max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
     change = second.forces[carry.nodes] - first.forces @ carry.matrix.T
     errors, bits = {"forces": float(np.abs(change).max())}, int(np.count_nonzero(change))
     values = {quantities[0].name: ratio(errors["forces"], size)}
@@ -154,12 +154,6 @@ def compare(
     undecided = _explain(first, second, failures) if failures and explain else ""
     details, idle = {BITS: float(bits)}, not (first.forces.any() or second.forces.any())
     return Measurement(values, dict.fromkeys(values, tolerance), undecided, details=details, idle=idle)
-
-
-def _size(answer: Answer) -> float:
-    """Return Σ|R| of the slave or of the master, the larger: half passes may push one side alone."""
-    slave = sum_slave_forces(answer.case, answer.forces)
-    return max(slave, float(np.abs(answer.forces).sum()) - slave)
 
 
 def _explain(first: Answer, second: Answer, failures: dict[str, float]) -> str:
