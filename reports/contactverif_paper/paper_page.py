@@ -16,6 +16,7 @@ from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, Pr
 from contactverif_paper.paper_tree import REFERENCE, tree_of
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
+from contactverif_reports.netcdf.write_tree import write_tree
 
 NUMBERS, PAGE = "paper.nc", "paper.html"
 MARKS: Mapping[Agreement, str] = {
@@ -83,7 +84,7 @@ def write(
     check_folder(folder, argument)
     paths = [folder / NUMBERS]
     with whole(folder / NUMBERS) as part:
-        tree_of(paper).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+        write_tree(tree_of(paper), part)
     inlined: dict[str, Markup] = {}
     for result in paper.results:
         for figure in result.item.figures:

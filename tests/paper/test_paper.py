@@ -24,6 +24,7 @@ from contactverif_paper.items import ITEMS, ORDER
 from contactverif_paper.paper_item import Agreement, Paper
 from contactverif_paper.paper_page import check_folder, page, summary, svg, write
 from contactverif_paper.paper_tree import tree_of
+from contactverif_reports.netcdf.write_tree import write_tree
 
 STORED = Path(__file__).parents[2] / "reports" / "paper"
 SOLVED = 2.0**-53 * 1e2 * 1e6
@@ -61,7 +62,7 @@ def paper(reported_steps: list[str]) -> Paper:
 @pytest.fixture(scope="module")
 def tree(paper: Paper, tmp_path_factory: pytest.TempPathFactory) -> xr.DataTree:
     path = tmp_path_factory.mktemp("paper") / "paper.nc"
-    tree_of(paper).to_netcdf(path, engine="netcdf4", format="NETCDF4")
+    write_tree(tree_of(paper), path)
     return xr.open_datatree(path).load()
 
 

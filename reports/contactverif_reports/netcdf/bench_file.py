@@ -19,6 +19,7 @@ from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, Be
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.schema import NONE, RATIO, SECONDS, text
 from contactverif_reports.netcdf.variables import codes, numbers, words
+from contactverif_reports.netcdf.write_tree import write_tree
 
 TITLE = "contactverif: speed against error of contact formulations"
 BENCH_SCHEMA = "1"
@@ -35,7 +36,7 @@ def write_bench(results: BenchResults, path: str | os.PathLike[str]) -> None:
     """
     check_writable(path)
     with whole(path) as part:
-        bench_tree(results).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+        write_tree(bench_tree(results), part)
 
 
 def bench_tree(results: BenchResults) -> xr.DataTree:

@@ -28,7 +28,8 @@ def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = Fa
         If the path cannot be written.
     """
     from contactverif_reports.netcdf.tree import tree_of
+    from contactverif_reports.netcdf.write_tree import write_tree
 
     check_writable(path)
     with whole(path) as part:
-        tree_of(run, with_named_cases=with_named_cases).to_netcdf(part, engine="netcdf4", format="NETCDF4")
+        write_tree(tree_of(run, with_named_cases=with_named_cases), part)
