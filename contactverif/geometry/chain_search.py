@@ -36,7 +36,9 @@ from contactverif.geometry.projection import (
 )
 
 NO_PLACE = -1  # There is no last answer.
-LEVEL = 1e-9  # Relative; ties of `is_nearer` are 16 units of roundoff wide.
+# Relative. It is far above the 16u of a tie of `is_nearer` and the rounding of squared distances, and so small that the
+# search from the root is seldom asked. No answer depends on it, only the time.
+LEVEL = 1e-9
 
 
 class Nearest(NamedTuple):

@@ -39,14 +39,14 @@ from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import solve_for_accuracy
-from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
+from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import Trace
 from contactverif.scenes.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details
-from contactverif_properties.shared.solved_patch import ITERATIONS, SAME_SOLUTION
+from contactverif_properties.shared.solved_patch import ITERATIONS, is_solved, nearest_to_balance
 
 LINES = {
     "roof of 41°": ((0.0, 0.0), (4.0, 1.5), (8.0, 0.0)),
@@ -169,13 +169,10 @@ def _solve(
         The unknowns that are judged.
     """
     trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
-    if trace.converged:
-        distance = np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0)
-        if distance <= SAME_SOLUTION * penetration:
-            return trace, trace.u[-1]
+    if is_solved(trace, exact, penetration):
+        return trace, trace.u[-1]
     again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
-    balanced = again.roundings[0] <= NEAR_CONVERGENCE or len(again.u) == 1
-    return trace, again.u[0] if balanced else again.u[1 + np.argmin(again.roundings[1:])]
+    return trace, nearest_to_balance(again)
 
 
 def _add_three_normals(

@@ -236,12 +236,20 @@ def solve_patch(
         The unknowns that are judged.
     """
     trace = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
-    if trace.converged:
-        distance = np.abs(trace.solution - exact[: scene.n_free]).max(initial=0.0)
-        if distance <= SAME_SOLUTION * penetration:
-            return trace, trace.u[-1]
+    return trace, trace.u[-1] if is_solved(trace, exact, penetration) else nearest_to_balance(trace)
+
+
+def is_solved(trace: Trace, exact: FloatArray, penetration: float) -> bool:
+    """Return whether Newton's method converged to the exact solution (n_free + n_multipliers,)."""
+    distance = np.abs(trace.solution - exact[: trace.scene.n_free]).max(initial=0.0)
+    return trace.converged and bool(distance <= SAME_SOLUTION * penetration)
+
+
+def nearest_to_balance(trace: Trace) -> FloatArray:
+    """Return the start (n_free + n_multipliers,) if it is nearly in balance, else the later iterate nearest to it."""
     balanced = trace.roundings[0] <= NEAR_CONVERGENCE or len(trace.u) == 1
-    return trace, trace.u[0] if balanced else trace.u[1 + np.argmin(trace.roundings[1:])]
+    iterate: FloatArray = trace.u[0 if balanced else 1 + np.argmin(trace.roundings[1:])]
+    return iterate
 
 
 def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> tuple[Pairing | None, FloatArray]:
