@@ -61,8 +61,9 @@ ROOMS = {
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
     "geometry": Room(("contract",), ("numpy", "numba", "scipy.sparse"), QUIET),
     "oracle": Room(("contract",), ("numpy",), QUIET),
+    "foreign_files": Room(("contract",), ("numpy", "msgspec", "psutil")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
-    "meshes": Room(("contract",), ("numpy", "meshio")),
+    "meshes": Room(("contract", "foreign_files"), ("numpy", "meshio", "msgspec")),
     "scenes": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "scenes"), ("numpy", "hypothesis"), QUIET),
     "run": Room(("contract", "scenes", "strategies"), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
@@ -87,7 +88,9 @@ ROOMS = {
     ),
     "reports": Room(("contract",), ("numpy",)),
     "reports.bench": Room(("contract", "reports"), ("numpy",)),
-    "reports.netcdf": Room(("contract", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4")),
+    "reports.netcdf": Room(
+        ("contract", "foreign_files", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")
+    ),
     "reports.draw": Room(
         ("contract", "reports", "reports.stability", "reports.bench"), ("numpy", "matplotlib", "meshio")
     ),

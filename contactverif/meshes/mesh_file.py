@@ -1,6 +1,6 @@
 """A user's own mesh file becomes an `Interface`: the lines of two named groups, each with its body on the left.
 
-meshio reads the file, so a format is read as well as meshio reads it.
+meshio reads the file, so a format is read as well as meshio reads it; `plain_mesh` says how.
 
 Rule for the next editor: whatever a mesh from elsewhere may have wrong is found here, before an `Interface` sees it,
 and is said in terms of the options of the command line.
@@ -8,24 +8,19 @@ and is said in terms of the options of the command line.
 
 from __future__ import annotations
 
-import sys
-from contextlib import redirect_stderr, redirect_stdout
 from difflib import get_close_matches
-from io import StringIO
 from pathlib import Path
-from typing import Any
 
-import meshio
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
+from contactverif.meshes.plain_mesh import PlainMesh, read_mesh
 
 Group = list[IntArray]  # For each block of cells in the file: 0 no member, 1 a member, −1 a member to be reversed.
 
-# The cell data in which formats that number their groups store the numbers.
-TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "ugrid:ref", "su2:tag", "nastran:ref", "avsucd:material")
+MOST_MEMBERS = 10**8  # Groups times cells: so many take 1 GB. A mesh of a million cells may have a hundred groups.
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
 
 
@@ -63,7 +58,7 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
     if slave == master:
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     names = (("--slave", slave), ("--master", master))
-    mesh = _read(Path(path))
+    mesh = read_mesh(path)
     points = _planar(mesh)
     groups = _groups(mesh)
     sides = [(argument, _lines(mesh, groups, argument, name)) for argument, name in names]
@@ -122,30 +117,10 @@ def _mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray | None:
     return normal
 
 
-def _read(path: Path) -> Any:
-    if not path.is_file():
-        raise MisuseError("--mesh", f"{str(path)!r}, which is no file", "a mesh file")
-    output, warnings = StringIO(), StringIO()
-    try:
-        with path.open("rb") as stream:
-            is_gmsh = stream.read(1) == b"$"  # Ansys uses the suffix .msh too, and meshio would try that first.
-        with redirect_stdout(output), redirect_stderr(warnings):
-            mesh = meshio.read(path, file_format="gmsh" if is_gmsh else None)
-    except (Exception, SystemExit) as error:  # meshio prints and exits if a reader gives up.
-        reason = output.getvalue() + warnings.getvalue() if isinstance(error, SystemExit) else str(error)
-        brief = " ".join(reason.split()) or type(error).__name__
-        actual = f"{str(path)!r}, which meshio cannot read ({brief})"
-        raise MisuseError("--mesh", actual, "a whole mesh file in a format that meshio knows") from error
-    sys.stderr.write(warnings.getvalue())
-    return mesh
-
-
-def _planar(mesh: Any) -> FloatArray:
+def _planar(mesh: PlainMesh) -> FloatArray:
     """Return the positions (n_points, 2) of a mesh in a plane of constant z."""
-    points = np.asarray(mesh.points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise MisuseError("--mesh", f"points of shape {points.shape}", "points with two or three coordinates")
-    numbers = [np.asarray(block.data).reshape(-1) for block in mesh.cells if block.dim > 0]
+    points = mesh.points
+    numbers = [block.data.reshape(-1) for block in mesh.cells if block.dim > 0]
     used = (
         points[np.unique(np.concatenate(numbers))] if numbers else points[:0]
     )  # Points without cells may lie outside the plane.
@@ -159,35 +134,37 @@ def _planar(mesh: Any) -> FloatArray:
     return points[:, :2]
 
 
-def _groups(mesh: Any) -> dict[str, Group]:
+def _groups(mesh: PlainMesh) -> dict[str, Group]:
     """Return all groups of a mesh: sets of cells and physical groups by name, numbered groups by number as text."""
     named, numbered = _cell_sets(mesh), _tagged_cells(mesh)
-    for name, value in mesh.field_data.items():  # Gmsh stores the number and the dimension of a name here.
-        if np.shape(value) == (2,):
-            number, dim = str(int(value[0])), int(value[1])
-            group = numbered.get(number, [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
-            _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
-            # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
-            _include(numbered, number, named[name])
+    for name, (number, dim) in mesh.field_data.items():
+        group = numbered.get(str(number), [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
+        _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
+        # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
+        _include(numbered, str(number), named[name])
     return numbered | named
 
 
-def _cell_sets(mesh: Any) -> dict[str, Group]:
-    """Return the sets of cells by name, without those that Gmsh makes for its own use."""
-    groups: dict[str, Group] = {}
-    for name, sets in mesh.cell_sets.items():
-        if len(sets) == len(mesh.cells) and all(isinstance(part, np.ndarray) for part in sets) and "gmsh:" not in name:
-            members = [np.isin(np.arange(len(block)), part) for block, part in zip(mesh.cells, sets, strict=True)]
-            groups[name] = [part.astype(np.int64) for part in members]
-    return groups
+def _cell_sets(mesh: PlainMesh) -> dict[str, Group]:
+    """Return the sets of cells by name."""
+    return {
+        name: [
+            np.isin(np.arange(len(block)), part).astype(np.int64) for block, part in zip(mesh.cells, sets, strict=True)
+        ]
+        for name, sets in mesh.cell_sets.items()
+    }
 
 
-def _tagged_cells(mesh: Any) -> dict[str, Group]:
+def _tagged_cells(mesh: PlainMesh) -> dict[str, Group]:
     """Return the groups that the cell data number, by number as text."""
     groups: dict[str, Group] = {}
-    for key in TAGS:
-        for tag in sorted({int(tag) for values in mesh.cell_data.get(key, ()) for tag in np.unique(values)} - {0}):
-            group = [np.asarray(values == tag, dtype=np.int64) for values in mesh.cell_data[key]]
+    n_cells = sum(map(len, mesh.cells))
+    for key, parts in mesh.cell_data.items():
+        tags = sorted({int(tag) for values in parts for tag in np.unique(values)} - {0})
+        if len(tags) * n_cells > MOST_MEMBERS:
+            raise MisuseError("--mesh", f"{len(tags)} groups of {n_cells} cells", "fewer groups")
+        for tag in tags:
+            group = [np.asarray(values == tag, dtype=np.int64) for values in parts]
             if key == "gmsh:physical" and tag < 0:  # In Gmsh, a negative number reverses the lines of a curve.
                 _include(groups, str(-tag), [-part for part in group])
             else:
@@ -201,7 +178,7 @@ def _include(groups: dict[str, Group], name: str, group: Group) -> None:
     groups[name] = [np.where(part != 0, part, more) for part, more in zip(known, group, strict=True)]
 
 
-def _lines(mesh: Any, groups: dict[str, Group], argument: str, name: str) -> IntArray:
+def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
     """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
     if name not in groups:
         raise _unknown_group_error(mesh, groups, argument, name)
@@ -214,7 +191,7 @@ def _lines(mesh: Any, groups: dict[str, Group], argument: str, name: str) -> Int
     parts = [np.empty((0, 2), dtype=np.int64)]
     for block, members in zip(mesh.cells, group, strict=True):
         if block.type == "line":
-            ends = np.asarray(block.data, dtype=np.int64)
+            ends = block.data
             parts.append(np.where(members[:, None] < 0, ends[:, ::-1], ends)[members != 0])
     lines = np.concatenate(parts)
     if not len(lines):
@@ -224,12 +201,12 @@ def _lines(mesh: Any, groups: dict[str, Group], argument: str, name: str) -> Int
     return lines
 
 
-def _kinds(mesh: Any, group: Group) -> list[str]:
+def _kinds(mesh: PlainMesh, group: Group) -> list[str]:
     """Return the types of the cells in a group."""
     return sorted({block.type for block, members in zip(mesh.cells, group, strict=True) if members.any()})
 
 
-def _unknown_group_error(mesh: Any, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
+def _unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
     """Return the error for a group that the file does not have; it names near groups and lists all."""
     listed = ", ".join(f"{each!r} ({', '.join(_kinds(mesh, group)) or 'empty'})" for each, group in groups.items())
     by_case = {each.casefold(): each for each in groups}
@@ -238,7 +215,7 @@ def _unknown_group_error(mesh: Any, groups: dict[str, Group], argument: str, nam
     return MisuseError(argument, f"{name!r}, which is no group of the file", needed if listed else "groups in the file")
 
 
-def _directed_edges(mesh: Any, points: FloatArray) -> IntArray:
+def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
     """Return the edges of the 2-D cells, each as first node × n_points + second node, its cell on the left."""
     edges = [np.empty(0, dtype=np.int64)]
     for block in mesh.cells:
@@ -248,7 +225,7 @@ def _directed_edges(mesh: Any, points: FloatArray) -> IntArray:
         n_corners = (
             3 if "triangle" in kind else 4 if "quad" in kind else None
         )  # Corners come first, nodes on edges last.
-        corners = np.asarray(block.data, dtype=np.int64)[:, :n_corners]
+        corners = block.data[:, :n_corners]
         x, y = np.moveaxis(points[corners] - points[corners[:, :1]], -1, 0)  # (n_cells, n_corners) each
         twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
         corners = np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)[twice_area != 0]

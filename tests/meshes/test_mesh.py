@@ -256,8 +256,8 @@ def test_unreadable_files(name: str, text: str, tmp_path: Path, capsys: pytest.C
 
 
 def test_no_such_file(tmp_path: Path) -> None:
-    for path in (tmp_path / "none.msh", tmp_path):
-        with pytest.raises(MisuseError, match=r"--mesh: found '.*', which is no file; needed a mesh file"):
+    for path, words in ((tmp_path / "none.msh", "which does not exist"), (tmp_path, "which is a folder")):
+        with pytest.raises(MisuseError, match=f"--mesh: found .*, {words}; needed a mesh file"):
             read_interface(path, slave="punch", master="base")
 
 

@@ -109,7 +109,7 @@ def test_the_file_holds_everything(tmp_path: Path) -> None:
 
 
 def test_another_file_is_no_bench(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match="no file"):
+    with pytest.raises(MisuseError, match="which does not exist"):
         read_bench(tmp_path / "a.nc")
     (tmp_path / "a.nc").write_text("no netCDF")
     with pytest.raises(MisuseError, match="a file that `contactverif bench"):

@@ -7,7 +7,6 @@ same plan is identical.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.schema import NONE, RATIO, SECONDS, text
+from contactverif_reports.netcdf.stored_groups import Group, read_groups
 from contactverif_reports.netcdf.variables import codes, numbers, words
 from contactverif_reports.netcdf.write_tree import write_tree
 
@@ -60,15 +60,51 @@ def read_bench(path: str | os.PathLike[str]) -> BenchResults:
         If the file is missing, or is no file of a bench.
     """
     needed = "a file that `contactverif bench --out FILE.nc` wrote"
-    if not Path(path).is_file():
-        raise MisuseError("FILE", f"no file {os.fspath(path)}", needed)
+    name = os.fspath(path)
+    groups = read_groups(path, "FILE", needed)
+    if groups["/"].attrs.get("bench_schema") != BENCH_SCHEMA:
+        raise MisuseError("FILE", f"{name}, another file", needed)
     try:
-        with xr.open_datatree(path, engine="netcdf4") as tree:
-            if tree.attrs.get("bench_schema") != BENCH_SCHEMA:
-                raise MisuseError("FILE", f"{os.fspath(path)}, another file", needed)
-            return _results(tree.load())
-    except (OSError, ValueError) as error:
-        raise MisuseError("FILE", f"{os.fspath(path)}: {error}", needed) from error
+        results = _results(groups["/"], groups["/timing"])
+        _check_shapes(results)
+        _check_codes(results)
+    except (AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise MisuseError("FILE", f"{name}, which is damaged ({reason})", needed) from error
+    return results
+
+
+def _check_shapes(results: BenchResults) -> None:
+    """Check that all arrays have the shapes and types that their names ask for."""
+    n_formulations, n_cells, n_repeats = len(results.formulations), len(results.cells), results.yardstick.shape[-1]
+    runs = (n_formulations, n_cells)
+    for name, shape in {
+        "segments": (n_cells,),
+        "unknowns": (n_cells,),
+        "outcomes": runs,
+        "errors": (*runs, len(ERRORS)),
+        "counts": (*runs, len(COUNTS)),
+        "seconds": (*runs, len(PARTS), n_repeats),
+        "wall": (*runs, n_repeats),
+        "yardstick": (n_cells, n_repeats),
+    }.items():
+        values = getattr(results, name)
+        if values.shape != shape:
+            raise ValueError(f"{name} has the shape {values.shape}, and the names ask for {shape}")
+        whole = name in ("segments", "unknowns", "outcomes", "counts")
+        if values.dtype != (np.int64 if whole else np.float64) or (whole and (values < 0).any()):
+            raise ValueError(f"{name} holds what it must not")
+
+
+def _check_codes(results: BenchResults) -> None:
+    """Check that codes have a meaning, names are different, and there is something to show."""
+    n_formulations, n_repeats = len(results.formulations), results.yardstick.shape[-1]
+    if not n_repeats or len(set(results.formulations)) != n_formulations:
+        raise ValueError("there are no repeats, or two formulations have one name")
+    if not np.isin(results.outcomes, list(Outcome)).all():
+        raise ValueError("outcome holds a code without a meaning")
+    if not all(np.isfinite(cell.stiffness) and cell.stiffness > 0 for cell in results.cells):
+        raise ValueError("a penalty is no finite number > 0")
 
 
 def _labels(results: BenchResults) -> dict[str, Any]:
@@ -129,15 +165,16 @@ def _timing(results: BenchResults) -> xr.Dataset:
     return xr.Dataset(table, attrs={"comment": "the only numbers that depend on a clock"})
 
 
-def _results(tree: xr.DataTree) -> BenchResults:
-    root, timing = tree.to_dataset(), tree["timing"].to_dataset()
-    formulations = tuple(map(_word, root["formulation"].values))
+def _results(root: Group, timing: Group) -> BenchResults:
+    formulations = tuple(map(str, root["formulation"].values))
     scenes = list(SCENES)
+    if (root["scene"].values < 0).any():
+        raise ValueError("scene holds a code without a meaning")
     columns = (root[name].values.tolist() for name in ("scene", "mesh", "stiffness"))
     cells = tuple(Cell(scenes[scene], mesh, stiffness) for scene, mesh, stiffness in zip(*columns, strict=True))
     outcomes, remarks = root["outcome"].values.astype(np.int64), root["remark"].values
     unsolved = np.argwhere(outcomes != Outcome.SOLVED).tolist()
-    attributes = {str(name): str(value) for name, value in tree.attrs.items()}
+    attributes = {str(name): str(value) for name, value in root.attrs.items()}
     not_loaded = attributes["not_loaded"]
     structure = ("title", "bench_schema", "Conventions", "not_loaded")
     return BenchResults(
@@ -151,21 +188,17 @@ def _results(tree: xr.DataTree) -> BenchResults:
         seconds=timing["seconds"].values,
         wall=_wall(timing),
         yardstick=timing["yardstick_seconds"].values,
-        remarks={(formulations[row], cell): _word(remarks[row, cell]) for row, cell in unsolved},
+        remarks={(formulations[row], cell): str(remarks[row, cell]) for row, cell in unsolved},
         not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
 
 
-def _wall(timing: xr.Dataset) -> FloatArray:
+def _wall(timing: Group) -> FloatArray:
     """Return the times by the wall clock; NaN from a file whose only clock it was."""
     nothing = np.full_like(timing["seconds"].values[:, :, -1], np.nan)
     wall: FloatArray = timing["wall_seconds"].values if "wall_seconds" in timing else nothing
     return wall
-
-
-def _word(value: Any) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def _split(line: str) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
+from contactverif_reports.netcdf.stored_groups import Group
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
@@ -118,7 +119,7 @@ def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
     return numbers(dims, values, long_name, units)
 
 
-def case_of_group(dataset: xr.Dataset) -> Case:
+def case_of_group(dataset: Group) -> Case:
     """Return the case that `case_group` made a group of.
 
     Raises

@@ -15,6 +15,7 @@ from contactverif.contract.counterexample import named_failures, typeable
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.counterexample_groups import case_group, case_of_group
+from contactverif_reports.netcdf.stored_groups import Group
 
 _FOLDER = f"/{schema.NAMED_CASES}"
 _COMMENT = (
@@ -39,7 +40,7 @@ def named_case_groups(run: Run) -> dict[str, xr.Dataset]:
     return groups
 
 
-def read_named_cases(groups: Mapping[str, xr.Dataset]) -> dict[tuple[str, str], Case]:
+def read_named_cases(groups: Mapping[str, Group]) -> dict[tuple[str, str], Case]:
     """Return {(property id, name): case} of a report; empty where it stores none."""
     cases = {}
     for path, dataset in groups.items():

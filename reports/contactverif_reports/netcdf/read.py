@@ -2,9 +2,9 @@
 
 Rules for the next editor:
 
-- xarray opens the file, everything is loaded at once, and the file is closed before anything else happens: HDF5 may
-  crash when a damaged file is opened twice.
-- Whatever is wrong with a file is a `MisuseError` in one line.
+- A child process opens the file, see `stored_groups`; here are arrays, and none is believed before it is checked.
+- Whatever is wrong with a file is a `MisuseError` in one line. What is read only when somebody asks for it, such as an
+  outcome, is checked when the file is read.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
-import xarray as xr
+import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
@@ -31,15 +31,17 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.counterexample_groups import case_of_group
 from contactverif_reports.netcdf.named_case_groups import read_named_cases
+from contactverif_reports.netcdf.stored_groups import Group, read_groups
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
 from contactverif_reports.netcdf.summary_group import root_attributes
 
-Groups = Mapping[str, xr.Dataset]
+Groups = Mapping[str, Group]
 
 _ARGUMENT = "REPORT"
 _NEEDED = "a report that `contactverif verify --out FILE.nc` wrote"
-# What xarray and we meet in a file that is not whole: a missing name, a number that means nothing, an HDF error.
-_DAMAGE = (AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError, OverflowError, AssertionError)
+# What a file that is not whole leads to: a missing name, an array of another shape, a number that means nothing.
+_DAMAGE = (AttributeError, LookupError, TypeError, ValueError, RuntimeError, ArithmeticError, AssertionError)
+_LONGEST_REASON = 300  # Characters: a reason may quote what the file holds.
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
@@ -105,43 +107,23 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
         missing or damaged in it.
     """
     name = os.fspath(path)
-    if not Path(path).is_file():
-        reason = "which is a folder" if Path(path).is_dir() else "which does not exist"
-        raise MisuseError(_ARGUMENT, f"{name}, {reason}", _NEEDED)
+    groups = read_groups(path, _ARGUMENT, _NEEDED, decode=decode)
     try:
-        groups = xr.open_groups(
-            Path(path).resolve(),
-            engine="netcdf4",
-            mask_and_scale=False,
-            decode_times=False,
-            decode_timedelta=False,
-            decode_coords=False,
-            concat_characters=decode,
-        )
-    except _DAMAGE as error:
-        description = f"{name}, which is no netCDF file or a damaged one ({_one_line(error)})"
-        raise MisuseError(_ARGUMENT, description, "a report (netCDF-4)") from error
-    try:
-        try:
-            _check_schema(groups["/"], name)
-            for dataset in groups.values():
-                dataset.load()
-        finally:
-            for dataset in groups.values():
-                dataset.close()
+        _check_schema(groups["/"], name)
         yield groups
-    except MisuseError:
-        raise
     except _DAMAGE as error:
-        description = f"{name}, which cannot be read ({_one_line(error)})"
+        if isinstance(error, MisuseError) and error.argument == _ARGUMENT:
+            raise
+        cause = error.found if isinstance(error, MisuseError) else error
+        description = f"{name}, which cannot be read ({type(error).__name__}: {_one_line(cause)})"
         raise MisuseError(_ARGUMENT, description, "an undamaged report") from error
 
 
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+def _one_line(error: object) -> str:
+    return " ".join(str(error).split())[:_LONGEST_REASON]
 
 
-def _check_schema(root: xr.Dataset, path: str) -> None:
+def _check_schema(root: Group, path: str) -> None:
     if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
     version = str(root.attrs["schema"])
@@ -172,7 +154,7 @@ class _Reader:
 
     def run(self) -> Run:
         """Return the run."""
-        formulations, properties = (self._words(name) for name in ("formulation", "property"))
+        formulations, properties = (self._labels(name) for name in ("formulation", "property"))
         by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
         for j, property_id in enumerate(properties):
             for i, row in self._rows_of(j, property_id, formulations):
@@ -185,8 +167,18 @@ class _Reader:
             opposite_signs=self._opposite_signs(formulations),
         )
         written = root_attributes(run)
+        self._check(run, written)
         origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
         return replace(run, provenance=origin)
+
+    def _check(self, run: Run, written: Mapping[str, Any]) -> None:
+        """Check what the file says twice: the counterexamples, and the counts of the root."""
+        stored = {(example.formulation, example.property_id) for example in counterexamples(run).values()}
+        if stored != self._examples.keys():
+            raise ValueError("the counterexamples are not those of the rows")
+        for name, value in written.items():
+            if name.startswith("n_") and int(self._root.attrs.get(name, value)) != value:
+                raise ValueError(f"{name} is {self._root.attrs[name]}, and the rows say {value}")
 
     def _rows_of(self, j: int, property_id: str, formulations: list[str]) -> Iterator[tuple[int, Row]]:
         """Yield the rows of a property, with the number of the formulation."""
@@ -202,7 +194,7 @@ class _Reader:
             if verdict == schema.NOT_PLANNED:
                 continue
             shrunk, case = self._example(formulation, property_id, info)
-            length = int((codes[i] != schema.NOT_PLANNED).sum())
+            length = self._n_outcomes(i, j, property_id, codes[i])
             yield (
                 i,
                 Row(
@@ -219,6 +211,14 @@ class _Reader:
                     seconds=float(self._timing["row_seconds"].values[i, j]),
                 ),
             )
+
+    def _n_outcomes(self, i: int, j: int, property_id: str, codes: np.ndarray[Any, Any]) -> int:
+        """Return the number of outcomes of a row, checked against what the summary counts."""
+        length = int((codes != schema.NOT_PLANNED).sum())
+        counts = np.bincount(codes[:length].clip(0), minlength=len(schema.VERDICTS))
+        if (codes[:length] == schema.NOT_PLANNED).any() or (counts != self._summary["count"].values[i, j]).any():
+            raise ValueError(f"the verdicts of {property_id} are not those that the summary counts")
+        return length
 
     def _example(self, formulation: str, property_id: str, info: PropertyInfo) -> tuple[Outcome | None, Case | None]:
         """Return the shrunk case, or the case of the witness, of a row; None where the report stores none."""
@@ -253,8 +253,15 @@ class _Reader:
     def _words(self, name: str) -> list[str]:
         return [str(word) for word in self._summary[name].values] if name in self._summary else []
 
+    def _labels(self, name: str) -> list[str]:
+        """Return the names along a dimension, which are all different."""
+        labels = self._words(name)
+        if len(set(labels)) != len(labels):
+            raise ValueError(f"two of {name} have one name")
+        return labels
 
-def _examples(groups: Groups) -> dict[tuple[str, str], tuple[xr.Dataset, Case]]:
+
+def _examples(groups: Groups) -> dict[tuple[str, str], tuple[Group, Case]]:
     """Return the counterexamples by formulation and property, each with its case."""
     examples = {}
     folder = f"/{schema.COUNTEREXAMPLES}/"

@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any, overload
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.case import Case
@@ -26,8 +25,12 @@ from contactverif.contract.property import (
 )
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import safe_names
+from contactverif_reports.netcdf.stored_groups import Group
 
 _REALS = ("penalty", "largest_coordinate", "shortest_segment")
+# The kind of numpy's types of each variable; all others hold reals.
+_KINDS = dict.fromkeys(("verdict", "state", "n_slave_segments", "n_master_segments", "case_kind"), "i")
+_KINDS |= dict.fromkeys(("reason", "undecided", "broken", "place", "case_name"), "U")
 
 
 class OutcomeArrays:
@@ -35,8 +38,8 @@ class OutcomeArrays:
 
     Parameters
     ----------
-    dataset : xr.Dataset
-        The group, loaded.
+    dataset : Group
+        The group.
     info : PropertyInfo
         The property of the group.
     dims : Sequence[str]
@@ -52,7 +55,7 @@ class OutcomeArrays:
         If a variable is missing.
     """
 
-    def __init__(self, dataset: xr.Dataset, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
+    def __init__(self, dataset: Group, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
         self._dataset, self._dims, self._prefix = dataset, tuple(dims), prefix
         self.verdicts = self._read("verdict")
         known = [schema.NOT_PLANNED, *schema.VERDICTS.values()]
@@ -61,7 +64,7 @@ class OutcomeArrays:
         self._states = self._read("state")
         self._texts = {name: self._read(name) for name in ("reason", "undecided", "broken", "place") if self._has(name)}
         self._quantities = [quantity.name for quantity in info.quantities]
-        self._details = _names(dataset, "detail")
+        self._details = _labels(dataset, "detail")
         self._values, self._tolerances, self._detail_values = (
             self._read(name, axis) if along else np.empty((len(self.verdicts), 0))
             for name, axis, along in (
@@ -76,16 +79,36 @@ class OutcomeArrays:
             if self._has(f"series_{safe}")
         }
         self._read_summaries()
+        self._check()
+
+    def _check(self) -> None:
+        """Check what is used only when somebody asks for an outcome."""
+        place = f"of {self._prefix}verdict"
+        planned = self.verdicts != schema.NOT_PLANNED
+        if (self._states[planned] & ~sum(schema.STATES.values())).any():
+            raise ValueError(f"the states {place} hold a code without a meaning")
+        if self._values.shape[1] != len(self._quantities) or self._detail_values.shape[1] != len(self._details):
+            raise ValueError(f"the numbers {place} are not as many as their names")
+        measured = self._states & schema.MEASURED != 0
+        lacks_tolerance = (self._values != schema.NOT_MEASURED) & (self._tolerances == schema.NOT_MEASURED)
+        if lacks_tolerance[planned & measured].any():
+            raise ValueError(f"a value {place} has no tolerance")
+        if self._has("n_slave_segments"):
+            kinds = self._case_kinds[planned]
+            if ((kinds < -1) | (kinds >= len(self._kinds) - 1)).any():
+                raise ValueError(f"the kinds {place} hold a code without a meaning")
+            if (self._counts[planned] < 0).any():
+                raise ValueError(f"the cases {place} have fewer than no segments")
 
     def _read_summaries(self) -> None:
-        self._parameters = _names(self._dataset, "parameter")
+        self._parameters = _labels(self._dataset, "parameter")
         if not self._has("n_slave_segments"):  # Whole cases stand elsewhere.
             return
         self._counts = np.column_stack([self._read("n_slave_segments"), self._read("n_master_segments")])
         columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
         self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
         self._case_names = self._read("case_name") if self._has("case_name") else None
-        self._kinds = [*_names(self._dataset, "kind"), ""]  # A case of none has the code −1, which is the last.
+        self._kinds = [*_labels(self._dataset, "kind"), ""]  # A case of none has the code −1, which is the last.
         self._case_kinds = self._read("case_kind") if self._has("case_kind") else np.full(len(self.verdicts), -1)
 
     def outcome(self, number: int, case: Case | None = None, seconds: float = 0.0) -> Outcome | None:
@@ -146,6 +169,8 @@ class OutcomeArrays:
         if variable.dims != (*self._dims, *axes):
             raise ValueError(f"{self._prefix}{name} has the dimensions {variable.dims}")
         values: np.ndarray[Any, Any] = variable.values
+        if values.dtype.kind not in _KINDS.get(name, "f"):
+            raise ValueError(f"{self._prefix}{name} is of the type {values.dtype}")
         return values.reshape(-1, *values.shape[len(self._dims) :])
 
 
@@ -189,7 +214,7 @@ class StoredOutcomes(Sequence[Outcome]):
         return outcome if case is None else replace(outcome, case_or_summary=case)
 
 
-def read_info(dataset: xr.Dataset) -> PropertyInfo:
+def read_info(dataset: Group) -> PropertyInfo:
     """Return the property of a group.
 
     Raises
@@ -199,21 +224,33 @@ def read_info(dataset: xr.Dataset) -> PropertyInfo:
     """
     columns = ("quantity", "quantity_units", "tolerance_formula", "tolerance_reason", "sense")
     needs = str(dataset.attrs["needs"])
+    _labels(dataset, "quantity")
+    strangers = set(_names(dataset, "sense")) - {"at most", "at least"}
+    if strangers:
+        raise ValueError(f"the sense of a quantity is {strangers.pop()!r}")
     return PropertyInfo(
         str(dataset.attrs["property_id"]),
         str(dataset.attrs["family"]),
         str(dataset.attrs["summary"]),
         tuple(Quantity(*row) for row in zip(*(_names(dataset, name) for name in columns), strict=True)),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
-        series=dict(zip(_names(dataset, "series"), _names(dataset, "series_units"), strict=True)),
-        kinds=tuple(_names(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
+        series=dict(zip(_labels(dataset, "series"), _names(dataset, "series_units"), strict=True)),
+        kinds=tuple(_labels(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
         # Reports that are older than these two have no such attribute.
         least_contact=float(dataset.attrs.get("least_contact", LEAST_CONTACT)),
         usual_undecided=float(dataset.attrs.get("usual_undecided", NONE_UNDECIDED)),
     )
 
 
-def _names(dataset: xr.Dataset, name: str) -> list[str]:
+def _labels(dataset: Group, name: str) -> list[str]:
+    """Return the names along a dimension, which are all different."""
+    names = _names(dataset, name)
+    if len(set(names)) != len(names):
+        raise ValueError(f"two of {name} have one name")
+    return names
+
+
+def _names(dataset: Group, name: str) -> list[str]:
     return [str(word) for word in dataset.variables[name].values] if name in dataset.variables else []
 
 

@@ -1,0 +1,1 @@
+"""Files that others wrote: what they may be, and how they are read so that a damaged one harms nobody."""

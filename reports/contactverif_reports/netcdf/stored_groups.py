@@ -1,0 +1,229 @@
+"""The groups of a netCDF file as plain arrays: what the reader of reports sees instead of the file.
+
+A child process opens the file and sends its groups as bytes, so that a damaged file can harm only the child.
+
+Rules for the next editor:
+
+- `pack_groups` runs in the child. It asks for the sizes of everything before it reads anything.
+- The process that shows a report never opens it with the netCDF library.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import msgspec
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from contactverif.contract.errors import MisuseError
+from contactverif.foreign_files.child import Limits, ReadError, read_in_child
+from contactverif.foreign_files.ordinary import check_ordinary
+from contactverif.foreign_files.packed import PackedArray
+
+# The file with the most cases that we keep is read in 1 s. One with a million cases takes half a minute and 1 GB.
+LIMITS = Limits(seconds=120.0, megabytes=4096)
+# zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
+MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20
+LONGEST_TEXT = 1 << 20  # Characters of an attribute. The longest that we write say what each formulation provides.
+_MAGIC = b"\x89HDF\r\n\x1a\n"  # The first bytes of each netCDF-4 file.
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a group.
+
+    Attributes
+    ----------
+    dims : tuple[str, ...]
+        The names of its dimensions.
+    values : NDArray[Any]
+        Its entries, read-only.
+    attrs : Mapping[str, Any]
+        Its attributes: words, or arrays of numbers.
+    """
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    attrs: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Group(Mapping[str, Variable]):
+    """A group: a mapping from names to variables.
+
+    Attributes
+    ----------
+    attrs : Mapping[str, Any]
+        Its attributes: words, or arrays of numbers.
+    variables : Mapping[str, Variable]
+        Its variables by name.
+    """
+
+    attrs: Mapping[str, Any]
+    variables: Mapping[str, Variable]
+
+    def __getitem__(self, name: str) -> Variable:
+        return self.variables[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.variables)
+
+    def __len__(self) -> int:
+        return len(self.variables)
+
+    @cached_property
+    def sizes(self) -> Mapping[str, int]:
+        """The lengths of all dimensions of its variables.
+
+        Raises
+        ------
+        ValueError
+            If a dimension has two lengths.
+        """
+        sizes: dict[str, int] = {}
+        for name, variable in self.variables.items():
+            for dim, length in zip(variable.dims, variable.values.shape, strict=True):
+                if sizes.setdefault(dim, length) != length:
+                    raise ValueError(f"{name} is {length} long along {dim}, others {sizes[dim]}")
+        return sizes
+
+
+def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, decode: bool = True) -> dict[str, Group]:
+    """Return all groups of a netCDF-4 file by path.
+
+    Parameters
+    ----------
+    path : str | os.PathLike[str]
+        The file.
+    argument, needed : str
+        The argument that named it, and the file that is needed, for messages.
+    decode : bool
+        Make strings of characters.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such file, or it cannot be read within the limits.
+    """
+    name = os.fspath(path)
+    size = check_ordinary(path, argument, needed).st_size
+    with open(path, "rb") as file:
+        if file.read(len(_MAGIC)) != _MAGIC:
+            reason = "is empty" if not size else "is no netCDF file, or one that is damaged at its beginning"
+            raise MisuseError(argument, f"{name}, which {reason}", needed)
+    try:
+        packed = read_in_child(f"{__name__}:pack_groups", os.path.abspath(name), LIMITS)
+        groups = msgspec.msgpack.decode(packed, type=dict[str, _PackedGroup])
+        return {path: group.unpack(decode=decode) for path, group in groups.items()}
+    except (ReadError, msgspec.DecodeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise MisuseError(argument, f"{name}, which is damaged ({reason})", needed) from error
+
+
+class _PackedVariable(msgspec.Struct, array_like=True):
+    dims: tuple[str, ...]
+    values: PackedArray
+    attrs: dict[str, str | PackedArray]
+
+    def unpack(self, *, decode: bool) -> Variable:
+        values, dims = self.values.unpack(), self.dims
+        if decode and values.dtype.kind == "S":
+            values, dims = _words(values), dims[:-1]
+        if len(dims) != values.ndim:
+            raise ValueError(f"{len(dims)} dimensions of an array of shape {values.shape}")
+        return Variable(dims, values, _unpack_attributes(self.attrs))
+
+
+class _PackedGroup(msgspec.Struct, array_like=True):
+    attrs: dict[str, str | PackedArray]
+    variables: dict[str, _PackedVariable]
+
+    def unpack(self, *, decode: bool) -> Group:
+        variables = {name: variable.unpack(decode=decode) for name, variable in self.variables.items()}
+        return Group(_unpack_attributes(self.attrs), variables)
+
+
+def _unpack_attributes(attributes: Mapping[str, str | PackedArray]) -> dict[str, Any]:
+    return {name: value if isinstance(value, str) else _unpack_number(value) for name, value in attributes.items()}
+
+
+def _unpack_number(packed: PackedArray) -> Any:
+    values = packed.unpack()
+    return values if values.ndim else values[()]
+
+
+def _words(characters: NDArray[Any]) -> NDArray[Any]:
+    """Return characters (..., width) as words (...,)."""
+    *shape, width = characters.shape
+    if not characters.size:
+        return np.zeros(shape, dtype=np.str_)
+    return np.strings.decode(characters.view(f"S{width * characters.itemsize}").reshape(shape), "utf-8")
+
+
+def pack_groups(path: str) -> bytes:
+    """Return all groups of a netCDF file as bytes; this runs in a child process.
+
+    Raises
+    ------
+    ValueError
+        If the library cannot open it, or sizes or types are not those of a report.
+    """
+    try:
+        file = netCDF4.Dataset(path)
+    except OSError as error:  # Its words repeat the path.
+        raise ValueError(error.strerror) from error
+    groups = dict(_walk(file))
+    _check_sizes(groups, os.path.getsize(path))
+    return msgspec.msgpack.encode({name: _pack_group(group) for name, group in groups.items()})
+
+
+def _walk(group: Any) -> Iterator[tuple[str, Any]]:
+    """Yield (path, group) of a group and all below it."""
+    group.set_auto_mask(False)
+    group.set_auto_scale(False)
+    group.set_auto_chartostring(False)
+    yield group.path, group
+    for child in group.groups.values():
+        yield from _walk(child)
+
+
+def _check_sizes(groups: Mapping[str, Any], size: int) -> None:
+    """Check that the file may hold all that its variables are said to be."""
+    most = LEAST_ALLOWANCE + MOST_EXPANSION * size
+    total = 0
+    for path, group in groups.items():
+        for name, variable in group.variables.items():
+            place = f"{path.rstrip('/')}/{name}"
+            if not isinstance(variable.datatype, np.dtype):
+                raise ValueError(f"{place} is of a type that no report has")
+            total += math.prod(variable.shape) * variable.datatype.itemsize
+            if total > most:
+                raise ValueError(f"with {place} of shape {variable.shape} it holds more than {size} bytes can")
+
+
+def _pack_group(group: Any) -> _PackedGroup:
+    variables = {}
+    for name, variable in group.variables.items():
+        values = PackedArray.pack(variable[...], name)
+        variables[name] = _PackedVariable(tuple(variable.dimensions), values, _pack_attributes(variable))
+    return _PackedGroup(_pack_attributes(group), variables)
+
+
+def _pack_attributes(owner: Any) -> dict[str, str | PackedArray]:
+    attributes: dict[str, str | PackedArray] = {}
+    for name in owner.ncattrs():
+        value = owner.getncattr(name)
+        if isinstance(value, list):  # Of strings.
+            value = " ".join(map(str, value))
+        attributes[name] = value if isinstance(value, str) else PackedArray.pack(value, name)
+        length = len(value) if isinstance(value, str) else np.size(value)
+        if length > LONGEST_TEXT:
+            raise ValueError(f"the attribute {name} is {length} long")
+    return attributes
