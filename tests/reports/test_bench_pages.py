@@ -20,6 +20,8 @@ from contactverif_reports.bench.work_precision import (
     cost_ratio,
     cost_sentence,
     figure_sentence,
+    harness_sentence,
+    harness_share,
     pair_profiles,
     pareto_front,
     time_to_reach,
@@ -181,3 +183,11 @@ def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) 
     text = bench_markdown(RESULTS, "bench.nc", with_pictures=True)
     assert set(re.findall(r"\]\(([^)]+)\)", text)) == {"cost.svg", "wavy.svg", "profiles.svg"}
     assert "| `poor` | ∞ | ∞ | ∞ | ∞ |" in text
+
+
+def test_the_share_of_the_harness_is_what_no_part_of_a_solution_takes() -> None:
+    """The search takes a quarter of each time, and no other part takes any."""
+    assert harness_share(RESULTS, "vts-ppt") == 0.75
+    assert harness_sentence(RESULTS).startswith("Of the time of vts-ppt, 25 % goes into its own calls")
+    assert harness_sentence(make_results(CELLS, {"poor": RUNS["poor"]})) == ""
+    assert isnan(harness_share(make_results(CELLS, {"nobody": [(1.0, inf)] * len(CELLS)}), "nobody"))

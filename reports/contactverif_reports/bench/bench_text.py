@@ -12,6 +12,7 @@ from contactverif_reports.bench.work_precision import (
     cost_ratio,
     cost_sentence,
     figure_sentence,
+    harness_sentence,
     pair_profiles,
     time_to_reach,
 )
@@ -49,6 +50,7 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
         "in seconds of the processor. The time is that of a whole solution by Newton's method, from the first iterate "
         "to the last. Bodies are condensed before.",
         "\n".join(f"- {text}" for text in [*costs, *clock_sentences(results)]),
+        harness_sentence(results),
     ]
     if with_pictures:
         parts.append(f"![Time to an error of 1 % in the forces, over that of {REFERENCE}]({COST_PICTURE})")

@@ -17,7 +17,7 @@ from math import inf, isfinite
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray
-from contactverif_reports.bench.results import RANDOM, BenchResults
+from contactverif_reports.bench.results import RANDOM, BenchResults, Outcome
 
 REFERENCE = "vts-ppt"
 TARGETS = (1e-1, 1e-2, 1e-3)
@@ -177,6 +177,36 @@ def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None
     if all(np.isnan(ratio) for ratio in ratios.values()):
         return f"On {scene}, {REFERENCE} does not reach an error of 1 % in the forces."
     return _put_in_words(scene, ratios)
+
+
+def harness_share(results: BenchResults, formulation: str) -> float:
+    """Return the share of the time of all solutions in which neither the plugin nor a linear solver works.
+
+    Parameters
+    ----------
+    results : BenchResults
+        The bench.
+    formulation : str
+        The formulation.
+
+    Returns
+    -------
+    float
+        The share, 0 to 1; NaN without a solution.
+    """
+    row = results.formulations.index(formulation)
+    *parts, total = results.fastest[row, results.outcomes[row] == Outcome.SOLVED].sum(axis=0)  # As in PARTS.
+    return float(1 - sum(parts) / total) if total > 0 else np.nan
+
+
+def harness_sentence(results: BenchResults) -> str:
+    """Return one sentence on how much of a time is not the formulation's; empty without the reference."""
+    if REFERENCE not in results.formulations or np.isnan(share := harness_share(results, REFERENCE)):
+        return ""
+    return (
+        f"Of the time of {REFERENCE}, {100 * (1 - share):.0f} % goes into its own calls and the linear "
+        "systems, and the rest into the harness. So these ratios are nearer to 1 than those of the formulations alone."
+    )
 
 
 def _put_in_words(scene: str, ratios: Mapping[str, float]) -> str:

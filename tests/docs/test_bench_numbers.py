@@ -1,0 +1,90 @@
+"""Numbers about speed: those of README.md and of the site are those of `reports/bench`."""
+
+from __future__ import annotations
+
+import csv
+import re
+from math import inf, log
+from pathlib import Path
+
+import pytest
+from quotes import DOCS, README, ROOT
+
+from contactverif_reports.bench.bench_text import bench_markdown
+from contactverif_reports.bench.results import BenchResults
+from contactverif_reports.bench.work_precision import REFERENCE, cost_ratio
+from contactverif_reports.netcdf.bench_file import read_bench
+
+BENCH = ROOT / "reports" / "bench"
+HOW_TO = (DOCS / "how-to" / "speed-against-error.md").read_text(encoding="utf-8")
+PEER = "ipctk"
+
+
+@pytest.fixture(scope="module")
+def results() -> BenchResults:
+    return read_bench(BENCH / "bench.nc")
+
+
+def rows(name: str) -> list[dict[str, str]]:
+    with (BENCH / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def table(head: str) -> list[list[str]]:
+    """Return the cells of the table of the how-to page whose first line begins with `head`."""
+    lines = HOW_TO[HOW_TO.index(head) :].partition("\n\n")[0].splitlines()[2:]
+    return [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in lines]
+
+
+def test_the_page_says_what_the_file_says(results: BenchResults) -> None:
+    assert (BENCH / "README.md").read_text(encoding="utf-8") == bench_markdown(results, "bench.nc", with_pictures=True)
+
+
+@pytest.mark.parametrize("page", [README, DOCS / "index.md"], ids=lambda page: page.name)
+def test_the_sentence_on_cost_is_true(page: Path, results: BenchResults) -> None:
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    (sentence,) = re.findall(r"At an error of 1 % in the forces on wavy [^.]*(?:\.\d[^.]*)*", text)
+    costs = dict(re.findall(rf"`([\w-]+)` (?:costs )?([\d.]+) times(?: `{REFERENCE}`)?", sentence))
+    never = re.findall(r"`([\w-]+)` never gets there", sentence)
+    assert set(costs) | set(never) == set(re.findall(r"`([\w-]+)`", sentence)) - {REFERENCE}
+    assert costs == {name: f"{cost_ratio(results, name, 'wavy'):.2g}" for name in costs} != {}
+    assert {cost_ratio(results, name, "wavy") for name in never} == {inf}
+
+
+def test_no_formulation_of_the_bench_is_drawn_that_did_not_run(results: BenchResults) -> None:
+    assert not results.not_loaded
+    assert results.seconds.shape[-1] >= 7
+
+
+def test_the_table_of_the_race_is_that_of_the_file() -> None:
+    race = {(row["formulation"], row["segments"]): row for row in rows("kernels.csv")}
+    names = list(dict.fromkeys(row["formulation"] for row in rows("kernels.csv")))
+    expected = [
+        [
+            name,
+            *(f"{float(race[name, size]['faster, median']):.1f}" for size in ("1000", "10000", "100000")),
+            f"{float(race[name, '10000']['median / µs']):.2f}",
+            f"{float(race[name, '100000']['peak / bytes']):.0f}",
+        ]
+        for name in names
+    ]
+    assert table("| | at 1,000 |") == expected
+    assert PEER in names
+
+
+def test_the_powers_of_the_cost_are_those_of_the_file() -> None:
+    time = {(row["formulation"], row["segments"]): float(row["median / µs"]) for row in rows("kernels.csv")}
+    text = HOW_TO[HOW_TO.index("From 10,000 to 1,000,000 segments") :].partition("\n\n")[0]
+    powers = re.findall(r"`([\w-]+)`(?: grows\s+like their number to the power)? ([\d.]+\d)", text)
+    assert len(powers) == 3
+    for name, power in powers:
+        ratio = time[name, "1000000"] / time[name, "10000"]
+        assert power == f"{1 + log(ratio) / log(100):.2f}", name
+
+
+def test_the_table_of_the_steps_is_that_of_the_file() -> None:
+    head, *_ = rows("steps.csv")[0]
+    steps = {row[head]: float(row["10000"]) for row in rows("steps.csv")}
+    names = {"search and walk": "search and walk, with a tree"}
+    for name, value in table("| step | µs a slave segment"):
+        assert value == f"{steps[names.get(name, name)]:.2f}", name
