@@ -49,7 +49,7 @@ def fill(
     _write(name, heads, lines, keys)
     missing = [key for key in keys if key not in lines]
     if missing:
-        _keep_commit(name)
+        keep_commit(name)
     with get_context("spawn").Pool(processes) as pool:
         for number, (key, line) in enumerate(zip(missing, pool.imap(cells, missing), strict=True), 1):
             lines[key] = [key, *line]
@@ -57,7 +57,7 @@ def fill(
             print(f"{number} of {len(missing)}: {key}", flush=True)
 
 
-def _keep_commit(name: str) -> None:
+def keep_commit(name: str) -> None:
     """Note with which commit a table was filled last."""
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], check=True, capture_output=True, text=True).stdout
     commits = {row["table"]: [row["table"], row["commit"]] for row in read(COMMITS)} | {name: [name, commit.strip()]}

@@ -1,0 +1,177 @@
+"""Write `reports/trust/hostile.md` from the tables that `tox -e hostile` keeps beside it."""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "trust"))
+
+from catalogue import PLUGINS
+from containment import CHECKS
+from tables import COMMITS, FOLDER, read
+
+PAGE, TABLE, KILLS = "hostile.md", "hostile.csv", "sigkills.csv"
+CAMPAIGNS = {
+    "command_lines.txt": "Command lines",
+    "damaged_reports.txt": "Damaged reports",
+    "damaged_meshes.txt": "Damaged meshes",
+}
+
+INTRODUCTION = """# Hostile plugins
+
+A plugin is a stranger's code. `tox -e hostile` runs plugins that were written to do harm, kills runs at random moments,
+and damages files; it wrote this page from the tables beside it: {commits}. What the harness contains and what it does
+not is on the page [What a plugin can do](../../docs/concepts/containment.md).
+
+## Plugins against a run
+
+Each line is `contactverif verify nts BAD vts-ppt --isolation process` with one hostile plugin `BAD`. The answers are
+looked up outside of the harness:
+
+- *goes on*: the run ends by itself, with exit status 0 or 1 and without a traceback.
+- *others unchanged*: `nts` and `vts-ppt` have the same numbers, bit by bit, as in a run without the plugin.
+- *report complete*: the report has every row, and an outcome of every planned case.
+- *exit status right*: 0 only if the plugin was judged and keeps its promises. A plugin whose answers are right although
+  it misbehaves must get the same numbers as `nts`, whose answers it gives.
+- *nothing left*: no process, temporary file or block of shared memory is there afterwards.
+- *output clean*: what is printed has no control characters, and less than 100 kB.
+
+"""
+SUMMARY = """{plugins} plugins in a process of their own: {whole} are contained in everything, and of {answers} answers
+{yes} are yes.
+{inline}
+"""
+INLINE = """In the process of the harness (`--isolation inline`), {whole} of {plugins} are contained, {lost} lose the
+results of everybody, and {zero} end with exit status 0 though the plugin was not judged.
+"""
+KILLED = """## Kills
+
+Runs were killed by SIGKILL at random moments, half of them with all their processes, half the first process alone, and
+then resumed. *Cases lost* counts cases that were asked again beyond the one that each job was judging. A report is
+broken if it cannot be read after the kill, or if it differs from that of an unbroken run after it was resumed.
+
+"""
+RUN = """## {title}
+
+What the campaign printed:
+
+```text
+{text}
+```
+
+"""
+Row = dict[str, str]
+
+
+def rows(mode: str) -> list[Row]:
+    """Return the lines of a way to run the plugins."""
+    return [row for row in read(TABLE) if row["mode/plugin"].partition("/")[0] == mode]
+
+
+def name_of(row: Row) -> str:
+    """Return the plugin of a line."""
+    return row["mode/plugin"].partition("/")[2]
+
+
+def is_whole(row: Row) -> bool:
+    """Return whether a plugin is contained in everything."""
+    return all(row[check] == "yes" for check in CHECKS)
+
+
+def table(heads: list[str], lines: list[list[str]]) -> str:
+    """Return a table in Markdown."""
+    text = [f"| {' | '.join(heads)} |", f"|---|{':-:|' * (len(heads) - 1)}"]
+    return "\n".join([*text, *(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)]) + "\n"
+
+
+def by_kind() -> str:
+    """Return a table with a line for each kind of plugin: in how many plugins of it each answer is yes."""
+    groups: dict[str, list[Row]] = defaultdict(list)
+    for row in rows("process"):
+        groups[PLUGINS[name_of(row)].kind].append(row)
+    lines = [
+        [kind, str(len(group)), *(f"{sum(row[check] == 'yes' for row in group)}" for check in CHECKS)]
+        for kind, group in groups.items()
+    ]
+    return table(["kind", "plugins", *CHECKS], lines)
+
+
+def summary() -> str:
+    """Return the numbers of both ways to run the plugins."""
+    process, inline = rows("process"), rows("inline")
+    answers = [row[check] == "yes" for row in process for check in CHECKS]
+    words = ""
+    if inline:
+        words = INLINE.format(
+            whole=sum(map(is_whole, inline)),
+            plugins=len(inline),
+            lost=sum(row["report complete"] == "no" for row in inline),
+            zero=sum(row["status"] == "0" and row["exit status right"] == "no" for row in inline),
+        )
+    numbers = {"plugins": len(process), "whole": sum(map(is_whole, process)), "answers": len(answers)}
+    return SUMMARY.format(**numbers, yes=sum(answers), inline=words)
+
+
+def exceptions() -> str:
+    """Return a table of the plugins that are not contained in everything."""
+    heads = ["plugin", "what it does", "not contained", "remarks"]
+    lines = [
+        [
+            f"`{name_of(row)}`",
+            PLUGINS[name_of(row)].summary,
+            ", ".join(check for check in CHECKS if row[check] != "yes"),
+            row["remarks"],
+        ]
+        for row in rows("process")
+        if not is_whole(row)
+    ]
+    return "Those that are not contained in everything:\n\n" + table(heads, lines) if lines else ""
+
+
+def all_plugins() -> str:
+    """Return the long table."""
+    heads = ["plugin", "what it does", *CHECKS, "seconds", "verdict"]
+    lines = []
+    for row in rows("process"):
+        name = name_of(row)
+        verdict = row["result"].partition(":")[0]
+        answers = [row[check] for check in CHECKS]
+        lines.append([f"`{name}`", PLUGINS[name].summary, *answers, row["seconds"], verdict])
+    return '<div class="wide" markdown>\n\n' + table(heads, lines) + "\n</div>\n"
+
+
+def kills() -> str:
+    """Return the part about kills; empty if there is no table."""
+    lines = [list(row.values()) for row in read(KILLS)]
+    return KILLED + table(list(read(KILLS)[0]), lines) if lines else ""
+
+
+def campaigns() -> str:
+    """Return what the other campaigns printed."""
+    texts = {title: FOLDER / name for name, title in CAMPAIGNS.items()}
+    return "".join(
+        RUN.format(title=title, text=file.read_text(encoding="utf-8").rstrip())
+        for title, file in texts.items()
+        if file.exists()
+    )
+
+
+def page() -> str:
+    """Return the whole page."""
+    commits = ", ".join(
+        f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in (TABLE, KILLS)
+    )
+    parts = [
+        INTRODUCTION.format(commits=commits) + summary() + "\n" + by_kind(),
+        exceptions(),
+        kills(),
+        campaigns().rstrip() + "\n" if campaigns() else "",
+        "## All plugins\n\n" + all_plugins(),
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+if __name__ == "__main__":
+    (FOLDER / PAGE).write_text(page(), encoding="utf-8")

@@ -1,0 +1,7 @@
+"""A plugin that sleeps when it is imported."""
+
+import time
+
+from hostile_kit import LONG
+
+time.sleep(LONG)

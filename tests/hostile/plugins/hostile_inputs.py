@@ -1,0 +1,131 @@
+"""Plugins that change what they were given, remember what they were asked, or answer by what is no argument."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import os
+import threading
+import time
+from typing import Any
+
+import numpy as np
+from hostile_kit import EITHER, IMPURE, answers, instead
+
+_calls = itertools.count(1)
+_last: list[Any] = []
+
+
+def _overwrite(array: Any) -> None:
+    """Write the number 7.5 over the first entry of an array, whatever its flags say."""
+    number = np.full(1, 7.5 if array.dtype.kind == "f" else 0, array.dtype)
+    ctypes.memmove(array.ctypes.data, number.ctypes.data, number.nbytes)
+
+
+@instead("residual", ends=EITHER)
+def write_to_z(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Write into the read-only state after the right answer."""
+    answer = right()
+    _overwrite(z)
+    return answer
+
+
+@instead("residual", ends=EITHER)
+def write_to_nodes(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Write into the read-only nodes of the interface after the right answer."""
+    answer = right()
+    _overwrite(interface.nodes)
+    return answer
+
+
+@instead("residual", ends=EITHER)
+def write_to_segments(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Write into the read-only segments of the interface after the right answer."""
+    answer = right()
+    _overwrite(interface.slave.segments)
+    return answer
+
+
+@instead("residual", ends=EITHER)
+def write_to_pairing(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Write into the read-only pairing after the right answer."""
+    answer = right()
+    _overwrite(pairing["master"])
+    return answer
+
+
+@instead("residual", ends=EITHER)
+def exchange_the_nodes(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Exchange the nodes of the frozen interface by others, after the right answer."""
+    answer = right()
+    object.__setattr__(interface, "nodes", 2 * interface.nodes)
+    return answer
+
+
+@instead("residual")
+def set_flags(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Make the read-only state writeable, and write to it."""
+    z.setflags(write=True)
+    z[:] = 0
+    return right()
+
+
+@instead("residual", ends=IMPURE)
+def add_the_last_answer(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Add a trace of the last answer of the same shape."""
+    answer = right()
+    last = _last[0] if _last and _last[0].shape == answer.shape else 0 * answer
+    _last[:] = [answer]
+    return answer + 1e-9 * last
+
+
+@answers("residual", ends=IMPURE)
+def by_count(answer: Any) -> Any:
+    """Answer by the number of calls."""
+    return answer * (1 + 1e-9 * next(_calls))
+
+
+@answers("residual", ends=IMPURE)
+def by_process(answer: Any) -> Any:
+    """Answer by the number of the process."""
+    return answer * (1 + 1e-12 * os.getpid())
+
+
+@answers("residual", ends=IMPURE)
+def by_hash_seed(answer: Any) -> Any:
+    """Answer by the seed of Python's hashes, as the order of a set of words does."""
+    return answer * (1 + 1e-6 * (hash("seed") % 1001))
+
+
+@answers("residual", ends=IMPURE)
+def by_threads(answer: Any) -> Any:
+    """Answer by the number of threads that the environment allows."""
+    return answer * (1 + 1e-6 * int(os.environ.get("OMP_NUM_THREADS", "1")))
+
+
+@answers("residual", ends=IMPURE)
+def by_time(answer: Any) -> Any:
+    """Answer by the clock."""
+    return answer * (1 + 1e-9 * (time.perf_counter_ns() % 1_000_003))
+
+
+@answers("residual", ends=IMPURE)
+def by_chance(answer: Any) -> Any:
+    """Answer by chance."""
+    return answer * (1 + 1e-9 * np.random.default_rng().random())
+
+
+@instead("residual", ends=EITHER)
+def by_address(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Answer by the address of the state in memory."""
+    return right() * (1 + 1e-9 * (z.ctypes.data // 64 % 1009))
+
+
+@instead("residual", ends=IMPURE)
+def from_another_thread(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Compute in a thread, and answer what the thread of the last call has computed."""
+    answer = right()
+    thread = threading.Thread(target=lambda: _last.append(1.0))
+    thread.start()
+    thread.join()
+    return answer * (1 + 1e-9 * len(_last))

@@ -1,0 +1,126 @@
+"""Plugins that write where the table of verdicts should be, or where the harness talks to them."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import logging
+import os
+import sys
+import warnings
+from contextlib import suppress
+
+from hostile_kit import EITHER, LIKE_NTS, before
+
+_calls = itertools.count(1)
+MOST_FILES = 200
+
+
+@before("residual", ends=LIKE_NTS)
+def print_lines() -> None:
+    """Print a line to standard output at each call."""
+    print("residual called")
+
+
+@before("residual", ends=LIKE_NTS)
+def print_errors() -> None:
+    """Print a line to standard error at each call."""
+    print("residual called", file=sys.stderr)
+
+
+@before("residual", ends=LIKE_NTS)
+def write_to_1_and_2() -> None:
+    """Write to the file descriptors 1 and 2, past Python's streams."""
+    os.write(1, b"residual called\n")
+    os.write(2, b"residual called\n")
+
+
+@before("residual", ends=LIKE_NTS)
+def print_from_c() -> None:
+    """Print by C's printf, whose buffer is written at the end of the process."""
+    ctypes.CDLL(None).printf(b"residual called\n")
+
+
+@before("residual", ends=LIKE_NTS)
+def print_escapes() -> None:
+    """Clear the terminal, change its title, and print a table of its own."""
+    print("\x1b[2J\x1b[H\x1b]0;all passed\x07\x1b[32mbad\n  patch.flat.transmission passes pass\x1b[0m", flush=True)
+
+
+@before("residual", ends=LIKE_NTS)
+def print_100_megabytes() -> None:
+    """Print 100 MB at the first call."""
+    if next(_calls) == 1:
+        for _ in range(100):
+            os.write(1, b"x" * 2**20)
+
+
+@before("make", ends=LIKE_NTS)
+def print_in_make() -> None:
+    """Print in the factory."""
+    print("made", flush=True)
+
+
+@before("residual", ends=LIKE_NTS)
+def warn() -> None:
+    """Warn at each call, each time in other words, and log an error."""
+    warnings.warn(f"call {next(_calls)} \x1b[2J", RuntimeWarning, stacklevel=2)
+    logging.getLogger("plugin").error("an error \x1b[2J")
+
+
+@before("residual", ends=EITHER)
+def close_standard_streams() -> None:
+    """Close the file descriptors 0, 1 and 2."""
+    os.closerange(0, 3)
+
+
+@before("residual", ends=EITHER)
+def close_all_files() -> None:
+    """Close the file descriptors from 0 to 100, and so the line to the harness too."""
+    os.closerange(0, 101)
+
+
+@before("residual", ends=EITHER)
+def close_python_streams() -> None:
+    """Close Python's streams, so that a later print fails."""
+    for stream in (sys.stdout, sys.stderr, sys.stdin):
+        with suppress(Exception):
+            stream.close()
+
+
+@before("residual", ends=EITHER)
+def write_rubbish_everywhere() -> None:
+    """Write rubbish to every open file descriptor but the standard streams, and so to the harness."""
+    for number in range(3, MOST_FILES):
+        with suppress(OSError):
+            os.set_blocking(number, False)
+            os.write(number, b"\xff\x00rubbish" * 1000)
+        with suppress(OSError):
+            os.set_blocking(number, True)
+
+
+@before("residual", ends=EITHER)
+def announce_a_huge_answer() -> None:
+    """Write bytes to every open file descriptor that announce more than a message may hold."""
+    for number in range(3, MOST_FILES):
+        with suppress(OSError):
+            os.write(number, b"\xff\xff\xff\xff\xff\xff\xff\x7f")
+
+
+@before("residual", ends=EITHER)
+def read_everything() -> None:
+    """Read from every open file descriptor whatever is there, and so what the harness asks next."""
+    for number in range(3, MOST_FILES):
+        with suppress(OSError):
+            os.set_blocking(number, False)
+            os.read(number, 2**16)
+        with suppress(OSError):
+            os.set_blocking(number, True)
+
+
+@before("residual", ends=EITHER)
+def duplicate_the_output() -> None:
+    """Put standard output in the place of every other file descriptor."""
+    for number in range(3, 40):
+        with suppress(OSError):
+            os.dup2(1, number)

@@ -1,0 +1,117 @@
+"""Plugins whose pairings are no flat mapping from names to small integers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from hostile_kit import EITHER, answers
+
+from contactverif.contract.formulation import Pairing
+
+NUMBER_OF_NAMES = 200_000
+
+
+@answers("pair")
+def floats(answer: Any) -> Any:
+    """Answer a pairing that holds real numbers, so that the frozen part of the residual may be the whole."""
+    return {**answer, "gap": np.zeros(4)}
+
+
+@answers("pair", ends=EITHER)
+def floats_as_integers(answer: Any) -> Any:
+    """Answer a pairing that holds real numbers, bit by bit, in booleans."""
+    bits = np.unpackbits(np.frombuffer(np.float64(0.1).tobytes(), np.uint8)).astype(bool)
+    return {**answer, "bits": bits}
+
+
+@answers("pair")
+def too_large_numbers(answer: Any) -> Any:
+    """Answer a pairing with numbers that number nothing."""
+    return {**answer, "number": np.array([2**62])}
+
+
+@answers("pair", ends=EITHER)
+def huge(answer: Any) -> Any:
+    """Answer a pairing with an array of 1e9 entries that takes no memory."""
+    return {**answer, "huge": np.broadcast_to(np.int64(0), 10**9)}
+
+
+@answers("pair", ends=EITHER)
+def long_name(answer: Any) -> Any:
+    """Answer a pairing with a name of 20 MB."""
+    return {**answer, "x" * 20_000_000: np.zeros(1, np.int64)}
+
+
+@answers("pair", ends=EITHER)
+def many_names(answer: Any) -> Any:
+    """Answer a pairing with 200,000 names."""
+    return {**answer, **{f"name {number}": np.zeros(0, np.int64) for number in range(NUMBER_OF_NAMES)}}
+
+
+@answers("pair", ends=EITHER)
+def names_with_controls(answer: Any) -> Any:
+    """Answer a pairing with names that clear the terminal, hold NUL, or cannot be written as UTF-8."""
+    return {**answer, "\x1b[2J": np.zeros(1, np.int64), "\0": np.zeros(1, bool), "\ud800": np.zeros(1, bool)}
+
+
+@answers("pair")
+def number_as_name(answer: Any) -> Any:
+    """Answer a pairing with a name that is no string."""
+    return {**answer, 7: np.zeros(1, np.int64)}
+
+
+@answers("pair", ends=EITHER)
+def string_of_its_own(answer: Any) -> Any:
+    """Answer a pairing with a name that has another hash each time."""
+
+    class Name(str):
+        __slots__ = ()
+
+        def __hash__(self) -> int:
+            return id(object())
+
+    return {**answer, Name("name"): np.zeros(1, np.int64)}
+
+
+@answers("pair")
+def endless_mapping(answer: Any) -> Any:
+    """Answer a mapping that always has one more name."""
+
+    class Endless(Mapping[str, Any]):
+        def __getitem__(self, name: str) -> Any:
+            return np.zeros(2**10, np.int64)
+
+        def __iter__(self) -> Iterator[str]:
+            number = 0
+            while True:
+                number += 1
+                yield str(number)
+
+        def __len__(self) -> int:
+            return 1
+
+    return Endless()
+
+
+@answers("pair", ends=EITHER)
+def floats_after_the_check(answer: Any) -> Any:
+    """Answer a pairing into which floats were put after it had been checked."""
+    answer = Pairing(answer)
+    answer._arrays["gap"] = np.full(4, np.nan)
+    return answer
+
+
+@answers("pair")
+def list_of_arrays(answer: Any) -> Any:
+    """Answer a list instead of a mapping."""
+    return list(answer.values())
+
+
+@answers("pair")
+def within_itself(answer: Any) -> Any:
+    """Answer a pairing that contains itself."""
+    nested: dict[str, Any] = dict(answer)
+    nested["itself"] = nested
+    return nested

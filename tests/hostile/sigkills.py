@@ -1,0 +1,295 @@
+"""Kill runs of the command line with SIGKILL at random moments, resume them, and count what was lost.
+
+`python tests/hostile/sigkills.py 100` kills 100 times; `… 3 verify` kills `verify` three times. The moments come from a
+seed. Half of the kills hit the whole process group, half the first process alone.
+
+Cases that are asked again after a kill were lost. A plugin notes the states that it is asked about, so that they are
+counted without a look into the journal: each job may lose the case that it was judging.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from catalogue import install
+from reaper import adopt_orphans, descendants, kill_descendants
+
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import read_run
+
+SEED = 14
+MAIN = "from contactverif.cli import main; main()"
+GRACE = 5.0  # Seconds in which workers must see that the first process is gone.
+LINE = 32  # Bytes of a line of the plugin `counting`.
+HEADS = ("command", "kills", "resumed", "cases lost", "reports broken", "files left", "processes left", "seconds")
+_COUNTED = ("verify", "counting", "-p", "purity", "-p", "patch.flat.transmission", "--seed", "1", "--out", "report.nc")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that is killed.
+
+    Attributes
+    ----------
+    words : tuple[str, ...]
+        The command line.
+    resume : tuple[str, ...]
+        The command line that goes on; empty if there is none.
+    after : tuple[str, ...]
+        A command line that makes the report from what is there; empty if there is none.
+    jobs : int
+        The number of processes that judge; each may lose one case.
+    share : float
+        The share of the kills that hit this command.
+    compare : Callable[[Path, Path], list[str]]
+        Returns the differences of two folders, one of them from a run that was never killed.
+    """
+
+    words: tuple[str, ...]
+    resume: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    jobs: int = 1
+    share: float = 0.2
+    compare: Callable[[Path, Path], list[str]] = field(default=lambda a, b: same_data(a / "report.nc", b / "report.nc"))
+
+
+def _same_files(a: Path, b: Path) -> list[str]:
+    """Return the names of files that are not the same in both folders; a number of seconds in a page may differ."""
+    names = {path.relative_to(folder) for folder in (a, b) for path in folder.rglob("*.svg")}
+    return [str(name) for name in sorted(names) if not _equal(a / name, b / name)]
+
+
+def _equal(a: Path, b: Path) -> bool:
+    return a.exists() and b.exists() and a.read_bytes() == b.read_bytes()
+
+
+_SHARDED = (
+    "campaign",
+    "counting",
+    "-p",
+    "purity",
+    "--examples",
+    "300",
+    "--seed",
+    "1",
+    "--shard",
+    "1/2",
+    "--out",
+    "shards",
+)
+COMMANDS = {
+    "verify": Command((*_COUNTED, "--examples", "250", "--jobs", "1"), ("verify", "--resume", "report.nc"), share=0.3),
+    "verify -j2": Command(
+        (*_COUNTED, "--examples", "250", "--jobs", "2"), ("verify", "--resume", "report.nc"), jobs=2, share=0.2
+    ),
+    "campaign": Command(_SHARDED, _SHARDED, share=0.2, compare=lambda a, b: []),
+    "compare": Command(
+        ("compare", "nts-ar", "--against", "vts-ppt", "-p", "patch.flat.*", "--examples", "60", "--seed", "1",
+         "--out", "report.nc"), share=0.1,
+    ),
+    "bench": Command(
+        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--repeats", "1", "--out", "report.nc"),
+        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--repeats", "1", "--out", "report.nc"),
+        share=0.1, compare=lambda a, b: [],
+    ),
+    "paper": Command(("paper", "--out", "paper", "--jobs", "2"), jobs=2, share=0.1, compare=_same_files),
+}  # fmt: skip
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """Yield a folder that is deleted afterwards."""
+    folder = Path(tempfile.mkdtemp(prefix="kills-"))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def start(folder: Path, words: Sequence[str], notes: str) -> subprocess.Popen[bytes]:
+    """Start `contactverif` in a folder; the plugin `counting` notes what it is asked in the file `notes`."""
+    (folder / "tmp").mkdir(exist_ok=True)
+    here = folder / "here"
+    here.mkdir(exist_ok=True)
+    variables = os.environ | {
+        "PYTHONPATH": install(folder / "site", {"counting": "counting:make"}),
+        "CASES_ASKED": str(folder / notes),
+        "TMPDIR": str(folder / "tmp"),
+        "NO_COLOR": "1",
+    }
+    with (folder / f"{notes}.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-c", MAIN, *words],
+            cwd=here,
+            env=variables,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+
+
+def states(file: Path) -> list[bytes]:
+    """Return the states that a plugin noted, in order."""
+    data = file.read_bytes() if file.exists() else b""
+    return [data[at : at + LINE] for at in range(0, len(data) - LINE + 1, LINE)]
+
+
+@dataclass(frozen=True)
+class Unbroken:
+    """A run that was never killed: its folder, its seconds, and its exit status."""
+
+    folder: Path
+    seconds: float
+    status: int
+
+
+@cache
+def unbroken(name: str) -> Unbroken:
+    """Run a command to its end, once."""
+    folder = Path(tempfile.mkdtemp(prefix="kills-"))
+    start(folder, COMMANDS[name].words, "asked").wait()  # The first run compiles.
+    shutil.rmtree(folder)
+    folder.mkdir()
+    begin = time.monotonic()
+    status = start(folder, COMMANDS[name].words, "asked").wait()
+    return Unbroken(folder, time.monotonic() - begin, status)
+
+
+@cache
+def common_states() -> frozenset[bytes]:
+    """Return the states that every run asks about before its first case: those of two runs with other seeds."""
+    with scratch() as folder:
+        sets = []
+        for seed in ("2", "3"):
+            words = ("verify", "counting", "-p", "purity", "--examples", "5", "--seed", seed, "--jobs", "1")
+            start(folder, words, seed).wait()
+            sets.append(set(states(folder / seed)))
+        return frozenset(sets[0] & sets[1])
+
+
+@dataclass
+class Count:
+    """The results of some kills of a command."""
+
+    kills: int = 0
+    resumed: int = 0
+    n_lost: int = 0
+    broken: int = 0
+    files: int = 0
+    processes: int = 0
+    seconds: float = 0.0
+    remarks: list[str] = field(default_factory=list)
+
+
+def _broken_reports(folder: Path) -> list[str]:
+    """Return why reports cannot be read; a report that is not there is not broken."""
+    reasons = []
+    for path in folder.rglob("*.nc"):
+        if ".journal" in str(path.relative_to(folder)):
+            continue
+        try:
+            read_run(path)
+        except Exception as error:
+            reasons.append(f"{path.name}: {type(error).__name__}: {error}")
+    return reasons
+
+
+def kill_once(name: str, moment: float, group: bool, count: Count) -> None:
+    """Kill a command at a moment, look at what is there, resume it, and look again.
+
+    Parameters
+    ----------
+    name : str
+        The name of the command.
+    moment : float
+        The moment, as a share of the time of an unbroken run.
+    group : bool
+        Kill the whole process group, or only the first process.
+    count : Count
+        The counts, which are raised.
+    """
+    command, whole = COMMANDS[name], unbroken(name)
+    with scratch() as folder:
+        process = start(folder, command.words, "first")
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(moment * whole.seconds)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL) if group else process.kill()
+        process.wait()
+        count.kills += 1
+        end = time.monotonic() + GRACE
+        while descendants() and time.monotonic() < end:
+            time.sleep(0.05)
+        left = kill_descendants()
+        count.processes += len(left)
+        broken = [] if name == "bench" else _broken_reports(folder / "here")
+        count.remarks += [f"left: {line}" for line in left] + broken
+        count.broken += len(broken)
+        if command.resume:
+            _resume(name, folder, count)
+        elif process.returncode == whole.status:
+            count.broken += bool(command.compare(folder / "here", whole.folder / "here"))
+
+
+def _resume(name: str, folder: Path, count: Count) -> None:
+    """Go on with a run that was killed, and compare what comes out with an unbroken run."""
+    command, whole = COMMANDS[name], unbroken(name)
+    words = command.resume
+    if words[:2] == ("verify", "--resume") and not (folder / "here" / "report.nc.journal").exists():
+        words = command.words  # It was killed before it began, or after it had ended.
+    status = start(folder, words, "second").wait()
+    count.resumed += 1
+    twice = (set(states(folder / "first")) & set(states(folder / "second"))) - common_states()
+    # A case of `purity` asks about four states and one of the patch test about one: the case in flight of each job.
+    n_lost = max(0, len(twice) - 5 * command.jobs) if words == command.resume else 0
+    count.n_lost += n_lost
+    differs = ["no report"] if status != whole.status else command.compare(folder / "here", whole.folder / "here")
+    count.broken += bool(differs)
+    files = {path.name for path in (folder / "here").iterdir()} - {
+        path.name for path in (whole.folder / "here").iterdir()
+    }
+    count.files += len(files)
+    log = (folder / "second.log").read_text(errors="replace").strip()[-200:]
+    if n_lost or differs or files:
+        count.remarks.append(f"status {status}, {n_lost} lost, {differs[:1]}, {sorted(files)}: {log}")
+
+
+def main(kills: int, names: Sequence[str]) -> int:
+    """Kill, print the table, and return the exit status: 1 if anything was lost, broken or left behind."""
+    adopt_orphans()
+    chance = random.Random(SEED)
+    shares = {name: COMMANDS[name].share for name in names}
+    table = csv.writer(sys.stdout, lineterminator="\n")
+    table.writerow(HEADS)
+    bad = 0
+    for name in names:
+        count, begin = Count(), time.monotonic()
+        for number in range(max(1, round(kills * shares[name] / sum(shares.values())))):
+            kill_once(name, chance.random(), group=bool(number % 2), count=count)
+        seconds = f"{time.monotonic() - begin:.0f}"
+        table.writerow(
+            (name, count.kills, count.resumed, count.n_lost, count.broken, count.files, count.processes, seconds)
+        )
+        sys.stdout.flush()
+        for remark in count.remarks:
+            print(f"  {remark}", file=sys.stderr)
+        bad += count.n_lost + count.broken + count.files + count.processes
+        shutil.rmtree(unbroken(name).folder, ignore_errors=True)
+    return int(bad > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), sys.argv[2:] or list(COMMANDS)))
