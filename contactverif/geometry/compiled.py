@@ -1,6 +1,6 @@
 """The one place that knows the compiler: a typed `numba.njit`, so that mypy --strict still checks the kernels.
 
-Kernels are compiled at their first call and cached beside their source. `python_function` gives the Python function
+Kernels are compiled at their first call and cached beside their source (`kernel_store`). `python_function` gives the Python function
 back, for coverage and for tests that change a line of it. Where the environment variable NUMBA_DISABLE_JIT is 1 nothing
 is compiled: kernels are hundreds of times slower, and take every type that numpy has. A formulation then computes in
 ``numpy.longdouble`` if its constants have the precision of its state, too (`match_precision`).
@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray
+from contactverif.geometry.kernel_store import compile_stored
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -26,7 +27,7 @@ TAKES_LONGDOUBLE = not ARE_KERNELS_COMPILED and bool(_IS_LONGER)
 
 def compile_kernel(function: Kernel) -> Kernel:
     """Compile a function for the types of each call; division by zero gives infinity or NaN, as in numpy."""
-    return cast(Kernel, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    return cast(Kernel, compile_stored(function, nogil=True, error_model="numpy"))
 
 
 def compile_inline(function: Kernel) -> Kernel:
@@ -34,7 +35,7 @@ def compile_inline(function: Kernel) -> Kernel:
 
     A call that hands on an array costs two atomic operations. Use this for what a loop calls for each point.
     """
-    return cast(Kernel, numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
+    return cast(Kernel, compile_stored(function, error_model="numpy", forceinline=True))
 
 
 def python_function(function: Kernel) -> Kernel:

@@ -1,0 +1,88 @@
+"""The store of compiled kernels, beside their source or in the user's cache: damage in it never reaches a formulation.
+
+numba trusts its files. A truncated one raises an error where a kernel is called, as if the plugin had failed, and a
+changed one may crash the process. Here each file ends with a digest. A file whose digest is wrong counts as absent: the
+kernel is compiled again and the file is replaced. A store that cannot be written is no error either.
+
+Rule for the next editor: only this file knows the inside of numba's cache. Where a version of numba has another inside,
+kernels are stored as numba does it, unchecked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import IndexDataCacheFile
+
+_DIGEST = 32  # Bytes at the end of a file.
+
+
+class CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """The files of one kernel: an index and a file for each signature, each with its digest at the end."""
+
+    def load(self, key: Any) -> Any:
+        """Return what is stored for a signature; None if there is nothing, or it is damaged."""
+        name = self._load_index().get(key)
+        return None if name is None else _unpickle(Path(self._data_path(name)))
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store what was compiled for a signature; a store that cannot be written stays as it is."""
+        try:
+            super().save(key, data)
+        except OSError:
+            return
+
+    def _load_index(self) -> dict[Any, str]:
+        """Return {signature: name of its file}; nothing if the index is damaged or of another source."""
+        index = _unpickle(Path(self._index_path))
+        is_current = isinstance(index, tuple) and index[:2] == (self._version, self._source_stamp)
+        return index[2] if is_current else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._write(self._index_path, pickle.dumps((self._version, self._source_stamp, overloads)))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), self._dump(data))
+
+    def _write(self, path: str, content: bytes) -> None:
+        with self._open_for_write(path) as file:
+            file.write(content + hashlib.sha256(content).digest())
+
+
+def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
+    """Return the function compiled by numba, with its machine code in a store that is checked.
+
+    Parameters
+    ----------
+    function : Callable[..., Any]
+        The Python function.
+    **options : Any
+        The options of `numba.njit`, but for `cache`.
+    """
+    try:
+        dispatcher = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # No folder can be written: neither that of the source nor the user's cache.
+        return numba.njit(**options)(function)
+    files = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if type(files) is IndexDataCacheFile:
+        files.__class__ = CheckedFiles
+    return dispatcher
+
+
+def _unpickle(path: Path) -> Any:
+    """Return what a file holds; None if it is absent, cannot be read, or its digest is wrong."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    if hashlib.sha256(content[:-_DIGEST]).digest() != content[-_DIGEST:]:
+        return None
+    try:
+        return pickle.loads(content[:-_DIGEST])
+    except Exception:  # What was stored refers to a module that is not there any more.
+        return None
