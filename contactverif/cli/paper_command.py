@@ -42,15 +42,14 @@ def paper(
 
     if not out:  # as an unset variable of the shell gives it
         raise MisuseError("--out", "''", "the name of a folder")
-    if jobs is not None and jobs < 1:
-        raise MisuseError("--jobs", str(jobs), "at least 1")
     folder = Path(out).absolute()  # a plugin may change the working folder
     check_folder(folder)  # before the slow import of what computes
+    from contactverif.cli.console import say
     from contactverif.cli.progress import Bar
-    from contactverif.run.workers import CASES_A_WORKER, default_jobs, worker_pool
+    from contactverif.run.workers import CASES_A_WORKER, check_jobs, default_jobs, worker_pool
     from contactverif_paper import compute, steps
 
-    n_jobs = default_jobs(2 * CASES_A_WORKER) if jobs is None else jobs
+    n_jobs = default_jobs(2 * CASES_A_WORKER) if jobs is None else check_jobs(jobs)
     n_finished, n_planned = 0, steps()
     with worker_pool(n_jobs) as executor, Bar() as bar:
 
@@ -61,5 +60,5 @@ def paper(
 
         results = compute(report_step, executor=executor)
         paths = write(results, folder, report_step)
-    typer.echo(summary(results))
-    typer.echo(f"{len(paths)} files in {out}, to begin with: {Path(out) / paths[-1].name}")
+    say(summary(results))
+    say(f"{len(paths)} files in {out}, to begin with: {Path(out) / paths[-1].name}")

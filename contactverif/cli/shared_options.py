@@ -92,15 +92,13 @@ class WorkerOptions:
         Raises
         ------
         MisuseError
-            If it is less than 1.
+            If it is less than 1, or many times the number of cores.
         """
-        from contactverif.run.workers import default_jobs
+        from contactverif.run.workers import check_jobs, default_jobs
 
         if self.jobs is None:
             return default_jobs(n_formulations * n_properties * examples)
-        if self.jobs < 1:
-            raise MisuseError("--jobs", str(self.jobs), "at least 1")
-        return self.jobs
+        return check_jobs(self.jobs)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,8 @@ from typing import TypeVar
 
 from contactverif.contract.errors import MisuseError
 
+MOST_POINTS = 1000  # Virtual slave nodes, or Gauss points, on a slave segment.
+
 _Choice = TypeVar("_Choice")
 
 
@@ -47,10 +49,10 @@ def check_count(n: int, name: str = "n") -> int:
     Raises
     ------
     MisuseError
-        If n is no whole number of at least one.
+        If n is no whole number from 1 to 1000; with more points, arrays would not fit into memory.
     """
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise MisuseError(name, repr(n), "a whole number ≥ 1")
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_POINTS:
+        raise MisuseError(name, repr(n), f"a whole number from 1 to {MOST_POINTS}")
     return n
 
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
 
+MOST_EXAMPLES = 10**9
+
 
 @dataclass(frozen=True, slots=True)
 class Profile:
@@ -53,14 +55,14 @@ class Profile:
         Raises
         ------
         MisuseError
-            If there is less than one example, or the seed is negative.
+            If there is less than one example or more than a billion, or the seed is not from 0 to 2^63 − 1.
         """
         examples = self.examples if examples is None else examples
         seed = self.seed if seed is None else seed
-        if examples < 1:
-            raise MisuseError("examples", str(examples), "at least 1")
-        if seed is not None and seed < 0:
-            raise MisuseError("seed", str(seed), "a whole number ≥ 0")
+        if not 1 <= examples <= MOST_EXAMPLES:
+            raise MisuseError("examples", str(examples), f"at least 1, at most {MOST_EXAMPLES}")
+        if seed is not None and not 0 <= seed < 2**63:
+            raise MisuseError("seed", str(seed), "a whole number ≥ 0 and < 2^63")
         if seed is None:
             seed = secrets.randbelow(10**9) if fresh is None else fresh
         return replace(self, examples=examples, seed=seed)

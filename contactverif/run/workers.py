@@ -48,6 +48,20 @@ def default_jobs(planned: int) -> int:
     return max(1, min(usable_cores(), planned // CASES_A_WORKER))
 
 
+def check_jobs(jobs: int) -> int:
+    """Return the number of processes that the user wants.
+
+    Raises
+    ------
+    MisuseError
+        If it is less than 1, or more processes than help: they would fill the memory.
+    """
+    most = max(16, 4 * usable_cores())
+    if not 1 <= jobs <= most:
+        raise MisuseError("--jobs", str(jobs), f"at least 1, at most {most} on this machine")
+    return jobs
+
+
 @contextmanager
 def worker_pool(jobs: int) -> Iterator[Executor | None]:
     """Yield an executor with so many worker processes; None for one job, which the parent does itself.

@@ -209,7 +209,7 @@ MISTAKES = [
     (["nts", "--against", "nts"], r"--against: found nts, which is compared too; needed another formulation .*"),
     (["nts", "nts", "--against", "vts-ppt"], r"formulation: found nts 2 times; needed each of them once"),
     (["nts", "--against", "vts-ppt", "-p", "pach.*"], r"property: found 'pach.\*'; needed .*"),
-    (["nts", "--against", "vts-ppt", "--examples", "0"], r"--examples: found 0; needed at least 1"),
+    (["nts", "--against", "vts-ppt", "--examples", "0"], r"--examples: found 0; needed at least 1, at most 1000000000"),
     (["nts", "--against", "vts-ppt", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nightly"),
     (["nts", "--against", "vts-ppt", "--out", "no/r.nc"], r"--out: .* is no folder; needed a folder that exists"),
     (["nts", "--against", "vts-ppt", "--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),

@@ -84,5 +84,5 @@ def test_threads_change_no_bit(name: str, options: dict[str, Any], seed: int, mo
 
 
 def test_the_number_of_threads_is_checked() -> None:
-    with pytest.raises(MisuseError, match=r"threads: found 0; needed a whole number ≥ 1"):
+    with pytest.raises(MisuseError, match=r"threads: found 0; needed a whole number from 1 to 1000"):
         contactverif_nts.vts_ppt(penalty=8.0, threads=0)

@@ -141,7 +141,7 @@ def test_a_torn_line_is_cut_off_and_another_plan_is_refused(tmp_path: Path) -> N
     ("options", "message"),
     [
         ({"scenes": ["disk"]}, "--scene: found 'disk'; needed one of wavy, hertz, rings, kinked, random"),
-        ({"repeats": 0}, "--repeats: found 0; needed at least 1"),
+        ({"repeats": 0}, "--repeats: found 0; needed at least 1, at most 1000"),
         ({"n_random": -1}, "--random: found -1; needed at least 0"),
         ({"scenes": ["random"], "n_random": 0}, "--random: found 0 random scenes and no other"),
     ],

@@ -169,7 +169,7 @@ def test_what_becomes_of_a_row(author: pytest.Pytester, arguments: str, outcome:
         ("'good', known={'patch.zer': 'why'}", "known: found 'patch.zer'*nearest: patch.zero*"),
         ("'good', properties='patch.zero'", "*properties: found 'patch.zero'; needed a sequence*"),
         ("properties=('patch.zero',)", "*formulations: found (); needed names or factories, at least one*"),
-        ("'good', examples=0", "examples: found 0; needed at least 1"),
+        ("'good', examples=0", "examples: found 0; needed at least 1, at most 1000000000"),
     ],
 )
 def test_what_is_written_wrong_is_an_error_of_the_collection(

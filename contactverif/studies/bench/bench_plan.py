@@ -18,6 +18,7 @@ GRID: dict[str, tuple[tuple[int, ...], tuple[float, ...]]] = {
 }
 N_RANDOM = 24  # Random scenes of a full bench.
 QUICK_MESHES, QUICK_RANDOM = 2, 6  # Meshes of each scene, and random scenes, of a quick bench.
+MOST_REPEATS = 1000
 REPEATS = 7  # Repeats of each solution that are timed.
 
 
@@ -59,7 +60,7 @@ def make_plan(
     Raises
     ------
     MisuseError
-        If there is no such scene, or a number is too small.
+        If there is no such scene, or a number is too small or too large.
     """
     usual = QUICK_RANDOM if quick else N_RANDOM
     count = usual if n_random is None else n_random
@@ -81,7 +82,7 @@ def _check_numbers(scenes: Sequence[str], repeats: int, count: int) -> None:
     for scene in scenes:
         if scene not in SCENES:
             raise MisuseError("--scene", repr(scene), f"one of {', '.join(SCENES)}")
-    if repeats < 1:
-        raise MisuseError("--repeats", f"{repeats}", "at least 1")
+    if not 1 <= repeats <= MOST_REPEATS:
+        raise MisuseError("--repeats", f"{repeats}", f"at least 1, at most {MOST_REPEATS}")
     if count < 0:
         raise MisuseError("--random", f"{count}", "at least 0")

@@ -16,6 +16,7 @@ from contactverif.studies.queries.query_shapes import Shape
 from contactverif_reports.files import whole
 
 KINDS = (*PLAIN_KINDS, *HARD_KINDS)
+_MOST_QUERIES = 10**6
 _MOST_DRAWS = 1000  # Surfaces drawn in a row without a point of the kind; more is a mistake in the kind.
 
 
@@ -37,12 +38,13 @@ def make_queries(seed: int, number: int) -> tuple[Queries, list[ExactAnswer]]:
     Raises
     ------
     MisuseError
-        If the seed is negative or there are fewer queries than kinds.
+        If the seed is negative or large, or there are fewer queries than kinds or more than a million.
     """
-    if seed < 0:
-        raise MisuseError("seed", str(seed), "a number of at least 0")
-    if number < len(KINDS):
-        raise MisuseError("-n", str(number), f"at least {len(KINDS)}, one query of each kind")
+    if not 0 <= seed < 2**63:
+        raise MisuseError("seed", str(seed), "a number of at least 0, below 2^63")
+    if not len(KINDS) <= number <= _MOST_QUERIES:
+        needed = f"at least {len(KINDS)}, one query of each kind, and at most {_MOST_QUERIES}"
+        raise MisuseError("-n", str(number), needed)
     surfaces: list[Shape] = []
     queries: list[Query] = []
     answers: list[ExactAnswer] = []
