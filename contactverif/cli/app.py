@@ -30,6 +30,7 @@ from contactverif.cli.shared_options import spell_out_groups
 from contactverif.cli.stability_command import stability
 from contactverif.cli.verify_command import verify
 from contactverif.contract.errors import ContactverifError, MisuseError
+from contactverif.contract.foreign_text import name_line, one_line
 
 app = typer.Typer(
     help="Find out whether a contact formulation is right: random meshes, exact answers, small counterexamples.",
@@ -82,6 +83,7 @@ def _options_of_all_commands(
 
 def main() -> None:
     """Run the command `contactverif`; a user's mistake is one line and exit status 2, never a traceback."""
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # A terminal that has no ≤ shows a question mark.
             stream.reconfigure(errors="replace")
@@ -95,6 +97,17 @@ def main() -> None:
     sys.exit(status or 0)
 
 
+def _open_closed_streams() -> None:
+    """Replace a stream that the caller has closed (`>&-`); else the next file that is opened would get its number."""
+    null = os.open(os.devnull, os.O_RDWR)
+    while null <= 2:
+        null = os.dup(null)
+    os.close(null)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115, since it stays open to the end
+
+
 def _exit_status(error: Exception) -> int:
     """Return the exit status for an error, after one line about it; raise again what is a mistake of the harness."""
     match error:
@@ -106,12 +119,22 @@ def _exit_status(error: Exception) -> int:
             return _refuse(str(MisuseError(argument, error.found, error.needed)))
         case ContactverifError():
             return _refuse(str(error))
-        case OSError(errno=errno.ENOSPC | errno.EIO | errno.EDQUOT):
-            _discard_output()
-            return _refuse(f"the output cannot be written: {error.strerror}")
+        case OSError(strerror=str()) | MemoryError():
+            return _refuse(_words_of_machine(error))
         case typer.Abort():
             return _STOPPED
     return _refuse(_words_of_usage_error(error))
+
+
+def _words_of_machine(error: OSError | MemoryError) -> str:
+    """Return what the machine cannot do: a disk is full, a folder may not be entered, a name is too long."""
+    if isinstance(error, MemoryError):
+        return f"there is not enough memory for this command ({one_line(str(error)) or 'no number is known'})"
+    if error.errno in (errno.ENOSPC, errno.EIO, errno.EDQUOT) and error.filename is None:
+        _discard_output()
+        return f"the output cannot be written: {error.strerror}"
+    name = f"{name_line(os.fsdecode(error.filename))}: " if isinstance(error.filename, str | bytes) else ""
+    return f"{name}{error.strerror}"
 
 
 def _words_of_usage_error(error: Exception) -> str:
@@ -133,7 +156,7 @@ def _words_of_usage_error(error: Exception) -> str:
 def _refuse(reason: str) -> int:
     """Print the reason in one line."""
     if reason:
-        typer.echo(f"contactverif: {' '.join(reason.split())}", err=True)
+        typer.echo(f"contactverif: {one_line(' '.join(reason.split()))}", err=True)
     return _MISUSE
 
 

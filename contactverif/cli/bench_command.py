@@ -173,7 +173,7 @@ def _show(
 ) -> None:
     """Print a table for each scene, the sentences, and the names of the files."""
     from contactverif.cli.bench_tables import slowdown_sentence, slowdown_table, targets_table
-    from contactverif.cli.console import show
+    from contactverif.cli.console import say, show
     from contactverif_reports.bench.clocks import clock_sentences
     from contactverif_reports.bench.work_precision import cost_sentence
 
@@ -193,4 +193,4 @@ def _show(
         show(slowdown_sentence(changes))
     files.announce()
     if folder is not None:
-        typer.echo(f"pictures: {folder.name}")
+        say(f"pictures: {folder.name}")

@@ -1,4 +1,8 @@
-"""The terminal: how wide it is, how text is printed, how a table looks, and which colour a result has."""
+"""The terminal: how wide it is, how text is printed, how a table looks, and which colour a result has.
+
+Rule for the next editor: whatever a command prints goes through `show`, `show_as_it_is` or `say`, which let no control
+character of a plugin or a file reach the terminal.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,14 @@ import os
 import sys
 from typing import NoReturn
 
+import typer
 from rich import box
 from rich.console import Console, RenderableType
+from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
+from contactverif.contract.foreign_text import printable
 from contactverif.contract.result import Result
 
 STYLES = {  # Red only where the run fails by it. What a formulation states about itself is no news.
@@ -39,14 +46,31 @@ class _Console(Console):
 def show(content: RenderableType) -> None:
     """Print to standard output, as wide as the terminal, or wide enough where there is none."""
     width_is_known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    # Words of a plugin may hold square brackets, which are no markup.
-    console = _Console(width=None if width_is_known else _PIPE_WIDTH, highlight=False, markup=False)
-    console.print(content)
+    console = _console(None if width_is_known else _PIPE_WIDTH)
+    console.print(_clean(console, content))
 
 
 def show_as_it_is(text: Text) -> None:
     """Print without folding a line: a drawing, or a command that is to be copied."""
-    _Console(highlight=False, markup=False).print(text, soft_wrap=True)
+    console = _console(None)
+    console.print(_clean(console, text, soft_wrap=True), soft_wrap=True)
+
+
+def say(words: str, *, to_stderr: bool = False) -> None:
+    """Print words as they are, without folding a line."""
+    typer.echo(printable(words), err=to_stderr)
+
+
+def _console(width: int | None) -> _Console:
+    """Return a console for which words of a plugin are neither markup nor emoji, whatever brackets they hold."""
+    return _Console(width=width, highlight=False, markup=False, emoji=False)
+
+
+def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False) -> Segments:
+    """Return the lines of a table or text with their styles, and no control character in them."""
+    options = console.options.update(no_wrap=True, overflow="ignore") if soft_wrap else console.options
+    lines = console.render(content, options)
+    return Segments([Segment(printable(line.text), line.style) for line in lines if not line.is_control])
 
 
 def plain_table(title: str) -> Table:

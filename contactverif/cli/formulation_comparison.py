@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import typer
-
 from contactverif.cli.case_pictures import draw_outcome
 from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
-from contactverif.cli.console import show, show_as_it_is
+from contactverif.cli.console import say, show, show_as_it_is
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.shared_options import SamplingOptions, WorkerOptions
@@ -131,7 +129,7 @@ def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *
             show_as_it_is(mesh_text(differing, contest.reference.name))
         if folder is not None:
             for name in _draw_pictures(differing, contest, folder):
-                typer.echo(f"    picture: {folder.name / name}")
+                say(f"    picture: {folder.name / name}")
     rest = study.differing[MOST_MESHES:]
     if rest and folder is None and not on_a_page:
         ids = ", ".join(differing.info.id for differing in rest)

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import typer
-
 from contactverif.contract.errors import MisuseError
 
 REPORT = ".nc"
@@ -78,9 +76,11 @@ class OutputFiles:
 
     def announce(self) -> None:
         """Print the name of each file that was written, a line each."""
+        from contactverif.cli.console import say
+
         for suffix, label in LABELS.items():
             if suffix in self.names:
-                typer.echo(f"{label}: {self.names[suffix]}")
+                say(f"{label}: {self.names[suffix]}")
 
 
 @dataclass(frozen=True, slots=True)

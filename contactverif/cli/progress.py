@@ -14,7 +14,10 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from contactverif.contract.foreign_text import one_line
 from contactverif.run import runner
+
+_LONGEST = 120  # Characters beside the bar.
 
 
 class Bar:
@@ -23,7 +26,7 @@ class Bar:
     def __init__(self) -> None:
         console = Console(stderr=True)
         self._progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
@@ -68,4 +71,6 @@ class Bar:
             return
         if self._task is None:
             self._task = self._progress.add_task(description)
-        self._progress.update(self._task, description=description, completed=n_finished, total=n_planned)
+        self._progress.update(
+            self._task, description=one_line(description, _LONGEST), completed=n_finished, total=n_planned
+        )

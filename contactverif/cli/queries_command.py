@@ -39,8 +39,9 @@ def queries(
     """
     files = OutputFiles.check([out], (_TEXT,))
     path = files.paths[_TEXT]
+    from contactverif.cli.console import say
     from contactverif.studies.queries.query_making import exact_path, write_queries
 
     kinds = write_queries(path, seed, number)
-    typer.echo(f"queries: {out}, {number} of {kinds} kinds")
-    typer.echo(f"exact answers: {exact_path(out)}")
+    say(f"queries: {out}, {number} of {kinds} kinds")
+    say(f"exact answers: {exact_path(out)}")

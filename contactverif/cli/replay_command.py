@@ -41,7 +41,7 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
     from contactverif.cli.case_pictures import draw_outcome
-    from contactverif.cli.console import show
+    from contactverif.cli.console import say, show
     from contactverif.cli.counterexample_text import ending_lines, replay_table
     from contactverif.contract.property import Verdict
     from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
@@ -51,7 +51,7 @@ def replay(
     files = OutputFiles.check(out, PICTURES)
     if case is None:
         ids = case_ids(report)
-        typer.echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
+        say("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     example = read_case(report, case)
     subject = the_formulation(formulation or example.formulation)
@@ -59,9 +59,9 @@ def replay(
     outcome = judge_if_applicable(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written
         draw_outcome(subject, question, outcome, picture, argument="--out")
-    typer.echo(as_text(example.case))
+    say(as_text(example.case))
     show(replay_table(example, subject.name, outcome))
     for line in ending_lines(outcome):
-        typer.echo(line)
+        say(line)
     files.announce()
     raise typer.Exit(1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0)

@@ -6,11 +6,10 @@ import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-import typer
 from rich.table import Table
 
 from contactverif.cli.case_pictures import draw_outcome
-from contactverif.cli.console import plain_table, show
+from contactverif.cli.console import plain_table, say, show
 from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
@@ -111,7 +110,7 @@ def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFile
     subject, question = the_formulation((names or [stored.formulation])[0]), the_property(stored.property_id)
     outcome = judge_if_applicable(question, stored.case, subject)
     if not files.paths:
-        typer.echo(as_text(stored.case))
+        say(as_text(stored.case))
     for picture in files.pictures():
         draw_outcome(subject, question, outcome, picture, argument="--out")
     files.announce()
@@ -126,11 +125,11 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFile
     if scene.solutions:
         _write_files(scene, title, files)
     if not (scene.solutions and files.paths):
-        typer.echo(as_text(case))
+        say(as_text(case))
     if scene.solutions:
         show(solutions_table(scene))
     for line in _remarks(scene):
-        typer.echo(line)
+        say(line)
     if scene.solutions:
         files.announce()
     return not scene.failures

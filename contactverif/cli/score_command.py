@@ -56,7 +56,7 @@ def score(
       contactverif score queries.txt --built-in --at-most 20000
     """
     _check_one_source(program, answers, built_in)
-    from contactverif.cli.console import show
+    from contactverif.cli.console import say, show
     from contactverif.cli.score_tables import score_table, score_words
     from contactverif.studies.queries.query_file import read_exact, read_queries
     from contactverif.studies.queries.query_making import exact_path
@@ -68,7 +68,7 @@ def score(
     show(score_table(scores))
     show(score_words(scores))
     if at_most is not None and scores.total.wrong_per_million > at_most:
-        typer.echo(f"wrong decisions a million: {scores.total.wrong_per_million:.0f}, but --at-most {at_most:g}")
+        say(f"wrong decisions a million: {scores.total.wrong_per_million:.0f}, but --at-most {at_most:g}")
         raise typer.Exit(1)
 
 

@@ -146,6 +146,7 @@ def _draw_counterexample(
     folder: PictureFolder,
 ) -> None:
     from contactverif.cli.case_pictures import draw_outcome
+    from contactverif.cli.console import say
     from contactverif.contract.counterexample import case_id
     from contactverif.contract.property import Property
     from contactverif.contract.subject import Subject
@@ -154,7 +155,7 @@ def _draw_counterexample(
     question = next(item for item in questions if isinstance(item, Property) and item.id == example.property_id)
     name = f"{case_id(example.formulation, example.property_id)}.png"
     draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
-    typer.echo(f"    picture: {folder.name / name}")
+    say(f"    picture: {folder.name / name}")
 
 
 def select_names(names: list[str], every: bool) -> list[str]:

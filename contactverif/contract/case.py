@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import clean, name_line
 from contactverif.contract.interface import Interface, Surface
 
 _PREFIX = "parameter_"
@@ -77,7 +78,8 @@ class Case:
         object.__setattr__(self, "z", self._check_state())
         object.__setattr__(self, "penalty", _as_penalty(self.penalty))
         object.__setattr__(self, "seed", _as_seed(self.seed))
-        parameters = {name: freeze(values, np.float64) for name, values in self.parameters.items()}
+        clean(self, names=("name", "kind"))
+        parameters = {name_line(name): freeze(values, np.float64) for name, values in self.parameters.items()}
         object.__setattr__(self, "parameters", parameters)
 
     def _check_state(self) -> FloatArray:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contactverif.contract.case import Case
+from contactverif.contract.foreign_text import clean
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,9 @@ class CaseSummary:
     parameters: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
     kind: str = ""
+
+    def __post_init__(self) -> None:
+        clean(self, names=("name", "kind"))
 
     @classmethod
     def from_case(cls, case: Case) -> CaseSummary:

@@ -6,6 +6,7 @@ Each has an id that a shell takes as it is. It is spelled like formulation and p
 from __future__ import annotations
 
 import difflib
+import hashlib
 import re
 import shlex
 from collections.abc import Iterable, Sequence
@@ -15,6 +16,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Row, Run
+
+_LONGEST_FILE_NAME = 180  # File systems take 255 bytes, and a suffix and the mark of a temporary file are added.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +129,15 @@ def named_case_id(formulation: str, property_id: str, name: str) -> str:
 
 
 def typeable(name: str) -> str:
-    """Return the name with only letters, digits, `.`, `_` and `-`, which a shell and netCDF take as they are."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("-.") or "_"
+    """Return the name with only letters, digits, `.`, `_` and `-`, which a shell and netCDF take as they are.
+
+    A name that is too long for a file is cut; a digest of all of it keeps it apart from others that begin alike.
+    """
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("-.") or "_"
+    if len(plain) <= _LONGEST_FILE_NAME:
+        return plain
+    digest = hashlib.sha256(plain.encode()).hexdigest()[:12]
+    return f"{plain[:_LONGEST_FILE_NAME]}-{digest}"
 
 
 def distinct(names: Iterable[str]) -> list[str]:

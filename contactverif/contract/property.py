@@ -17,6 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.case_summary import CaseSummary
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import clean, refuse
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 
@@ -58,6 +59,11 @@ class Quantity:
         The reason for that formula.
     sense : Literal['at most', 'at least']
         The relation of value to tolerance in a pass.
+
+    Raises
+    ------
+    MisuseError
+        If the name or the unit is too long or cannot be shown.
     """
 
     name: str
@@ -65,6 +71,10 @@ class Quantity:
     tolerance: str
     reason: str
     sense: Literal["at most", "at least"] = "at most"
+
+    def __post_init__(self) -> None:
+        refuse("quantity", self.name, self.unit)
+        clean(self, lines=("tolerance", "reason"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +136,9 @@ class Measurement:
     idle: bool = False
     place: str = ""
 
+    def __post_init__(self) -> None:
+        clean(self, lines=("undecided", "broken", "place"))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PropertyInfo:
@@ -159,7 +172,7 @@ class PropertyInfo:
     Raises
     ------
     MisuseError
-        If one of the shares is not between 0 and 1.
+        If one of the shares is not between 0 and 1, or id, family or a kind is too long or cannot be shown.
     """
 
     id: str
@@ -173,6 +186,8 @@ class PropertyInfo:
     usual_undecided: float = field(default=NONE_UNDECIDED, kw_only=True)
 
     def __post_init__(self) -> None:
+        refuse("property", self.id, self.family, *self.kinds, *self.series, *self.series.values())
+        clean(self, lines=("summary",))
         for name in ("least_contact", "usual_undecided"):
             if not 0 <= getattr(self, name) <= 1:
                 raise MisuseError(f"{self.id}: {name}", f"{getattr(self, name)}", "a share from 0 to 1")
@@ -252,6 +267,9 @@ class Outcome:
     measurement: Measurement | None = None
     seconds: float = 0.0
     breach: bool = False
+
+    def __post_init__(self) -> None:
+        clean(self, lines=("reason",))
 
     @property
     def decided(self) -> bool:

@@ -16,6 +16,7 @@ from enum import StrEnum
 
 from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, key_of, percent, total
 from contactverif.contract.chance import exceeds
+from contactverif.contract.foreign_text import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
@@ -167,6 +168,9 @@ class Row:
     seconds: float = 0.0
     _tally: Tally | None = field(default=None, init=False, repr=False)
 
+    def __post_init__(self) -> None:
+        clean(self, names=("formulation",), lines=("known", "reason"))
+
     @property
     def property_id(self) -> str:
         """The id of the property."""
@@ -292,6 +296,9 @@ class NotLoaded:
     formulation: str
     reason: str
 
+    def __post_init__(self) -> None:
+        clean(self, names=("formulation",), lines=("reason",))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
@@ -316,6 +323,13 @@ class Run:
     provided: Mapping[str, Mapping[str, bool]] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
     opposite_signs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        provided = {name_line(name): parts for name, parts in self.provided.items()}
+        provenance = {name_line(name): one_line(value, LONGEST_FACT) for name, value in self.provenance.items()}
+        object.__setattr__(self, "provided", provided)
+        object.__setattr__(self, "provenance", provenance)
+        object.__setattr__(self, "opposite_signs", tuple(map(name_line, self.opposite_signs)))
 
     @property
     def formulations(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.foreign_text import describe_error, name_line
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
@@ -67,7 +68,7 @@ class Subject:
     """
 
     def __init__(self, name: str, make: Callable[..., Any]) -> None:
-        self.name = name
+        self.name = name_line(name)
         self._make = make
         plugin = _call_plugin("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
@@ -249,7 +250,7 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
     except (KeyboardInterrupt, ContractError):
         raise
     except BaseException as error:
-        raise PluginError(f"{method}: {type(error).__name__}: {error}") from error
+        raise PluginError(f"{method}: {describe_error(error)}") from error
 
 
 def _check_forces(verb: str, forces: Any, z: Array) -> Array:

@@ -20,6 +20,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Literal
 
 from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.foreign_text import LONGEST_NAME, describe_error, name_line
 from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
@@ -27,6 +28,9 @@ from contactverif.contract.subject import Subject
 
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
+
+_SHORT_NAME = f"at most {LONGEST_NAME} characters"
+_MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
@@ -168,6 +172,8 @@ def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
 
 def _load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
     """Return the object that the entry point refers to, or a NotLoaded."""
+    if name_line(name) != name:
+        return NotLoaded(name, f"its name is too long, or not of characters that can be shown; needed {_SHORT_NAME}")
     if len(entries) > 1:
         return NotLoaded(name, f"registered {len(entries)} times: {', '.join(map(_origin, entries))}")
     try:
@@ -175,7 +181,7 @@ def _load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        return NotLoaded(name, f"{type(error).__name__}: {error}")
+        return NotLoaded(name, describe_error(error))
 
 
 def _origin(entry: EntryPoint) -> str:
@@ -215,6 +221,7 @@ def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
 
 def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
     """Return `make(*, penalty)` for the text, with its options and its inner formulation filled in."""
+    _check_length(text)
     outer, slash, inner_text = text.partition("/")
     name, options = parse_name("formulation", outer, _FORM)
     installed = _entries_by_name(FORMULATIONS)
@@ -238,6 +245,14 @@ def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
     if isinstance(inner, NotLoaded):
         return NotLoaded(text, f"{inner_text}: {inner.reason}")
     return partial(make, **options, inner=inner)
+
+
+def _check_length(text: str) -> None:
+    """Refuse a name that is too long, or that has too many wrappers."""
+    if len(text) > LONGEST_NAME:
+        raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
+    if text.count("/") > _MOST_WRAPPERS:
+        raise MisuseError("formulation", f"{text.count('/')} wrappers in {text!r}", f"at most {_MOST_WRAPPERS}")
 
 
 def _load_inner(text: str) -> Callable[..., Any] | NotLoaded:

@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.contract.foreign_text import LONGEST_FACT, name_line, one_line
 
 RANDOM = "random"  # The scene of the performance profiles.
 SCENES = {
@@ -121,6 +122,16 @@ class BenchResults:
     remarks: Mapping[tuple[str, int], str]
     not_loaded: Mapping[str, str]
     provenance: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        cleaned = {
+            "formulations": tuple(map(name_line, self.formulations)),
+            "remarks": {(name_line(name), cell): one_line(text) for (name, cell), text in self.remarks.items()},
+            "not_loaded": {name_line(name): one_line(text) for name, text in self.not_loaded.items()},
+            "provenance": {name_line(name): one_line(text, LONGEST_FACT) for name, text in self.provenance.items()},
+        }
+        for attribute, value in cleaned.items():
+            object.__setattr__(self, attribute, value)
 
     @property
     def scenes(self) -> tuple[str, ...]:

@@ -134,7 +134,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
         ticks = [tick for tick in _COST_TICKS if low <= tick <= high]
         axes.set_xticks([*ticks, (places[0] * places[-1]) ** 0.5], [*map("{:g}".format, ticks), "never"])
         axes.minorticks_off()
-        axes.set_yticks(range(len(order)), order)
+        axes.set_yticks(range(len(order)), order, parse_math=False)
         axes.grid(color="0.92", linewidth=0.5)
         axes.set_xlabel(f"time to an error of {SENTENCE_TARGET:.0%} in the forces, {REFERENCE} = 1")
         figure.legend(loc="outside upper center", ncols=4, frameon=False, handletextpad=0.1, columnspacing=1.2)

@@ -17,6 +17,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Surface
 from contactverif_reports.draw.case_geometry import Course, Gaps
 from contactverif_reports.draw.lengths import format_number, unit_of
+from contactverif_reports.draw.plain_labels import save_plainly
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
 from contactverif_reports.files import whole
 
@@ -165,6 +166,6 @@ def save(figure: Figure, target: Path) -> None:
     metadata = {"Date": None} if suffix == ".svg" else {"Software": None}
     try:
         with matplotlib.rc_context({"svg.hashsalt": "contactverif"}), whole(target) as part:
-            figure.savefig(part, format=suffix[1:], dpi=150, metadata=metadata)
+            save_plainly(figure, part, format=suffix[1:], dpi=150, metadata=metadata)
     except OSError as error:
         raise MisuseError("path", f"{target}: {error.strerror}", "a file that can be written") from error

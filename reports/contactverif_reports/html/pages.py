@@ -19,6 +19,7 @@ from markupsafe import Markup
 
 from contactverif.contract.case_counts import percent
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result
 from contactverif_reports.files import check_writable, checked_name, whole
@@ -107,9 +108,11 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
     """
     import matplotlib
 
+    from contactverif_reports.draw.plain_labels import save_plainly
+
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "contactverif", "svg.fonttype": "none"}):
-        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+        save_plainly(figure, buffer, format="svg", transparent=True, metadata={"Date": None})
     root = ElementTree.fromstring(buffer.getvalue())
     _remove_strangers(root)
     _prefix_ids(root, "f" + hashlib.sha256(buffer.getvalue()).hexdigest()[:9])
@@ -135,6 +138,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_make_printable,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -142,6 +146,11 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
     environment.filters["percent"] = percent
     environment.globals["marks"] = {str(word): mark for word, mark in MARKS.items()}
     return environment
+
+
+def _make_printable(value: Any) -> Any:
+    """Return what a template puts into a page, without control characters; only `Markup` is of our own making."""
+    return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _remove_strangers(root: ElementTree.Element) -> None:

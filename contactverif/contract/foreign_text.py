@@ -1,0 +1,122 @@
+r"""Foreign text, made fit to be shown: what a plugin, a file or a command line brought may hold anything.
+
+An escape sequence in a name can clear a terminal, a line break can forge a line of a table, a message may have 20 MB.
+Here, and nowhere else, such text becomes harmless: control characters, lone surrogates and characters that nobody sees
+or that turn the direction of reading are spelled out (``\x1b``, ``\u202e``), and long text is cut.
+
+Rules for the next editor:
+
+- The classes of cases and results call `clean` or `refuse` in their constructors. So tables, pages, figures, file names
+  and pytest's texts get clean text, whether it comes from memory or from a file.
+- The terminal, pages and figures call `printable` for all that they show. It is the last guard, for text that came
+  another way.
+- Nothing here calls a method of an object that a plugin made, but for `str(error)`, which may raise.
+"""
+
+from __future__ import annotations
+
+import re
+
+from contactverif.contract.errors import MisuseError
+
+LONGEST_NAME = 200  # Characters of a name.
+LONGEST_LINE = 2000  # Characters of a message that are kept.
+LONGEST_MESSAGE = 1000  # Characters of the message of an exception, which is a part of a line.
+LONGEST_FACT = 20_000  # Characters of a fact about a run, such as its command.
+
+# Python calls these printable, but nobody sees them: joiners, fillers and selectors of variants.
+_UNSEEN = re.compile(
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+)
+_SPACES = frozenset(
+    "\n\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f"
+)  # Harmless, though Python does not print them.
+_BREAKS = re.compile(r"[ \t]*(?:\r?\n|\t)[ \t\r\n]*")
+
+
+def one_line(text: str, longest: int = LONGEST_LINE) -> str:
+    r"""Return foreign text as one line without control characters, cut where it is too long.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    longest : int
+        The number of characters after which it is cut; its length is stated behind the cut.
+
+    Examples
+    --------
+    >>> one_line("red: \x1b[31m, and\na second line")
+    'red: \\x1b[31m, and a second line'
+    >>> one_line("x" * 20_000_000, longest=5)
+    'xxxxx… (20000000 characters)'
+    """
+    plain = str.__str__(text)  # A subclass of str may have other methods.
+    if len(plain) <= longest and plain.isascii() and plain.isprintable():
+        return plain
+    line = printable(_BREAKS.sub(" ", plain[:longest].strip("\t\r\n")))
+    if len(plain) <= longest and len(line) <= longest:
+        return line
+    return f"{line[:longest]}… ({len(plain)} characters)"
+
+
+def name_line(text: str) -> str:
+    """Return a foreign name as `one_line` does, cut where a name is too long."""
+    return one_line(text, LONGEST_NAME)
+
+
+def printable(text: str) -> str:
+    """Return a text of any length in which every character can be shown; line breaks stay."""
+    plain = str.__str__(text)
+    if plain.replace("\n", "").isprintable() and (plain.isascii() or not _UNSEEN.search(plain)):
+        return plain
+    return "".join(map(_spell_out, plain))
+
+
+def describe_error(error: BaseException) -> str:
+    """Return class and message of an exception in one line, even if its own methods raise errors."""
+    kind = name_line(type.__dict__["__name__"].__get__(type(error)))  # A metaclass may have another `__name__`.
+    try:
+        message = str(error)
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
+        return f"{kind}, whose message cannot be read"
+    return f"{kind}: {one_line(message, LONGEST_MESSAGE)}"
+
+
+def clean(instance: object, *, names: tuple[str, ...] = (), lines: tuple[str, ...] = ()) -> None:
+    """Make attributes of a frozen dataclass fit to be shown; its constructor calls this.
+
+    Parameters
+    ----------
+    instance : object
+        The dataclass.
+    names, lines : tuple[str, ...]
+        The attributes that hold a name, or a line of words.
+    """
+    for attributes, longest in ((names, LONGEST_NAME), (lines, LONGEST_LINE)):
+        for attribute in attributes:
+            text = getattr(instance, attribute)
+            line = one_line(text, longest)
+            if line is not text:
+                object.__setattr__(instance, attribute, line)
+
+
+def refuse(argument: str, *names: str) -> None:
+    """Raise an error for a name that other parts refer to, so that it cannot be changed, if it cannot be shown.
+
+    Raises
+    ------
+    MisuseError
+        If a name is too long or holds a character that cannot be shown.
+    """
+    for name in names:
+        if name_line(name) != name:
+            raise MisuseError(argument, repr(name_line(name)), f"at most {LONGEST_NAME} characters that can be shown")
+
+
+def _spell_out(character: str) -> str:
+    if character in _SPACES or (character.isprintable() and not _UNSEEN.match(character)):
+        return character
+    return character.encode("unicode_escape").decode("ascii")
