@@ -59,7 +59,8 @@ REPORTS = (
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
-    "geometry": Room(("contract",), ("numpy", "numba", "scipy.sparse"), QUIET),
+    "kernel_store": Room((), ("numba",)),
+    "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     "foreign_files": Room(("contract",), ("numpy", "msgspec", "psutil")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),

@@ -1,9 +1,10 @@
 """The one place that knows the compiler: a typed `numba.njit`, so that mypy --strict still checks the kernels.
 
-Kernels are compiled at their first call and cached beside their source (`kernel_store`). `python_function` gives the Python function
-back, for coverage and for tests that change a line of it. Where the environment variable NUMBA_DISABLE_JIT is 1 nothing
-is compiled: kernels are hundreds of times slower, and take every type that numpy has. A formulation then computes in
-``numpy.longdouble`` if its constants have the precision of its state, too (`match_precision`).
+Kernels are compiled at their first call and cached beside their source (`kernel_store`). `python_function` gives the
+Python function back, for coverage and for tests that change a line of it. Where the environment variable
+NUMBA_DISABLE_JIT is 1 nothing is compiled: kernels are hundreds of times slower, and take every type that numpy has. A
+formulation then computes in ``numpy.longdouble`` if its constants have the precision of its state, too
+(`match_precision`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numba
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray
-from contactverif.geometry.kernel_store import compile_stored
+from contactverif.kernel_store.checked_files import compile_stored
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

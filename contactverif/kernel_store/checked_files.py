@@ -22,18 +22,18 @@ from numba.core.caching import IndexDataCacheFile
 _DIGEST = 32  # Bytes at the end of a file.
 
 
-class CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
+class CheckedFiles(IndexDataCacheFile):
     """The files of one kernel: an index and a file for each signature, each with its digest at the end."""
 
     def load(self, key: Any) -> Any:
         """Return what is stored for a signature; None if there is nothing, or it is damaged."""
         name = self._load_index().get(key)
-        return None if name is None else _unpickle(Path(self._data_path(name)))
+        return None if name is None else _unpickle(Path(self._data_path(name)))  # type: ignore[no-untyped-call]
 
     def save(self, key: Any, data: Any) -> None:
         """Store what was compiled for a signature; a store that cannot be written stays as it is."""
         try:
-            super().save(key, data)
+            super().save(key, data)  # type: ignore[no-untyped-call]
         except OSError:
             return
 
@@ -47,7 +47,7 @@ class CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
         self._write(self._index_path, pickle.dumps((self._version, self._source_stamp, overloads)))
 
     def _save_data(self, name: str, data: Any) -> None:
-        self._write(self._data_path(name), self._dump(data))
+        self._write(self._data_path(name), self._dump(data))  # type: ignore[no-untyped-call]
 
     def _write(self, path: str, content: bytes) -> None:
         with self._open_for_write(path) as file:

@@ -17,7 +17,7 @@ from contactverif.geometry.compiled import ARE_KERNELS_COMPILED
 
 pytestmark = pytest.mark.skipif(not ARE_KERNELS_COMPILED, reason="nothing is compiled")
 SOURCE = """
-from contactverif.geometry.kernel_store import compile_stored
+from contactverif.kernel_store.checked_files import compile_stored
 
 def add(a, b):
     return a + b

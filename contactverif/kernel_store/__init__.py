@@ -1,0 +1,1 @@
+"""The store of compiled kernels, whose files are checked before numba believes them."""
