@@ -8,6 +8,7 @@ and is said in terms of the options of the command line.
 
 from __future__ import annotations
 
+import sys
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -75,6 +76,7 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
         ]
     interface = _renumber(points, *(lines for lines, _ in oriented))
     check_facing(interface)
+    sys.stderr.write(mesh.warnings)
     return interface
 
 

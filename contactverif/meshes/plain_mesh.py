@@ -6,7 +6,6 @@ Rule for the next editor: whoever gets a `PlainMesh` may rely on every statement
 from __future__ import annotations
 
 import os
-import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
@@ -68,6 +67,8 @@ class PlainMesh:
         {key: for each block the number of each cell, shape (n_cells,)}, for the keys among `TAGS`.
     field_data : dict[str, tuple[int, int]]
         {name: number and dimension} of the physical groups of Gmsh.
+    warnings : str
+        What meshio prints.
     """
 
     points: FloatArray
@@ -75,6 +76,7 @@ class PlainMesh:
     cell_sets: dict[str, list[IntArray]]
     cell_data: dict[str, list[IntArray]]
     field_data: dict[str, tuple[int, int]]
+    warnings: str
 
 
 def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
@@ -101,7 +103,6 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
         raise MisuseError("--mesh", f"{name!r}, which meshio cannot read ({error})", needed) from error
     except (msgspec.DecodeError, ValueError) as error:
         raise MisuseError("--mesh", f"{name!r} with {error}", "a mesh whose parts fit each other") from error
-    sys.stderr.write(stored.warnings)
     return mesh
 
 
@@ -122,7 +123,7 @@ def _unpack(stored: _PackedMesh) -> PlainMesh:
     sets = {name: _whole(name, parts) for name, parts in stored.cell_sets.items()}
     data = {key: _whole(key, parts) for key, parts in stored.cell_data.items()}
     _check_data(cells, data)
-    return PlainMesh(points.astype(np.float64), cells, sets, data, stored.field_data)
+    return PlainMesh(points.astype(np.float64), cells, sets, data, stored.field_data, stored.warnings)
 
 
 def _check_data(cells: tuple[Block, ...], data: dict[str, list[IntArray]]) -> None:
