@@ -29,6 +29,9 @@ def replay(
 ) -> None:
     """Judge one stored counterexample again; without --case, list the ids.
 
+    A report names the formulation that failed, and this runs it. It says which
+    one, with which options, before it does.
+
     \bExit status
       0  the case does not fail any more
       1  the case fails again
@@ -43,6 +46,7 @@ def replay(
     from contactverif.cli.case_pictures import draw_outcome
     from contactverif.cli.console import say, show
     from contactverif.cli.counterexample_text import ending_lines, replay_table
+    from contactverif.cli.stored_formulation import announce_stored
     from contactverif.contract.property import Verdict
     from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
     from contactverif_reports.draw import as_text
@@ -54,7 +58,7 @@ def replay(
         say("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     example = read_case(report, case)
-    subject = the_formulation(formulation or example.formulation)
+    subject = the_formulation(formulation or announce_stored(example.formulation))
     question = the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written

@@ -11,6 +11,7 @@ from rich.table import Table
 from contactverif.cli.case_pictures import draw_outcome
 from contactverif.cli.console import plain_table, say, show
 from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
+from contactverif.cli.stored_formulation import announce_stored
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
@@ -63,7 +64,8 @@ def draw_scene_or_case(
         return _draw_solved(case, names, scene, files)
     stored = _read_stored(report, case_id)
     if has_bodies(stored.case):
-        return _draw_solved(stored.case, names or [stored.formulation], f"{case_id}: {stored.reason}", files)
+        names = names or [announce_stored(stored.formulation)]
+        return _draw_solved(stored.case, names, f"{case_id}: {stored.reason}", files)
     _draw_stored(stored, names, files)
     return True
 
@@ -107,7 +109,8 @@ def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFile
         raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
     if len(names) > 1:
         raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
-    subject, question = the_formulation((names or [stored.formulation])[0]), the_property(stored.property_id)
+    name = names[0] if names else announce_stored(stored.formulation)
+    subject, question = the_formulation(name), the_property(stored.property_id)
     outcome = judge_if_applicable(question, stored.case, subject)
     if not files.paths:
         say(as_text(stored.case))

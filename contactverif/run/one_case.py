@@ -5,11 +5,12 @@ from __future__ import annotations
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.run import judging
-from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.registry import load_formulation, load_properties, property_ids
 
 
 def the_formulation(name: str) -> Subject:
@@ -34,6 +35,8 @@ def the_property(property_id: str) -> Property:
     MisuseError
         If there is none, or it does not load.
     """
+    if property_id not in property_ids():  # A pattern is no id.
+        raise unknown_name_error("property", property_id, property_ids())
     (question,) = load_properties([property_id])
     if isinstance(question, NotLoaded):
         raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")

@@ -112,7 +112,7 @@ MISTAKES = [
     (["verify", "nts", "--out", "a.nc", "--out", "b.NC"], r"--out: found a.nc and b.NC; needed one file .* .nc"),
     (["verify", "nts", "--report", "nts.nc"], r"--report: found an option of an earlier version; needed --out.*"),
     (["verify", "nts", "--pictures", str(PUNCH)], r"--pictures: found .*punch.msh, which is no folder; needed .*"),
-    (["verify", "nts", "--mesh", "no.msh", "--slave", "a", "--master", "b"], r"--mesh: found 'no.msh', .*; needed .*"),
+    (["verify", "nts", "--mesh", "no.msh", "--slave", "a", "--master", "b"], r"--mesh: found no.msh, .*; needed .*"),
     (["verify", "nts", "--mesh", str(PUNCH), "--slave", "punch"], r"--master: found nothing; needed --master TAG, .*"),
     (["verify", "nts", "--mesh", str(PUNCH), "--master", "base"], r"--slave: found nothing; needed --slave TAG, .*"),
     (["verify", "nts", *ON_PUNCH[:-1], "bace"], r"--master: found 'bace', which is no group .*; needed 'base'\?.*"),
@@ -122,7 +122,7 @@ MISTAKES = [
     (["verify", "nts", "--flip"], r"--mesh: found none, but --flip; needed --mesh FILE, .*"),
     (["replay"], r"Missing argument 'REPORT'.* \(see contactverif replay --help\)"),
     (["replay", "no.nc"], r"REPORT: found no.nc, which does not exist; needed a report .*"),
-    (["replay", str(PUNCH)], r"REPORT: found .*punch.msh, which is no netCDF file .*; needed a report \(netCDF-4\)"),
+    (["replay", str(PUNCH)], r"REPORT: found .*punch.msh, which is no netCDF file.*; needed a report that .*"),
     (["replay", str(ROOT)], r"REPORT: found .*, which is a folder; needed a report .*"),
 ]  # fmt: skip
 

@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 from asking import Answer, Ask, asking
 
+from contactverif.cli.stored_formulation import announce_stored
+from contactverif.contract.errors import MisuseError
+from contactverif.run.one_case import the_property
+
 
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
@@ -107,3 +111,23 @@ def test_a_netcdf_file_of_something_else(ask: Ask, tmp_path: Path) -> None:
     answer = ask("report", path)
     assert answer.status == 2
     assert "a netCDF file of something else" in answer.err
+
+
+def test_what_a_report_names_is_said_before_it_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert announce_stored("two-pass/vts-me:n=4,area=reference") == "two-pass/vts-me:n=4,area=reference"
+    words = "the report names the formulation two-pass/vts-me, n = 4, area = 'reference'\n"
+    assert capsys.readouterr() == ("", words)
+    announce_stored("nts")
+    assert capsys.readouterr().err == "the report names the formulation nts, without options\n"
+
+
+@pytest.mark.parametrize("name", ["os.system", "two-pass/\x1b[31mevil", "vts-me/../x:n=4", "NTS", " "])
+def test_a_report_runs_nothing_that_is_not_installed(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(MisuseError, match=r"REPORT: found the formulation .*, which is not installed; needed"):
+        announce_stored(name)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_pattern_is_no_property() -> None:
+    with pytest.raises(MisuseError, match="property: found 'patch"):
+        the_property("patch.*")

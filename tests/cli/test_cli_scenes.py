@@ -238,7 +238,8 @@ def test_a_stored_interface_is_drawn_as_replay_does(ask: Ask, tmp_path: Path) ->
     case_id = "nts.patch.flat.transmission"
     files = {name: tmp_path / f"{name}.svg" for name in ("draw", "replay")}
     answer = ask("draw", report, "--case", case_id, "--out", files["draw"])
-    assert (answer.status, answer.out, answer.err) == (0, f"picture: {files['draw']}\n", "")
+    notice = "the report names the formulation nts, without options\n"
+    assert (answer.status, answer.out, answer.err) == (0, f"picture: {files['draw']}\n", notice)
     ask("replay", report, "--case", case_id, "--out", files["replay"])
     assert files["draw"].read_bytes() == files["replay"].read_bytes()
     assert "●─2─●─2─●───4───●───4───●" in ask("draw", report, "--case", case_id).out

@@ -17,7 +17,7 @@ from contactverif.meshes import plain_mesh
 from contactverif.meshes.mesh_file import read_interface
 from contactverif.meshes.plain_mesh import read_mesh
 
-N_FILES = 12  # Of each kind of damage.
+N_FILES = 12  # The number of files with each kind of damage.
 
 
 @pytest.fixture(scope="module")
