@@ -26,6 +26,7 @@ KINDS = {
     "prints": "hostile_output",
     "process": "hostile_process",
     "leaves": "hostile_leftovers",
+    "says": "hostile_messages",
     "cheats": "hostile_cheats",
 }
 # {name: (module, end, what it does)} of modules that act when they are imported, so that nobody imports them here.
@@ -64,12 +65,15 @@ class HostilePlugin:
         The end that a run with it must have, of `hostile_kit`.
     summary : str
         What it does, in one line.
+    verb : str
+        The method in which it does it.
     """
 
     name: str
     target: str
     ends: str
     summary: str
+    verb: str = "import"
 
     @property
     def kind(self) -> str:
@@ -84,7 +88,7 @@ def _plugins() -> dict[str, HostilePlugin]:
             if callable(make) and hasattr(make, "ends"):
                 name = f"{kind}-{function.replace('_', '-')}"
                 summary = (make.__doc__ or "").partition("\n")[0]
-                entries.append(HostilePlugin(name, f"{module}:{function}", make.ends, summary))
+                entries.append(HostilePlugin(name, f"{module}:{function}", make.ends, summary, make.verb))
         entries += [
             HostilePlugin(name, f"{target}:make", ends, summary)
             for name, (target, ends, summary) in AT_IMPORT.items()

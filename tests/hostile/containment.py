@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -31,12 +31,15 @@ from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
 OTHERS = ("nts", "vts-ppt")
-PROPERTIES = ("patch.flat.nodal", "patch.flat.transmission", "projection.place", "tangent.directional")
-# Plugins that answer by what is no argument are asked whether they do; that takes a second process of each formulation.
-PURE = (*PROPERTIES, "purity")
-EXAMPLES = 6
+PROPERTY = "balance.force"  # It asks for a pairing and a residual, and everybody promises it.
+# A further property for plugins of some kinds, and for those that act in some verbs.
+FOR_KINDS = {"process": "patch.flat.nodal", "cheats": "patch.flat.transmission", "inputs": "purity"}
+FOR_VERBS = {"tangent": "tangent.directional", "contact_points": "projection.place"}
+EXAMPLES = 4
 MODES = {"process": ("--isolation", "process", "--time-limit", "2", "--memory-limit", "1024"), "inline": ()}
-SECONDS = 90.0  # The longest run; one without a hostile plugin takes a few seconds.
+SECONDS = 300.0  # The longest run; one without a hostile plugin takes a few seconds.
+GROUP = 8  # Plugins of one run.
+ALONE = ("memory", "leaves", "says")  # Plugins of these kinds run alone.
 MEGABYTES = 4000  # The address space of a whole run, plugins included.
 MOST_OUTPUT = 100_000  # Bytes that the command may print.
 CHECKS = ("goes on", "others unchanged", "report complete", "exit status right", "nothing left", "output clean")
@@ -115,7 +118,8 @@ def scratch() -> Iterator[Path]:
 
 def questions(plugin: HostilePlugin) -> tuple[str, ...]:
     """Return the properties that a plugin is asked."""
-    return PURE if plugin.kind == "inputs" else PROPERTIES
+    more = {FOR_KINDS.get(plugin.kind), FOR_VERBS.get(plugin.verb)} - {None}
+    return PROPERTY, *sorted(str(name) for name in more)
 
 
 def verify(folder: Path, mode: str, properties: tuple[str, ...], *names: str) -> Finish:
@@ -203,41 +207,76 @@ def _status_is_right(plugin: HostilePlugin, run: Run, finish: Finish, alone: Run
     return ""
 
 
-def judge(plugin: HostilePlugin, mode: str) -> list[str]:
-    """Run one plugin; return the cells of its line."""
-    properties = questions(plugin)
+def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
+    """Run some plugins in one run, between the others; return {plugin: cells of its line}."""
+    properties = questions(plugins[0])
     alone = reference(mode, properties)
     with scratch() as folder:
-        finish = verify(folder, mode, properties, "nts", plugin.name, "vts-ppt")
+        finish = verify(folder, mode, properties, "nts", *(plugin.name for plugin in plugins), "vts-ppt")
         run, remark = _read(finish)
-        remarks = [remark] if remark else []
+        text = finish.output + finish.errors
+        clean = len(text) < MOST_OUTPUT * len(plugins) and not CONTROL.search(text.replace(b"\r\n", b"\n"))
         ended = finish.status in (0, 1) and b"Traceback" not in finish.errors
-        unchanged = complete = right = False
-        result = ""
-        if run is not None:
-            changes = [line for name in OTHERS for line in differences(only(run, name, name), only(alone, name, name))]
-            unchanged, complete, result = (
-                not changes,
-                _is_complete(run, plugin.name, properties),
-                _result(run, plugin.name),
-            )
-            wrong = _status_is_right(plugin, run, finish, alone)
-            right = not wrong
-            remarks += [*changes[:1], *([wrong] if wrong else [])]
-        elif plugin.ends == STOPS:  # Nobody can go on without the parent; what counts is that no report is broken.
-            ended, right = finish.status is not None, finish.status not in (0, None)
-            unchanged = complete = remark == "no report"
+        remarks = [remark] if remark else []
         if finish.status is None:
             remarks.append(f"no end within {SECONDS:g} s")
         if not ended:
             remarks.append(finish.errors.decode(errors="replace").strip()[-100:])
-        text = finish.output + finish.errors
-        clean = len(text) < MOST_OUTPUT and not CONTROL.search(text.replace(b"\r\n", b"\n"))
-        remarks += finish.left[:2]
-        verdicts = (ended, unchanged, complete, right, not finish.left, clean)
-    status = "" if finish.status is None else str(finish.status)
-    words = [plain(result)[:120], plain("; ".join(remarks))[:200]]
-    return [f"{finish.seconds:.1f}", status, *("yes" if verdict else "no" for verdict in verdicts), *words]
+        lines = {}
+        for plugin in plugins:
+            more: list[str] = []
+            answers, result = (False, False, False), ""
+            if run is not None:
+                answers, result, more = _look(plugin, run, finish, alone)
+            elif plugin.ends == STOPS:  # Nobody can go on without the parent; what counts is that no report is broken.
+                ended, answers = finish.status is not None, (True, True, finish.status not in (0, None))
+            verdicts = (ended, *answers, not finish.left, clean)
+            status = "" if finish.status is None else str(finish.status)
+            words = [plain(result)[:120], plain("; ".join([*remarks, *more, *finish.left[:2]]))[:200]]
+            seconds = f"{finish.seconds / len(plugins):.1f}"
+            lines[plugin.name] = [seconds, status, *("yes" if verdict else "no" for verdict in verdicts), *words]
+        return lines
+
+
+def _look(
+    plugin: HostilePlugin, run: Run, finish: Finish, alone: Run
+) -> tuple[tuple[bool, bool, bool], str, list[str]]:
+    """Return what the report says: (others unchanged, report complete, exit status right), the verdict, remarks."""
+    changes = [line for name in OTHERS for line in differences(only(run, name, name), only(alone, name, name))]
+    complete = _is_complete(run, plugin.name, questions(plugin))
+    wrong = _status_is_right(plugin, run, finish, alone)
+    return (not changes, complete, not wrong), _result(run, plugin.name), [*changes[:1], *([wrong] if wrong else [])]
+
+
+@cache
+def groups() -> dict[str, tuple[HostilePlugin, ...]]:
+    """Return {plugin: the plugins that run together with it}: those that must end alike and are asked the same.
+
+    Whatever one of a group does to the run, all of them are blamed for; then each runs alone. So a group without a
+    blame says as much as its plugins one by one.
+    """
+    alike: dict[tuple[object, ...], list[HostilePlugin]] = {}
+    for plugin in PLUGINS.values():
+        alone = plugin.name if plugin.kind in ALONE or plugin.ends == STOPS else ""
+        alike.setdefault((plugin.ends, questions(plugin), alone), []).append(plugin)
+    chunks = [tuple(same[at : at + GROUP]) for same in alike.values() for at in range(0, len(same), GROUP)]
+    return {plugin.name: chunk for chunk in chunks for plugin in chunk}
+
+
+@cache
+def _judged_together(names: tuple[str, ...], mode: str) -> dict[str, list[str]]:
+    return judge([PLUGINS[name] for name in names], mode)
+
+
+def cells(key: str) -> list[str]:
+    """Return the cells of a key such as `process/dies-exit-0`."""
+    mode, _, name = key.partition("/")
+    if mode == "process":
+        names = tuple(plugin.name for plugin in groups()[name])
+        lines = _judged_together(names, mode)
+        if len(names) > 1 and all(set(line[2 : 2 + len(CHECKS)]) == {"yes"} for line in lines.values()):
+            return lines[name]
+    return judge([PLUGINS[name]], mode)[name]
 
 
 def plain(text: str) -> str:
@@ -246,14 +285,9 @@ def plain(text: str) -> str:
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
-def cells(key: str) -> list[str]:
-    """Return the cells of a key such as `process/dies-exit-0`."""
-    mode, _, name = key.partition("/")
-    return judge(PLUGINS[name], mode)
-
-
 if __name__ == "__main__":
     from tables import fill
 
     processes = int(sys.argv[1]) if len(sys.argv) > 1 else 1
-    fill("hostile.csv", HEADS, [f"{mode}/{name}" for mode in MODES for name in PLUGINS], cells, processes=processes)
+    names = [name for chunk in dict.fromkeys(groups().values()) for name in (plugin.name for plugin in chunk)]
+    fill("hostile.csv", HEADS, [f"{mode}/{name}" for mode in MODES for name in names], cells, processes=processes)

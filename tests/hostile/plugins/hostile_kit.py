@@ -77,7 +77,7 @@ def instead(verb: str, *, ends: str = CAUGHT) -> Callable[[Act], Factory]:
             return HostileNts(penalty, {verb: act})
 
         make.__name__, make.__doc__, make.__module__ = act.__name__, act.__doc__, act.__module__
-        make.__dict__["ends"] = ends
+        make.__dict__.update(ends=ends, verb=verb)
         return make
 
     return decorate
