@@ -10,6 +10,7 @@ import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.shared_options import (
+    IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
@@ -44,6 +45,7 @@ def compare(
     ] = None,
     place: PlaceOptions,
     workers: WorkerOptions,
+    isolation: IsolationOptions,
 ) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
 
@@ -83,7 +85,7 @@ def compare(
     folder = PictureFolder.make(pictures)
     from contactverif.cli.formulation_comparison import compare_formulations, load_contest
 
-    contest = load_contest(names or [], reference, globs or ["*"])
+    contest = load_contest(names or [], reference, globs or ["*"], isolation.limits())
     promises_kept = compare_formulations(contest, sampling, workers, interface, scene, files, folder)
     raise typer.Exit(0 if promises_kept else 1)
 

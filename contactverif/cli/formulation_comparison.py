@@ -18,6 +18,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
@@ -48,7 +49,9 @@ class Contest:
         return next(item for item in self.properties if isinstance(item, Property) and item.id == differing.info.id)
 
 
-def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]) -> Contest:
+def load_contest(
+    names: Sequence[str], reference_name: str, globs: Sequence[str], limits: Limits | None = None
+) -> Contest:
     """Load the formulations and the properties.
 
     Parameters
@@ -59,6 +62,8 @@ def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]
         The formulation to compare them with.
     globs : Sequence[str]
         Patterns of property ids.
+    limits : Limits | None
+        The limits of the processes in which the plugins live; None to load them in this process.
 
     Raises
     ------
@@ -70,12 +75,12 @@ def load_contest(names: Sequence[str], reference_name: str, globs: Sequence[str]
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
     properties = load_properties(globs)
     try:
-        reference = load_formulation(reference_name)
+        reference = load_formulation(reference_name, limits)
     except MisuseError as error:
         raise MisuseError("--against", error.found, error.needed) from None
     if isinstance(reference, NotLoaded):
         raise MisuseError("--against", f"{reference_name}, which does not load ({reference.reason})", "one that loads")
-    return Contest(reference, [load_formulation(name) for name in names], properties)
+    return Contest(reference, [load_formulation(name, limits) for name in names], properties)
 
 
 def compare_formulations(

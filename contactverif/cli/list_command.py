@@ -6,9 +6,13 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli.shared_options import IsolationOptions
+
 
 def list_installed(
+    *,
     traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
+    isolation: IsolationOptions,
 ) -> None:
     """List the installed formulations with their promises, and the properties.
 
@@ -26,5 +30,5 @@ def list_installed(
     from contactverif.cli.listing_tables import formulations_table, properties_table
     from contactverif.run.registry import load_formulations, load_properties
 
-    show(formulations_table(load_formulations(), every_trait=traits))
+    show(formulations_table(load_formulations(isolation.limits()), every_trait=traits))
     show(properties_table(load_properties()))

@@ -12,7 +12,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.contract.traits import Traits
-from contactverif.run.registry import Wrapper
+from contactverif.isolation.loading import Wrapper
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
     ("passes_normal_patch", "passes with node on node", "fails with node on node"),

@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.output_files import PICTURES, OutputFiles
-from contactverif.cli.shared_options import CaseId, ReportPath, complete_formulation
+from contactverif.cli.shared_options import CaseId, IsolationOptions, ReportPath, complete_formulation
 
 
 def replay(
+    *,
     report: ReportPath,
     case: CaseId = None,
     formulation: Annotated[
@@ -26,6 +27,7 @@ def replay(
         list[Path] | None,
         typer.Option("--out", help="Draw the case to FILE.png or FILE.svg. Repeatable.", metavar="FILE"),
     ] = None,
+    isolation: IsolationOptions,
 ) -> None:
     """Judge one stored counterexample again; without --case, list the ids.
 
@@ -58,7 +60,7 @@ def replay(
         say("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     example = read_case(report, case)
-    subject = the_formulation(formulation or announce_stored(example.formulation))
+    subject = the_formulation(formulation or announce_stored(example.formulation), isolation.limits())
     question = the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written

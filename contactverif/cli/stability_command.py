@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.output_files import MARKDOWN, PICTURES, REPORT, OutputFiles
-from contactverif.cli.shared_options import complete_formulation
+from contactverif.cli.shared_options import IsolationOptions, complete_formulation
 from contactverif.cli.verify_command import select_names
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 def stability(
+    *,
     names: Annotated[
         list[str] | None,
         typer.Argument(
@@ -33,6 +34,7 @@ def stability(
             metavar="FILE",
         ),
     ] = None,
+    isolation: IsolationOptions,
 ) -> None:
     """Draw error against condition number, to tell bad conditioning from bad rounding.
 
@@ -57,9 +59,10 @@ def stability(
     from contactverif.run.registry import load_formulation
     from contactverif.studies.stability_study import run_stability
 
-    all_names = select_names(names or [], all_)
+    limits = isolation.limits()
+    all_names = select_names(names or [], all_, limits)
     files = OutputFiles.check(out, (REPORT, *PICTURES, MARKDOWN))
-    subjects = [load_formulation(name) for name in all_names]
+    subjects = [load_formulation(name, limits) for name in all_names]
     with Bar() as bar:
         outputs = [str(name) for name in files.names.values()]
         result = run_stability(subjects, progress=bar.show_progress, outputs=outputs)

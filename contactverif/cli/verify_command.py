@@ -10,6 +10,7 @@ import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.shared_options import (
+    IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from contactverif.contract.property import Property
     from contactverif.contract.result import NotLoaded, Run
     from contactverif.contract.subject import Subject
+    from contactverif.isolation.limits import Limits
+
+LINES_OF_A_PLUGIN = 5
 
 
 def verify(
@@ -53,6 +57,7 @@ def verify(
     ] = None,
     place: PlaceOptions,
     workers: WorkerOptions,
+    isolation: IsolationOptions,
 ) -> None:
     """Check every property of a formulation: print a table, draw what fails.
 
@@ -76,7 +81,8 @@ def verify(
     from contactverif.run.runner import run
     from contactverif.run.workers import worker_pool
 
-    names = select_names(names or [], all_)
+    limits = isolation.limits()
+    names = select_names(names or [], all_, limits)
     files = OutputFiles.check(out, (REPORT, PAGE))
     folder = PictureFolder.make(pictures)
     scene = place.make_scene()
@@ -85,7 +91,7 @@ def verify(
     jobs = workers.number(len(names), len(matching_ids(properties or ["*"])), sampling.planned_examples())
     with worker_pool(jobs) as executor, Bar() as bar:
         questions = load_properties(properties or ["*"])
-        subjects = [load_formulation(name) for name in names]
+        subjects = [load_formulation(name, limits) for name in names]
         result = run(
             subjects,
             questions,
@@ -101,11 +107,24 @@ def verify(
     write_results(result, files)  # before anything is shown, so that nothing that was judged is lost
     show(RunTable(result))
     _show_counterexamples(result, subjects, questions, files, folder)
+    _show_what_plugins_printed()
     files.announce()
     if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
     show(summary(result))
     raise typer.Exit(0 if result.promises_kept else 1)
+
+
+def _show_what_plugins_printed() -> None:
+    """End the processes of the plugins, and show the last lines that each of them printed."""
+    from rich.text import Text
+
+    from contactverif.cli.console import show_as_it_is
+    from contactverif.isolation.host import end_all
+
+    for name, printed in end_all().items():
+        lines = printed.decode(errors="replace").splitlines()[-LINES_OF_A_PLUGIN:]
+        show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
 
 
 def write_results(result: Run, files: OutputFiles) -> None:
@@ -158,14 +177,14 @@ def _draw_counterexample(
     say(f"    picture: {folder.name / name}")
 
 
-def select_names(names: list[str], every: bool) -> list[str]:
+def select_names(names: list[str], every: bool, limits: Limits | None = None) -> list[str]:
     """Return the formulations that the user named, or all of them."""
     from contactverif.run.registry import formulation_names, standalone_names
 
     if every and names:
         raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")
     if every:
-        return list(standalone_names())
+        return list(standalone_names(limits))
     if not names:
         raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
     return names

@@ -48,6 +48,8 @@ class Subject:
         The promises of the formulation.
     provides : frozenset[str]
         The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
+    counts_multipliers : bool
+        The plugin has a method ``n_multipliers``.
 
     Raises
     ------
@@ -80,8 +82,32 @@ class Subject:
         self.provides = frozenset(
             part for part in OPTIONAL_PARTS + FAST_PARTS if callable(_call_plugin(part, getattr, plugin, part, None))
         )
+        self.counts_multipliers = _call_plugin("n_multipliers", getattr, plugin, "n_multipliers", None) is not None
         if "residual_and_tangent" in self.provides and "tangent" not in self.provides:
             raise ContractError("residual_and_tangent: the plugin has no `tangent`; needed both")
+
+    @classmethod
+    def of_parts(cls, name: str, make: Callable[..., Any], traits: Traits, provides: frozenset[str]) -> Subject:
+        """Return a formulation of which somebody else has asked what it promises and which optional parts it has."""
+        subject = object.__new__(cls)
+        subject.name, subject._make, subject.traits = name, make, traits
+        subject.provides = provides & frozenset(OPTIONAL_PARTS + FAST_PARTS)
+        subject.counts_multipliers = "n_multipliers" in provides
+        return subject
+
+    @property
+    def n_ended(self) -> int:
+        """The number of times that the process of the plugin has ended; 0 if it has none of its own."""
+        return int(getattr(self._make, "n_ended", 0))
+
+    def elsewhere(self) -> Subject | None:
+        """Return the same formulation in another process than this one's; None if it has no process of its own."""
+        make = getattr(self._make, "elsewhere", None)
+        return None if make is None else Subject.of_parts(self.name, make, self.traits, self._parts)
+
+    @property
+    def _parts(self) -> frozenset[str]:
+        return self.provides | ({"n_multipliers"} if self.counts_multipliers else frozenset())
 
     def penalty(self, case: Case) -> float:
         """Return the penalty of a case in the unit that the formulation takes.
@@ -144,6 +170,8 @@ class CheckedFormulation:
         self.plugin = plugin
         self._traits = traits
         self.provides = provides
+        # A plugin in a process of its own gets a whole batch, and the loop is there.
+        self._takes_batch = traits.batched or getattr(plugin, "loops", False) is True
         self._counts: dict[int, tuple[Interface, int]] = {}  # It holds the interfaces, so that no id is used again.
 
     def n_multipliers(self, interface: Interface) -> int:
@@ -185,7 +213,7 @@ class CheckedFormulation:
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
-        if z.ndim == 1 or self._traits.batched:
+        if z.ndim == 1 or self._takes_batch:
             return self._residual(interface, pairing, z)
         forces = np.empty_like(z)
         for index in np.ndindex(z.shape[:-1]):
@@ -250,7 +278,8 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
     except (KeyboardInterrupt, ContractError):
         raise
     except BaseException as error:
-        raise PluginError(f"{method}: {describe_error(error)}") from error
+        cause = "memory" if isinstance(error, MemoryError) else "exit" if isinstance(error, SystemExit) else "exception"
+        raise PluginError(f"{method}: {describe_error(error)}", cause) from error
 
 
 def _check_forces(verb: str, forces: Any, z: Array) -> Array:

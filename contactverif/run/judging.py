@@ -51,9 +51,8 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
             measurement = question.measure(case, subject)
             verdict, reason = judge(question, measurement)
     except PluginError as error:
-        kinds: dict[type, str] = {MemoryError: "memory", SystemExit: "exit"}
-        kind = kinds.get(type(error.__cause__), "exception")
-        return outcome(Verdict.CRASHED, f"{kind}: {error}")
+        verdict = Verdict.UNDECIDED if error.cause == "not asked" else Verdict.CRASHED
+        return outcome(verdict, f"{error.cause}: {error}")
     except NonFiniteError as error:
         return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
     except ContractError as error:

@@ -9,19 +9,27 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.isolation.limits import Limits
 from contactverif.run import judging
 from contactverif.run.registry import load_formulation, load_properties, property_ids
 
 
-def the_formulation(name: str) -> Subject:
+def the_formulation(name: str, limits: Limits | None = None) -> Subject:
     """Return the formulation of that name, with its options.
+
+    Parameters
+    ----------
+    name : str
+        The name as on the command line.
+    limits : Limits | None
+        The limits of a process of its own, in which the plugin lives; None to load it in this process.
 
     Raises
     ------
     MisuseError
         If there is none, or it does not load.
     """
-    subject = load_formulation(name)
+    subject = load_formulation(name, limits)
     if isinstance(subject, NotLoaded):
         raise MisuseError("formulation", f"{name}, which does not load ({subject.reason})", "one that loads")
     return subject

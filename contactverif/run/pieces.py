@@ -22,6 +22,7 @@ from contactverif.run.sign_check import has_opposite_sign
 from contactverif.scenes.named_states import named_case
 
 CHUNK = 25  # The number of drawn cases that are judged in one piece.
+SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
 
 Count = Callable[[int], None]  # It is called with the number of finished cases.
@@ -106,10 +107,12 @@ def shrink_case(
     source = sampling.source(question)
     assert source is not None
     smallest: Outcome | None = None
-    calls = 0
+    calls, ended = 0, subject.n_ended
 
     def fails(case: Case) -> bool:
         nonlocal smallest, calls
+        if subject.n_ended - ended >= SHRINK_ENDS:
+            return False
         calls += 1
         if count is not None:
             count(calls)

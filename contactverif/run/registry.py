@@ -13,7 +13,6 @@ import difflib
 import inspect
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -25,6 +24,8 @@ from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.loading import Wrapper, load_remote, survey
 
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
@@ -38,20 +39,8 @@ _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
 
-@dataclass(frozen=True, slots=True)
-class Wrapper:
-    """A formulation that works only around another one, `name/NAME`.
-
-    Attributes
-    ----------
-    name : str
-        The name of the entry point.
-    summary : str
-        The first line of the factory's docstring.
-    """
-
-    name: str
-    summary: str
+_LOADER = f"{__name__}:load_formulation"  # How a plugin's own process loads a name.
+_SURVEYOR = f"{__name__}:load_with_defaults"
 
 
 def formulation_names() -> tuple[str, ...]:
@@ -59,9 +48,19 @@ def formulation_names() -> tuple[str, ...]:
     return tuple(_entries_by_name(FORMULATIONS))
 
 
-def standalone_names() -> tuple[str, ...]:
-    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which."""
-    return tuple(name for name in formulation_names() if _load_wrapper(name) is None)
+def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
+    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which.
+
+    Parameters
+    ----------
+    limits : Limits | None
+        The limits of the process that loads them; None to load them in this one.
+    """
+    if limits is None:
+        return tuple(name for name in formulation_names() if _load_wrapper(name) is None)
+    names = formulation_names()
+    found = survey(_SURVEYOR, names, limits)
+    return tuple(name for name, item in zip(names, found, strict=True) if not isinstance(item, Wrapper))
 
 
 def property_ids() -> tuple[str, ...]:
@@ -69,13 +68,15 @@ def property_ids() -> tuple[str, ...]:
     return tuple(_entries_by_name(PROPERTIES))
 
 
-def load_formulation(text: str) -> Subject | NotLoaded:
+def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
     """Load the formulation that the text names, with its options.
 
     Parameters
     ----------
     text : str
         A name as on the command line, such as `vts-me:n=4`.
+    limits : Limits | None
+        The limits of a process of its own, in which the plugin lives; None to load it in this process.
 
     Returns
     -------
@@ -87,6 +88,8 @@ def load_formulation(text: str) -> Subject | NotLoaded:
     MisuseError
         If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
+    if limits is not None:
+        return load_remote(_LOADER, text, limits)
     make = _load_factory(text)
     return make if isinstance(make, NotLoaded) else subject_of(text, make)
 
@@ -119,9 +122,17 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
         return NotLoaded(name, str(error))
 
 
-def load_formulations() -> tuple[Subject | Wrapper | NotLoaded, ...]:
-    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
-    return tuple(_load_with_defaults(name) for name in formulation_names())
+def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
+    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`.
+
+    Parameters
+    ----------
+    limits : Limits | None
+        The limits of the process that loads them; None to load them in this one.
+    """
+    if limits is None:
+        return tuple(map(load_with_defaults, formulation_names()))
+    return tuple(survey(_SURVEYOR, formulation_names(), limits))
 
 
 def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded, ...]:
@@ -197,7 +208,8 @@ def _load_property(name: str) -> Property | NotLoaded:
     return NotLoaded(name, f"the entry point gives {description}; needed {needed}")
 
 
-def _load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
+def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
+    """Load what is installed under a name, with the defaults of its options."""
     wrapper = _load_wrapper(name)
     if wrapper is not None:
         return wrapper

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from contactverif.contract.errors import ContactverifError, MisuseError
+from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.packing import pack, unpack
 
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
@@ -79,7 +80,7 @@ def worker_pool(jobs: int) -> Iterator[Executor | None]:
         yield None
         return
     before = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin)
     try:
         yield pool
     except BaseException:
@@ -102,8 +103,10 @@ def _context() -> Any:
     return context
 
 
-def _ignore_interrupts() -> None:
+def _begin() -> None:
+    """Leave interrupts to the parent, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    die_with_parent()
 
 
 class Team:

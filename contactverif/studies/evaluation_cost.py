@@ -19,6 +19,7 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.isolation.remote_formulation import RemoteFormulation
 from contactverif_reports.compare.comparison import PARTS, Cost
 
 TURNS = 9  # The least number of turns that are timed.
@@ -102,14 +103,16 @@ class _Timer:
         pairing = formulation.pair(interface, z)
         times = {}
         if "pair" in provides:
-            times["pair"] = _seconds(lambda: plugin.pair(interface, z))
-        times["residual"] = _seconds(lambda: plugin.residual(interface, pairing, z))
+            times["pair"] = _seconds(plugin, lambda: plugin.pair(interface, z))
+        times["residual"] = _seconds(plugin, lambda: plugin.residual(interface, pairing, z))
         if "tangent" in provides:
-            times["tangent"] = _seconds(lambda: plugin.tangent(interface, pairing, z))
+            times["tangent"] = _seconds(plugin, lambda: plugin.tangent(interface, pairing, z))
         return times
 
 
-def _seconds(call: Callable[[], Any]) -> float:
+def _seconds(plugin: Any, call: Callable[[], Any]) -> float:
+    """Return the seconds of a call; where the plugin has a process of its own, those that it took there."""
     start = perf_counter()
     call()
-    return perf_counter() - start
+    seconds = perf_counter() - start
+    return plugin.seconds if isinstance(plugin, RemoteFormulation) else seconds

@@ -1,0 +1,275 @@
+"""The host of one formulation: the process that it lives in, and what the judge has sent there.
+
+Rules for the next editor: a question waits in a queue until its answer is needed, so that a pairing and the forces on
+it take one way there and back. What the judge has sent stays there until it is pushed out. A process that ended is
+started anew at the next question.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import Any
+
+from contactverif.contract.arrays import Array
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.messages import (
+    Answer,
+    Ask,
+    Failure,
+    Forget,
+    Load,
+    Loaded,
+    Make,
+    Reply,
+    Request,
+    Share,
+    SharePairing,
+    encode,
+    pack_array,
+)
+from contactverif.isolation.process import PluginProcess, end_marked
+
+_MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more,
+_MOST_HANGS = 5  # and after so many calls without an answer.
+_SHELF = 256  # The number of interfaces and pairings that a process keeps for further questions.
+_FORGET = 64  # The number of what can be forgotten before the process is told.
+_QUEUE = 16  # The number of questions that wait.
+_TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
+
+
+class Question:
+    """A question that was asked, and its answer once it is there."""
+
+    __slots__ = ("answer", "verb")
+
+    def __init__(self, verb: str) -> None:
+        self.verb = verb
+        self.answer: Reply | PluginError | None = None
+
+    def result(self) -> Answer:
+        """Return the answer.
+
+        Raises
+        ------
+        ContractError
+            If the plugin made an error, or its process ended.
+        """
+        match self.answer:
+            case Answer() as answer:
+                return answer
+            case PluginError() as error:
+                raise PluginError(str(error), error.cause, ended=error.ended)
+            case Failure() as failure:
+                raise_failure(failure)
+        raise PluginError(f"{self.verb}: a {type(self.answer).__name__} where an answer was needed", "channel")
+
+
+class Host:
+    """The process of one formulation, started when it is needed, and again when it has ended.
+
+    Parameters
+    ----------
+    loader : str
+        The function that loads a formulation of a name there, as ``"module:function"``.
+    name : str
+        The name of the formulation.
+    limits : Limits
+        The limits of the process.
+    elsewhere : bool
+        The process differs from the first one in its hash seed and its number of threads.
+
+    Attributes
+    ----------
+    methods : frozenset[str]
+        The optional methods that the formulation has, once it is loaded.
+    n_ended, n_hangs : int
+        The number of times that the process ended before it was told to, and of those because no answer came.
+    n_started : int
+        The number of times that it was started.
+    last_words : bytes
+        The end of what the process printed.
+    """
+
+    def __init__(self, loader: str, name: str, limits: Limits, *, elsewhere: bool) -> None:
+        self._load = Load(loader, name)
+        self._limits, self._elsewhere = limits, elsewhere
+        self._process: PluginProcess | None = None
+        self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
+        self._queue: list[Request] = []
+        self._asked: list[Question] = []
+        self._forgotten: list[int] = []
+        self._number = 0
+        self.methods: frozenset[str] = frozenset()
+        self.n_ended = self.n_hangs = self.n_started = 0
+        self.last_words = b""
+
+    def load(self) -> Reply:
+        """Start the process anew, and return what loading the formulation gave."""
+        self.end()
+        return self._start()
+
+    def _start(self) -> Reply:
+        """Start the process, load the formulation, and return what that gave."""
+        if self.n_ended >= _MOST_ENDS or self.n_hangs >= _MOST_HANGS:
+            words = f"no answer came {self.n_hangs} times" if self.n_hangs >= _MOST_HANGS else ""
+            raise PluginError(words or f"its process ended {self.n_ended} times", "not asked")
+        self._process = PluginProcess(self._limits, elsewhere=self._elsewhere)
+        self.n_started += 1
+        for kept in (self._shelf, self._queue, self._asked, self._forgotten):
+            kept.clear()
+        question = Question("import")
+        self._queue.append(self._load)
+        self._asked.append(question)
+        self.flush()
+        if isinstance(question.answer, PluginError | Failure):
+            question.result()
+        assert question.answer is not None
+        assert not isinstance(question.answer, PluginError)
+        if isinstance(question.answer, Loaded):
+            self.methods = frozenset(question.answer.provides)
+        return question.answer
+
+    def make(self, penalty: float) -> tuple[int, int]:
+        """Make a formulation there, and return its number and the number of the process."""
+        if self._process is None and not isinstance(self._start(), Loaded):
+            raise PluginError("import: it loaded before, and does not any more", "channel")
+        self._number += 1
+        self._queue.append(Make(self._number, penalty))
+        return self._number, self.n_started
+
+    def is_alive(self, started: int) -> bool:
+        """Return whether the process of this number is still the one that answers."""
+        return self._process is not None and started == self.n_started
+
+    def forget(self, number: int, started: int) -> None:
+        """Forget what is kept under a number, if the process is still the same."""
+        if self.is_alive(started):
+            self._forgotten.append(number)
+
+    def ask(
+        self, verb: str, formulation: int, interface: Interface, pairing: Pairing | None, z: Array | None
+    ) -> tuple[Question, int]:
+        """Put a question into the queue; return it, and the number under which the process keeps its answer.
+
+        Only pairings are kept.
+        """
+        if len(self._asked) >= _QUEUE:
+            self.flush()
+        of_interface = self._shared(interface)
+        of_pairing = None if pairing is None else self._shared(pairing)
+        self._number += 1
+        question = Question(verb)
+        packed = None if z is None else pack_array(z)
+        self._queue.append(Ask(verb, formulation, of_interface, of_pairing, packed, self._number))
+        self._asked.append(question)
+        return question, self._number
+
+    def keep(self, item: Interface | Pairing, number: int) -> None:
+        """Note that the process keeps something under a number."""
+        self._shelf[id(item)] = item, number
+        if len(self._shelf) > _SHELF:
+            _, (_, oldest) = self._shelf.popitem(last=False)
+            self._forgotten.append(oldest)
+
+    def _shared(self, item: Interface | Pairing) -> int:
+        """Return the number of something there, after a request to keep it if it is not there."""
+        if id(item) in self._shelf:
+            self._shelf.move_to_end(id(item))
+            return self._shelf[id(item)][1]
+        arrays = dict(item) if isinstance(item, Pairing) else None  # This may ask, so it comes before the number.
+        self._number += 1
+        number = self._number
+        if arrays is not None:
+            self._queue.append(SharePairing(number, {name: pack_array(array) for name, array in arrays.items()}))
+        else:
+            assert isinstance(item, Interface)
+            meshes = item.nodes, item.slave.segments, item.master.segments
+            self._queue.append(Share(number, *map(pack_array, meshes)))
+        self.keep(item, number)
+        return number
+
+    def flush(self) -> None:
+        """Send what waits in the queue, and give each question its answer."""
+        requests, questions = self._queue, self._asked
+        self._queue, self._asked = [], []
+        if len(self._forgotten) > _FORGET:
+            requests.append(Forget(self._forgotten))  # At the end, for a question that waits may need it.
+            self._forgotten = []
+        if self._process is None:
+            ended = PluginError(f"{questions[0].verb}: its process has ended", "channel") if questions else None
+            for question in questions:
+                question.answer = ended
+            return
+        try:
+            self._exchange([encode(request) for request in requests], requests, questions)
+        except PluginError as error:
+            for question in questions:
+                question.answer = error if question.answer is None else question.answer
+            self.n_ended += 1
+            self.n_hangs += error.cause == "hang"
+            self._note_output()
+            self._process = None
+
+    def _exchange(self, frames: Sequence[bytes], requests: Sequence[Request], questions: Sequence[Question]) -> None:
+        """Send frames and receive the answers: all together if they are small, else each answer before the next."""
+        assert self._process is not None
+        if sum(map(len, frames)) <= _TOGETHER:
+            self._process.send(questions[0].verb if questions else "make", frames)
+            for question in questions:
+                question.answer = self._process.receive(question.verb)
+            return
+        unanswered = iter(questions)
+        for frame, request in zip(frames, requests, strict=True):
+            self._process.send(questions[0].verb if questions else "make", [frame])
+            if isinstance(request, Ask | Load):
+                question = next(unanswered)
+                question.answer = self._process.receive(question.verb)
+
+    def _note_output(self) -> None:
+        if self._process is not None:
+            self.last_words = self._process.output.last or self.last_words
+
+    def end(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.end()
+            self._note_output()
+            self._process = None
+
+
+def raise_failure(failure: Failure) -> None:
+    """Raise the error that a plugin's process has told of."""
+    words = failure.words[0] if failure.words else "no words"
+    if failure.kind == "plugin":
+        raise PluginError(words, failure.cause)
+    if failure.kind == "not finite":
+        raise NonFiniteError(words)
+    if failure.kind == "misuse" and len(failure.words) == 3:
+        raise MisuseError(*failure.words)
+    raise ContractError(words)
+
+
+_HOSTS: dict[tuple[str, str, Limits, bool], Host] = {}
+
+
+def host_of(loader: str, name: str, limits: Limits, *, elsewhere: bool = False) -> Host:
+    """Return the host of a formulation in this process of the judge."""
+    key = loader, name, limits, elsewhere
+    if key not in _HOSTS:
+        _HOSTS[key] = Host(loader, name, limits, elsewhere=elsewhere)
+    return _HOSTS[key]
+
+
+def end_all() -> dict[str, bytes]:
+    """End the processes of all plugins, and return the last words that those of each name printed."""
+    for host in _HOSTS.values():
+        host.end()
+    if _HOSTS:
+        end_marked()
+    printed = {name: host.last_words for (_, name, _, _), host in _HOSTS.items() if host.last_words}
+    _HOSTS.clear()
+    return printed

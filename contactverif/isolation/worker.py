@@ -1,0 +1,234 @@
+"""The process of a plugin: it loads one formulation, and answers questions until its judge is gone.
+
+Rules for the next editor: nothing of the judge comes here, no expected answer and no other plugin. A plugin may do to
+this process what it likes, so the judge believes nothing that it says, and checks every answer again. Every answer is
+checked here first, so that an error has the same words as in the judge's own process.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import socket
+from collections.abc import Callable
+from dataclasses import fields
+from importlib import import_module
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.foreign_text import describe_error
+from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
+from contactverif.isolation.channel import Channel, ClosedError
+from contactverif.isolation.limits import MEGABYTE
+from contactverif.isolation.messages import (
+    Answer,
+    Ask,
+    Failure,
+    Forget,
+    Load,
+    Loaded,
+    Make,
+    PackedArray,
+    Reply,
+    Request,
+    Share,
+    SharePairing,
+    Survey,
+    Unloaded,
+    Wraps,
+    decode_request,
+    encode,
+    pack_array,
+    travels,
+    unpack_array,
+)
+from contactverif.isolation.parent_death import die_with_parent
+
+
+def main(end: int, memory: int) -> None:
+    """Answer the judge at the other end of a socket until it is closed.
+
+    Parameters
+    ----------
+    end : int
+        The file descriptor of the socket.
+    memory : int
+        The megabytes of address space that this process may take beyond what it has now.
+    """
+    die_with_parent()
+    faulthandler.enable()
+    _limit_memory(memory)
+    channel, desk = Channel(socket.socket(fileno=end)), Desk()
+    while True:
+        try:
+            data = channel.receive()
+        except ClosedError:
+            os._exit(0)  # What a plugin wants to do at the end of its process is not waited for.
+        reply = desk.reply(decode_request(data))
+        if reply is not None:
+            channel.send(encode(reply))  # At once, so that the judge knows which call has ended this process.
+
+
+def _limit_memory(megabytes: int) -> None:
+    """Limit the address space of this process, and write no image of it when it crashes. Windows has no such limits."""
+    try:
+        import resource
+    except ImportError:
+        return
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with open("/proc/self/statm") if os.path.exists("/proc/self/statm") else open(os.devnull) as file:
+        pages = int((file.read().split() or ["0"])[0])
+    limit = pages * resource.getpagesize() + megabytes * MEGABYTE
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    if most == resource.RLIM_INFINITY or limit < most:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+
+class Desk:
+    """What a plugin's process keeps: the formulation, and by number its instances, interfaces and pairings."""
+
+    def __init__(self) -> None:
+        self._subject: Subject | None = None
+        self._kept: dict[int, Any] = {}
+
+    def reply(self, request: Request) -> Reply | None:
+        """Return the reply to a request; None if it has none."""
+        try:
+            return self._reply(request)
+        except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
+            return _failure(error)
+
+    def _reply(self, request: Request) -> Reply | None:
+        match request:
+            case Ask():
+                return self._ask(request)
+            case Make(number, penalty):
+                self._kept[number] = self._made(penalty)
+            case Share(number, nodes, slave, master):
+                surfaces = (Surface(unpack_array(segments)) for segments in (slave, master))
+                self._kept[number] = Interface(unpack_array(nodes), *surfaces)
+            case SharePairing(number, arrays):
+                self._kept[number] = Pairing({name: unpack_array(array) for name, array in arrays.items()})
+            case Forget(numbers):
+                for number in numbers:
+                    self._kept.pop(number, None)
+            case Load(loader, name) | Survey(loader, name):
+                return self._load(loader, name)
+        return None
+
+    def _load(self, loader: str, name: str) -> Reply:
+        module, _, function = loader.partition(":")
+        load: Callable[[str], Any] = getattr(import_module(module), function)
+        found = load(name)
+        if isinstance(found, NotLoaded):
+            return Unloaded(found.reason)
+        if not isinstance(found, Subject):
+            return Wraps(str(found.summary))
+        self._subject = found
+        methods = found.provides | ({"n_multipliers"} if found.counts_multipliers else set())
+        return Loaded(_words_of_traits(found.traits), sorted(methods))
+
+    def _made(self, penalty: float) -> CheckedFormulation | Exception:
+        """Return the formulation with a penalty, or the error of its factory, which the first question is told."""
+        assert self._subject is not None
+        try:
+            formulation = self._subject.with_penalty(penalty)
+            formulation.plugin = Stopwatch(formulation.plugin)
+            return formulation
+        except Exception as error:
+            return error
+
+    def _ask(self, ask: Ask) -> Reply:
+        formulation: CheckedFormulation | Exception = self._kept[ask.formulation]
+        if isinstance(formulation, Exception):
+            raise formulation
+        interface: Interface = self._kept[ask.interface]
+        if ask.verb == "n_multipliers":
+            return Answer({}, 0.0, formulation.n_multipliers(interface))
+        assert ask.z is not None
+        z = unpack_array(ask.z)
+        if ask.verb == "pair":
+            pairing = formulation.pair(interface, z)
+            assert pairing is not None
+            self._kept[ask.keep] = pairing
+            return Answer({name: pack_array(array) for name, array in pairing.items()}, formulation.plugin.seconds)
+        pairing = None if ask.pairing is None else self._kept[ask.pairing]
+        answer = getattr(formulation, ask.verb)(interface, pairing, z)
+        return Answer(_PACKERS[ask.verb](answer), formulation.plugin.seconds)
+
+
+class Stopwatch:
+    """A plugin whose calls are timed: `seconds` is the time of the last call."""
+
+    def __init__(self, plugin: Any) -> None:
+        self._plugin = plugin
+        self.seconds = 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._plugin, name)
+
+        def timed(*arguments: Any) -> Any:
+            start = perf_counter()
+            answer = method(*arguments)
+            self.seconds = perf_counter() - start
+            return answer
+
+        return timed
+
+
+def _pack_residual(forces: np.ndarray[Any, Any]) -> dict[str, PackedArray]:
+    if not travels(forces):
+        raise ContractError(f"residual: returned dtype {forces.dtype}; needed one of numpy's usual ones")
+    return {"residual": pack_array(forces)}
+
+
+def _pack_tangent(tangent: Any) -> dict[str, PackedArray]:
+    if isinstance(tangent, np.ndarray):
+        return {"dense": pack_array(tangent)}
+    return {name: pack_array(getattr(tangent, name)) for name in ("row", "col", "data")}
+
+
+def _pack_both(answer: tuple[np.ndarray[Any, Any], Any]) -> dict[str, PackedArray]:
+    return _pack_residual(answer[0]) | _pack_tangent(answer[1])
+
+
+def _pack_points(points: ContactPoints) -> dict[str, PackedArray]:
+    return {entry.name: pack_array(getattr(points, entry.name)) for entry in fields(ContactPoints)}
+
+
+_PACKERS: dict[str, Callable[[Any], dict[str, PackedArray]]] = {
+    "residual": _pack_residual,
+    "tangent": _pack_tangent,
+    "residual_and_tangent": _pack_both,
+    "contact_points": _pack_points,
+}
+
+
+def _words_of_traits(traits: Traits) -> dict[str, Any]:
+    """Return the traits as words and numbers that travel. `Traits` is checked again at the other end."""
+    words = {entry.name: getattr(traits, entry.name) for entry in fields(Traits)}
+    words["dimensions"] = [int(number) for number in traits.dimensions]
+    for name in ("witnesses", "published_forces"):
+        words[name] = {str(key): str(value) for key, value in words[name].items()}
+    return words
+
+
+def _failure(error: BaseException) -> Failure:
+    """Return what the judge is told of an error."""
+    match error:
+        case PluginError():
+            return Failure("plugin", error.cause, (str(error),))
+        case NonFiniteError():
+            return Failure("not finite", "exception", (str(error),))
+        case ContractError():
+            return Failure("contract", "exception", (str(error),))
+        case MisuseError():
+            return Failure("misuse", "exception", (error.argument, error.found, error.needed))
+    return Failure("plugin", "exception", (f"its process: {describe_error(error)}",))

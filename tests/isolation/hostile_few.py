@@ -1,0 +1,123 @@
+"""A few plugins that a test asks in a process of their own, and the loader that finds them there."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+
+from contactverif import Subject
+from contactverif.run.registry import subject_of
+
+
+class Springs:
+    """Springs from the slave nodes to the line y = 0: right enough for a test of how answers travel."""
+
+    def __init__(self, *, penalty):
+        self.penalty = penalty
+
+    def pair(self, interface, z):
+        return {"active": z[1 : 2 * interface.n_slave_nodes : 2] < 0}
+
+    def residual(self, interface, pairing, z):
+        forces = np.zeros_like(z)
+        depths = slice(1, 2 * interface.n_slave_nodes, 2)
+        forces[..., depths] = self.penalty * np.where(pairing["active"], z[..., depths], 0)
+        return forces
+
+
+class RaisesInMake:
+    def __init__(self, *, penalty):
+        if penalty != 1.0:
+            raise ValueError("no other penalty")
+
+    def residual(self, interface, pairing, z):
+        return np.zeros_like(z)
+
+
+class Kills(Springs):
+    def residual(self, interface, pairing, z):
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Exits(Springs):
+    def residual(self, interface, pairing, z):
+        print("good bye")
+        sys.stdout.flush()
+        os._exit(0)
+
+
+class KillsInPair(Springs):
+    def pair(self, interface, z):
+        os.abort()
+
+
+class RaisesInPair(Springs):
+    def pair(self, interface, z):
+        raise RuntimeError("no pairing today")
+
+
+class Hangs(Springs):
+    def residual(self, interface, pairing, z):
+        time.sleep(1000)
+
+
+class TakesAll(Springs):
+    def residual(self, interface, pairing, z):
+        np.ones(10**12)
+
+
+class Forges(Springs):
+    """It writes rubbish to every open file of its process, so also to the line to the judge."""
+
+    def residual(self, interface, pairing, z):
+        for number in range(3, 50):
+            with contextlib.suppress(OSError):
+                os.write(number, b"\x03" + b"\x00" * 7 + b"abc" * 100)
+        return super().residual(interface, pairing, z)
+
+
+class TooLong(Springs):
+    """It promises an answer of an exabyte."""
+
+    def residual(self, interface, pairing, z):
+        for number in range(3, 50):
+            with contextlib.suppress(OSError):
+                os.write(number, b"\xff" * 6 + b"\x00" * 2)
+        time.sleep(1000)
+
+
+class Unspeakable(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+
+class RaisesUnspeakable(Springs):
+    def residual(self, interface, pairing, z):
+        raise Unspeakable
+
+
+class Shouts(Springs):
+    def residual(self, interface, pairing, z):
+        raise ValueError("x" * 20_000_000)
+
+
+class LeavesChildren(Springs):
+    """It starts a daemon in a session of its own."""
+
+    def residual(self, interface, pairing, z):
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                time.sleep(1000)
+            os._exit(0)
+        return super().residual(interface, pairing, z)
+
+
+def load(name: str) -> Subject:
+    """Return the formulation of a class above."""
+    return subject_of(name, globals()[name])

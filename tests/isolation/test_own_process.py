@@ -1,0 +1,150 @@
+"""A plugin in a process of its own: the same answers as here, and an error whatever it does."""
+
+from __future__ import annotations
+
+import pickle
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+from contactverif import Pairing, Subject, load_formulation, load_properties, named_case, verify
+from contactverif.contract.arrays import dense
+from contactverif.contract.errors import MisuseError, PluginError
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import NotLoaded
+from contactverif.isolation import host, process
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.loading import load_remote
+
+LOADER = "isolation.hostile_few:load"
+CASE = named_case("c")
+QUICK = Limits(seconds=20.0, memory=2000)
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left_behind():
+    yield
+    host.end_all()
+
+
+def ask(subject: Subject) -> None:
+    formulation = subject.for_case(CASE)
+    formulation.residual(CASE.interface, formulation.pair(CASE.interface, CASE.z), CASE.z)
+
+
+def test_every_answer_is_that_of_this_process() -> None:
+    near, far = (load_formulation("vts-ppt", limits).for_case(CASE) for limits in (None, Limits()))
+    interface, z = CASE.interface, CASE.z
+    pairings = near.pair(interface, z), far.pair(interface, z)
+    assert pairings[0] == pairings[1]
+    batch = np.array([[z, 1.001 * z]])
+    for name in ("residual", "tangent", "contact_points"):
+        ours, theirs = (getattr(f, name)(interface, p, z) for f, p in zip((near, far), pairings, strict=True))
+        if name == "contact_points":
+            ours, theirs = (np.concatenate([points.gap, points.pressure, points.xi]) for points in (ours, theirs))
+        assert np.array_equal(dense(ours), dense(theirs), equal_nan=True)
+    batches = [f.residual(interface, p, batch) for f, p in zip((near, far), pairings, strict=True)]
+    assert np.array_equal(*batches)
+    assert np.array_equal(far.residual(interface, pairings[0], z), far.residual(interface, pairings[1], z))
+
+
+def test_promises_and_parts_are_those_of_this_process() -> None:
+    for name in ("vts-ppt", "mortar-lm", "two-pass/nts-ar"):
+        near, far = load_formulation(name), load_formulation(name, Limits())
+        assert (far.traits, far.provides) == (near.traits, near.provides)
+        assert pickle.loads(pickle.dumps(far)).traits == near.traits
+
+
+def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
+    formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
+    pairing = formulation.pair(CASE.interface, CASE.z)
+    batch = np.array([CASE.z, 2 * CASE.z])
+    forces = formulation.residual(CASE.interface, pairing, batch)
+    assert np.array_equal(forces[1], formulation.residual(CASE.interface, pairing, 2 * CASE.z))
+
+
+@pytest.mark.parametrize(
+    ("name", "cause", "words"),
+    [
+        ("Kills", "signal", "residual: SIGSEGV ended its process"),
+        ("Exits", "exit", "residual: its process ended with status 0"),
+        ("KillsInPair", "signal", "pair: SIGABRT ended its process"),
+        ("RaisesInPair", "exception", "pair: RuntimeError: no pairing today"),
+        ("RaisesInMake", "exception", "make: ValueError: no other penalty"),
+        ("Hangs", "hang", "residual: no answer within 0.5 s"),
+        ("TakesAll", "memory", "residual: .*MemoryError"),
+        ("Forges", "channel", "residual: a message that cannot be read"),
+        ("TooLong", "memory", "residual: an answer of"),
+        ("RaisesUnspeakable", "exception", "residual: Unspeakable: its message cannot be made: RuntimeError"),
+        ("Shouts", "exception", r"residual: ValueError: x+ … \(20000000 characters\)"),
+    ],
+)
+def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words: str) -> None:
+    subject = load_remote(LOADER, name, QUICK)
+    if name in ("Hangs", "TooLong"):  # The import takes longer than such a limit.
+        subject._make.host._process._limits = Limits(seconds=0.1)
+    with pytest.raises(PluginError, match=words) as caught:
+        ask(subject)
+    assert caught.value.cause == cause
+    assert caught.value.ended is (cause not in ("exception",) and name != "TakesAll")
+
+
+def test_a_process_that_ended_is_started_again() -> None:
+    subject = load_remote(LOADER, "Kills", QUICK)
+    for times in (1, 2):
+        with pytest.raises(PluginError, match="SIGSEGV"):
+            ask(subject)
+        assert subject.n_ended == times
+    pairing = subject.for_case(CASE).pair(CASE.interface, CASE.z)
+    assert pairing["active"].dtype == np.bool_
+
+
+def test_one_that_always_ends_its_process_is_not_asked_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "_MOST_ENDS", 2)
+    (question,) = load_properties(["patch.flat.transmission"])
+    (row,) = verify([load_remote(LOADER, "Kills", QUICK)], [question], examples=20, seed=1).rows
+    reasons = [outcome.reason for outcome in row.outcomes]
+    assert row.verdict is Verdict.CRASHED
+    assert sum("SIGSEGV" in reason for reason in reasons) <= 2
+    assert reasons[-1] == "not asked: its process ended 2 times"
+
+
+def test_a_damaged_pairing_of_the_judge_is_refused_there_as_here() -> None:
+    formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
+    pairing = Pairing({"other": np.zeros(3, np.int64)})
+    with pytest.raises(PluginError, match="residual: KeyError: 'active'"):
+        formulation.residual(CASE.interface, pairing, CASE.z)
+
+
+def test_a_wrong_option_is_a_mistake_of_the_user() -> None:
+    with pytest.raises(MisuseError, match=r"option of .*: found .colour."):
+        load_formulation("vts-me:colour=red", QUICK)
+    with pytest.raises(MisuseError, match="formulation"):
+        load_formulation("no-such", QUICK)
+
+
+def test_a_formulation_that_cannot_be_imported_is_not_loaded() -> None:
+    assert isinstance(load_remote("isolation.hostile_few:load", "no_such_class", QUICK), NotLoaded)
+
+
+def test_nothing_it_started_is_left_behind() -> None:
+    ask(load_remote(LOADER, "LeavesChildren", QUICK))
+    marked = [p.pid for p in psutil.process_iter() if _is_marked(p)]
+    assert len(marked) >= 2
+    host.end_all()
+    time.sleep(0.1)
+    assert not [pid for pid in marked if psutil.pid_exists(pid) and psutil.Process(pid).status() != "zombie"]
+
+
+def _is_marked(item: psutil.Process) -> bool:
+    try:
+        return item.environ().get(process.MARK) == process._run
+    except (psutil.Error, OSError):
+        return False
+
+
+def test_limits_are_positive() -> None:
+    with pytest.raises(MisuseError, match="time limit: found 0"):
+        Limits(seconds=0)
