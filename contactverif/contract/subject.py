@@ -24,6 +24,8 @@ from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. Whoever has none lacks nothing.
+MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them,
+POINTS_A_SEGMENT = 1000  # and looks at each point in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
 
@@ -198,6 +200,8 @@ class CheckedFormulation:
         number = _call_plugin("n_multipliers", count, interface)
         if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < 0:
             raise ContractError(f"n_multipliers: returned {number!r}; needed an integer ≥ 0")
+        if number > (most := MULTIPLIERS_AN_UNKNOWN * interface.n_unknowns):
+            raise ContractError(f"n_multipliers: returned {int(number)}; needed at most {most} on this interface")
         return int(number)
 
     def pair(self, interface: Interface, z: FloatArray) -> Pairing | None:
@@ -251,6 +255,8 @@ class CheckedFormulation:
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
         counts = np.array([len(interface.slave), len(interface.master)])
+        if len(points.gap) > (most := POINTS_A_SEGMENT * int(counts.sum())):
+            raise ContractError(f"contact_points: {len(points.gap)} of them; needed at most {most} on this interface")
         for name, role in (("slave_segment", 0), ("master_segment", 1)):
             numbers, limits = (
                 getattr(points, name),

@@ -13,6 +13,7 @@ from typing import Any
 
 from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.foreign_text import one_line
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.isolation.limits import Limits
@@ -125,7 +126,9 @@ class Host:
         self._queue.append(self._load)
         self._asked.append(question)
         self.flush()
-        if isinstance(question.answer, PluginError | Failure):
+        if isinstance(question.answer, Failure):
+            raise_failure(question.answer, loading=True)
+        if isinstance(question.answer, PluginError):
             question.result()
         assert question.answer is not None
         assert not isinstance(question.answer, PluginError)
@@ -241,16 +244,16 @@ class Host:
             self._process = None
 
 
-def raise_failure(failure: Failure) -> None:
-    """Raise the error that a plugin's process has told of."""
-    words = failure.words[0] if failure.words else "no words"
+def raise_failure(failure: Failure, *, loading: bool = False) -> None:
+    """Raise the error that a plugin's process has told of. Only while it loads may it blame the user."""
+    words = [one_line(text) for text in failure.words[:3]] or ["no words"]
+    if failure.kind == "misuse" and loading and len(words) == 3:
+        raise MisuseError(*words)
     if failure.kind == "plugin":
-        raise PluginError(words, failure.cause)
+        raise PluginError(words[0], failure.cause if failure.cause in ("memory", "exit") else "exception")
     if failure.kind == "not finite":
-        raise NonFiniteError(words)
-    if failure.kind == "misuse" and len(failure.words) == 3:
-        raise MisuseError(*failure.words)
-    raise ContractError(words)
+        raise NonFiniteError(words[0])
+    raise ContractError(words[0])
 
 
 _HOSTS: dict[tuple[str, str, Limits, bool], Host] = {}

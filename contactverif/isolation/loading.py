@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from contactverif.contract.errors import ContractError, PluginError
+from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -103,19 +104,21 @@ def _found(name: str, factory: RemoteFactory, reply: Reply) -> Subject | Wrapper
     """Return what a process says that a name is."""
     match reply:
         case Unloaded(reason):
-            return NotLoaded(name, reason)
+            return NotLoaded(name, one_line(reason))
         case Wraps(summary):
-            return Wrapper(name, summary)
+            return Wrapper(name, one_line(summary))
         case Loaded(words, provides):
             return Subject.of_parts(name, factory, _traits(words), frozenset(provides))
         case Failure():
-            raise_failure(reply)
+            raise_failure(reply, loading=True)
     raise PluginError(f"import: a {type(reply).__name__} where a formulation was needed", "channel")
 
 
 def _traits(words: Mapping[str, Any]) -> Traits:
     """Return the traits that a plugin's process states, checked."""
     given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}
+    if isinstance(given.get("source"), str):
+        given["source"] = one_line(given["source"])
     try:
         return Traits(**given)
     except TypeError as error:

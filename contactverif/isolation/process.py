@@ -34,6 +34,7 @@ MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processe
 _run = uuid.uuid4().hex
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
+_LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in its own memory.
 _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
 _CODE = "import sys; sys.path[:] = {path!r}; from contactverif.isolation.worker import main; main({end}, {memory})"
@@ -70,7 +71,7 @@ class PluginProcess:
             start_new_session=True,
         )
         theirs.close()
-        self._channel = Channel(ours, largest=limits.memory * MEGABYTE)
+        self._channel = Channel(ours, largest=min(limits.memory, _LARGEST_ANSWER) * MEGABYTE)
         assert self._process.stdout is not None
         self.output = Output(self._process.stdout)
         self._known_verbs: set[str] = set()

@@ -77,8 +77,8 @@ def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
         ("TakesAll", "memory", "residual: .*MemoryError"),
         ("Forges", "channel", "residual: a message that cannot be read"),
         ("TooLong", "memory", "residual: an answer of"),
-        ("RaisesUnspeakable", "exception", "residual: Unspeakable: its message cannot be made: RuntimeError"),
-        ("Shouts", "exception", r"residual: ValueError: x+ … \(20000000 characters\)"),
+        ("RaisesUnspeakable", "exception", "residual: Unspeakable, whose message cannot be read"),
+        ("Shouts", "exception", r"residual: ValueError: x+… \(20000000 characters\)"),
     ],
 )
 def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words: str) -> None:
