@@ -17,7 +17,14 @@ if TYPE_CHECKING:
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
-    from contactverif.contract.formulation import ContactPoints, Formulation, Pairing, ResidualOnly, evaluate_both
+    from contactverif.contract.formulation import (
+        ContactPoints,
+        Formulation,
+        Handle,
+        Pairing,
+        ResidualOnly,
+        evaluate_both,
+    )
     from contactverif.contract.interface import Interface, Surface
     from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
@@ -43,7 +50,7 @@ _HOMES = {
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
-    "contract.formulation": ("ContactPoints", "Formulation", "Pairing", "ResidualOnly", "evaluate_both"),
+    "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
     "contract.property": ("Measurement", "Outcome", "Property", "Quantity", "Verdict"),
     "contract.result": ("Row", "Run"),
@@ -73,6 +80,7 @@ __all__ = [
     "ContractError",
     "End",
     "Formulation",
+    "Handle",
     "Interface",
     "Measurement",
     "MisuseError",

@@ -71,7 +71,9 @@ ROOMS = {
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil")),
     "run": Room(("contract", "scenes", "strategies", "isolation"), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
-    "studies": Room((*BELOW_RUN, "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis")),
+    "studies": Room(
+        (*BELOW_RUN, "foreign_files", "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis")
+    ),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
         ("contactverif", *BELOW_RUN, "isolation", "run", "studies", *REPORTS, "paper"),

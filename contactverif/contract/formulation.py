@@ -37,7 +37,8 @@ forces in the residual: −area · gap where a constraint is active, area · λ 
 decision λ − c gap ≥ 0; no solution may depend on it.
 
 Rules for the next editor: a `Pairing` holds integers and booleans only, so that the residual is a smooth function of
-the positions on a frozen pairing. Signs and words change here first, or not at all.
+the positions on a frozen pairing. One `Handle` is the exception, and nobody trusts such a pairing.
+Signs and words change here first, or not at all.
 """
 
 from __future__ import annotations
@@ -55,6 +56,31 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Handle:
+    """An object that a pairing carries and nobody but the plugin looks into, such as a collision set of a library.
+
+    Nobody can tell whether it hides real numbers. So a plugin whose pairing has a handle is judged as one without a
+    pairing: the harness pairs anew at each state that it asks at. The handle never leaves the process of the plugin.
+
+    Attributes
+    ----------
+    content : Any
+        The object. The harness passes it back, and does nothing else with it.
+
+    Examples
+    --------
+    A plugin returns a handle as one of the entries of its pairing, and finds its object in the attribute ``handle``:
+
+    >>> from contactverif import Handle, Pairing
+    >>> pairing = Pairing({"collisions": Handle("any object")})
+    >>> pairing.handle, len(pairing)
+    ('any object', 0)
+    """
+
+    content: Any
+
+
 class Pairing(Mapping[str, NDArray[Any]]):
     """The discrete decisions of a formulation at one state: who touches whom, as integers and booleans only.
 
@@ -63,18 +89,19 @@ class Pairing(Mapping[str, NDArray[Any]]):
 
     Every real number (ξ, the normal, the area of competence) is computed from the positions, never stored here. So the
     residual is a smooth function of the positions on a frozen pairing, and a finite difference shows a forgotten term.
-    A method ``pair`` may return a plain dict of arrays; the harness makes a `Pairing` of it.
+    A method ``pair`` may return a plain dict of arrays; the harness makes a `Pairing` of it. One of its values may be a
+    `Handle`, which is no entry of the mapping.
 
     Parameters
     ----------
-    arrays : Mapping[str, NDArray]
+    arrays : Mapping[str, NDArray | Handle]
         The arrays by name. Integers number something (a segment, a node, an unknown, an entry of a pattern); −1 stands
-        for nothing.
+        for nothing. At most one handle.
 
     Raises
     ------
     ContractError
-        If a value is no array of int64 or bool, or a name is no string.
+        If a value is no array of int64 or bool, a name is no string, or there are several handles.
 
     Examples
     --------
@@ -87,20 +114,37 @@ class Pairing(Mapping[str, NDArray[Any]]):
     Pairing(master_segment(3,), active(3,))
     """
 
-    __slots__ = ("_arrays",)
+    __slots__ = ("_arrays", "_handle")
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
         if not isinstance(arrays, Mapping):
             raise ContractError(f"pair: returned a {type(arrays).__name__}; needed a mapping from names to arrays")
         checked: dict[str, NDArray[Any]] = {}
+        handles = []
         for name, values in arrays.items():
             if not isinstance(name, str):
                 raise ContractError(f"pair: the name {name!r} is a {type(name).__name__}; needed a string")
+            if isinstance(values, Handle):
+                handles.append(values)
+                continue
             if not isinstance(values, np.ndarray) or values.dtype not in (np.int64, np.bool_):
                 kind = f"dtype {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
                 raise ContractError(f"pair: {name!r} is {kind}; needed an array of int64 or bool")
             checked[name] = freeze(values, values.dtype.type)
+        if len(handles) > 1:
+            raise ContractError(f"pair: returned {len(handles)} handles; needed at most one")
         self._arrays = checked
+        self._handle = handles[0] if handles else None
+
+    @property
+    def opaque(self) -> bool:
+        """Return whether the pairing has a handle, so that nobody knows all of it."""
+        return self._handle is not None
+
+    @property
+    def handle(self) -> Any:
+        """The object in the handle; None without a handle."""
+        return None if self._handle is None else self._handle.content
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self._arrays[name]
@@ -117,7 +161,8 @@ class Pairing(Mapping[str, NDArray[Any]]):
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"Pairing({', '.join(f'{name}{values.shape}' for name, values in self._arrays.items())})"
+        entries = [f"{name}{values.shape}" for name, values in self._arrays.items()]
+        return f"Pairing({', '.join([*entries, *(['a handle'] if self.opaque else [])])})"
 
     def check_bounds(self, interface: Interface) -> None:
         """Check that every integer can number something of the problem: a segment, node, unknown or entry, or −1.
@@ -142,9 +187,11 @@ class Pairing(Mapping[str, NDArray[Any]]):
             raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
 
     def same_as(self, other: Pairing) -> bool:
-        """Return whether names, shapes and all values agree."""
-        return self._arrays.keys() == other._arrays.keys() and all(
-            np.array_equal(values, other._arrays[name]) for name, values in self._arrays.items()
+        """Return whether names, shapes and all values agree; what is in handles is not compared."""
+        return (
+            self.opaque is other.opaque
+            and self._arrays.keys() == other._arrays.keys()
+            and all(np.array_equal(values, other._arrays[name]) for name, values in self._arrays.items())
         )
 
 

@@ -172,8 +172,8 @@ class CheckedFormulation:
         self.plugin = plugin
         self._traits = traits
         self.provides = provides
-        # A plugin in a process of its own gets a whole batch, and the loop is there.
-        self._takes_batch = traits.batched or getattr(plugin, "loops", False) is True
+        # A plugin in a process of its own gets a whole batch, and the loop is there; new pairings are made there, too.
+        self._remote = getattr(plugin, "loops", False) is True
         self._counts: dict[int, tuple[Interface, int]] = {}  # It holds the interfaces, so that no id is used again.
 
     def n_multipliers(self, interface: Interface) -> int:
@@ -205,7 +205,19 @@ class CheckedFormulation:
         return int(number)
 
     def pair(self, interface: Interface, z: FloatArray) -> Pairing | None:
-        """Return the pairing at one state z (n_unknowns,); None if the plugin has no ``pair``."""
+        """Return the pairing at one state z (n_unknowns,); None if the plugin has no ``pair``, or one with a handle.
+
+        Without a pairing the other methods take one of each state that they are asked at, handle included.
+        """
+        pairing = self.own_pairing(interface, z)
+        return None if pairing is None or pairing.opaque else pairing
+
+    def decides_anew(self, pairing: Pairing | None) -> bool:
+        """Return whether the plugin gets a new pairing at each state, since the one that it was asked with is None."""
+        return pairing is None and "pair" in self.provides
+
+    def own_pairing(self, interface: Interface, z: FloatArray) -> Pairing | None:
+        """Return the pairing at one state z (n_unknowns,), with a handle if it has one; None without ``pair``."""
         if "pair" not in self.provides:
             return None
         self._check_size(interface, z)
@@ -214,10 +226,13 @@ class CheckedFormulation:
         pairing.check_bounds(interface)
         return pairing
 
+    def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
+        return self.own_pairing(interface, z.real) if self.decides_anew(pairing) and not self._remote else pairing
+
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
-        if z.ndim == 1 or self._takes_batch:
+        if z.ndim == 1 or self._remote or (self._traits.batched and not self.decides_anew(pairing)):
             return self._residual(interface, pairing, z)
         forces = np.empty_like(z)
         for index in np.ndindex(z.shape[:-1]):
@@ -225,12 +240,14 @@ class CheckedFormulation:
         return forces
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
+        pairing = self._pairing_at(interface, pairing, z)
         forces = _call_plugin("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
         return _check_forces("residual", forces, z)
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a coo array of scipy.sparse."""
         self._check_size(interface, z)
+        pairing = self._pairing_at(interface, pairing, z)
         tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
         return _check_tangent("tangent", tangent, z.size)
 
@@ -241,6 +258,7 @@ class CheckedFormulation:
         if "residual_and_tangent" not in self.provides:
             return self.residual(interface, pairing, z), self.tangent(interface, pairing, z)
         self._check_size(interface, z)
+        pairing = self._pairing_at(interface, pairing, z)
         verb = "residual_and_tangent"
         answer = _call_plugin(verb, self.plugin.residual_and_tangent, interface, pairing, freeze(z, np.float64))
         if not isinstance(answer, tuple) or len(answer) != 2:
@@ -251,6 +269,7 @@ class CheckedFormulation:
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points at one state z (n_unknowns,)."""
         self._check_size(interface, z)
+        pairing = self._pairing_at(interface, pairing, z)
         points = _call_plugin("contact_points", self.plugin.contact_points, interface, pairing, freeze(z, np.float64))
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")

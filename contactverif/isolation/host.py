@@ -91,6 +91,8 @@ class Host:
         The number of times that the process ended before it was told to, and of those because no answer came.
     n_started : int
         The number of times that it was started.
+    opaque : bool | None
+        Pairings have a handle, which stays in the process; None until the first one is known.
     last_words : bytes
         The end of what the process printed.
     """
@@ -105,6 +107,7 @@ class Host:
         self._forgotten: list[int] = []
         self._number = 0
         self.methods: frozenset[str] = frozenset()
+        self.opaque: bool | None = None
         self.n_ended = self.n_hangs = self.n_started = 0
         self.last_words = b""
 

@@ -168,13 +168,30 @@ class RemotePairing(Pairing):
                 self._host.flush()
             whole = Pairing(_unpacked("pair", self._question.result()))
             whole.check_bounds(self._interface)
+            self.check()
             self._content = dict(whole)
         return self._content
 
+    @property
+    def opaque(self) -> bool:
+        """Return whether pairings of the plugin have a handle, which stay in its process."""
+        if self._host.opaque is None:
+            _ = self._arrays
+        return bool(self._host.opaque)
+
+    @property
+    def handle(self) -> None:
+        """Return None: the object is in the plugin's process."""
+
     def check(self) -> None:
         """Raise the error of the plugin, if it made one when it paired."""
-        if not isinstance(self._question.answer, Answer):
-            self._question.result()
+        answer = self._question.answer
+        if not isinstance(answer, Answer):
+            answer = self._question.result()
+        if self._host.opaque is None:
+            self._host.opaque = answer.opaque
+        elif self._host.opaque is not answer.opaque:
+            raise ContractError("pair: returned a handle in some states, and none in others")
 
     def check_bounds(self, interface: Interface) -> None:
         """Do nothing: the bounds are checked where the plugin is, and once more when somebody looks into it."""

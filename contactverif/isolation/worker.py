@@ -155,10 +155,11 @@ class Desk:
         assert ask.z is not None
         z = unpack_array(ask.z)
         if ask.verb == "pair":
-            pairing = formulation.pair(interface, z)
+            pairing = formulation.own_pairing(interface, z)
             assert pairing is not None
-            self._kept[ask.keep] = pairing
-            return Answer({name: pack_array(array) for name, array in pairing.items()}, formulation.plugin.seconds)
+            self._kept[ask.keep] = pairing  # A handle stays here.
+            arrays = {name: pack_array(array) for name, array in pairing.items()}
+            return Answer(arrays, formulation.plugin.seconds, opaque=pairing.opaque)
         pairing = None if ask.pairing is None else self._kept[ask.pairing]
         answer = getattr(formulation, ask.verb)(interface, pairing, z)
         return Answer(_PACKERS[ask.verb](answer), formulation.plugin.seconds)

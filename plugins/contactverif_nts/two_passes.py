@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints, Handle, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.published_forces import Fractions, format_forces, parse_forces
 from contactverif.contract.subject import Subject
@@ -51,6 +51,8 @@ class Pass:
         """Return the part of a pairing of both passes that belongs to this one."""
         if pairing is None:
             return None
+        if pairing.opaque:  # Each pass decides anew.
+            return None
         arrays = {name.removeprefix(self.name): array for name, array in pairing.items() if name.startswith(self.name)}
         return Pairing(arrays)
 
@@ -78,11 +80,12 @@ class TwoPass:
         return total
 
     def _pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """Find the pairings of both passes; each name carries the prefix of its pass."""
-        arrays = {}
+        """Find the pairings of both passes; each name carries the prefix of its pass. A handle stays with its pass."""
+        arrays: dict[str, Any] = {}
         for each in self._passes(interface):
             pairing = self._inner.pair(each.interface, z[each.places])
-            assert pairing is not None
+            if pairing is None:
+                return Pairing({"of both passes": Handle(None)})
             arrays.update({each.name + name: array for name, array in pairing.items()})
         return Pairing(arrays)
 

@@ -13,7 +13,8 @@ A third instance has another penalty. Its forces differ, and those of the first 
 round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k is the stiffness, and a segment
 turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|, and k is the larger of ε̂L and the
 change of the residual from one state to the other over the way between them. A pairing that differs, or an interface
-that was changed, fails in words.
+that was changed, fails in words. A pairing with a handle is made twice at one state, with another state in between: it
+must have the same entries and give the same answers.
 
 Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a batch
 is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape) as if
@@ -37,6 +38,7 @@ from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.interleaved_calls import Question, count_changes, renumber
 from contactverif_properties.shared.roundoff import ratio
+from contactverif_properties.shared.two_pairings import compare_two_pairings
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
 BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.
@@ -108,6 +110,7 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         second.pair(question.interface, question.z) != question.pairing for question in (*questions[1:3], questions[1])
     ):
         broken.append("the pairing of a state depends on the state before it")
+    broken += compare_two_pairings(formulation, interface, z, distant)
     if questions[3].pairing == pairing:
         questions = questions[:3]
     else:

@@ -20,6 +20,8 @@ Where the plugin takes complex positions, a complex step differs by at most 1e-1
 residual itself bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again with λ
 in place of ℓ. Each block of the tangent by itself is the question of `tangent.sparsity`.
 
+Without a pairing, or where it has a handle, the residual decides anew at each state, and there is no complex step.
+
 **Undecided.** A failing case is undecided near a kink that the pairing does not freeze, or where the residual bends
 over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
 fails.
@@ -112,7 +114,7 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
         values, place = {CENTRAL.name: comparison.error}, comparison.place
         if np.isfinite(comparison.slope):
             values[TAYLOR.name] = comparison.slope
-        if subject.traits.takes_complex:
+        if subject.traits.takes_complex and not formulation.decides_anew(pairing):
             values[COMPLEX.name], complex_place = differences.compare_complex_step(
                 np.vstack([directions, more]), comparison.turns
             )

@@ -118,7 +118,7 @@ def test_a_batch_equals_a_loop(dtype: type) -> None:
     answers = {}
     for batched in (False, True):
         guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
-        answers[batched] = guarded.residual(PAIR, None, states)
+        answers[batched] = guarded.residual(PAIR, guarded.pair(PAIR, Z), states)
     assert dimensions == [1] * 6 + [3]
     assert answers[True].shape == states.shape
     assert answers[True].dtype == dtype

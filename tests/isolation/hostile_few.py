@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from contactverif import Subject
+from contactverif import Handle, Subject
 from contactverif.run.registry import subject_of
 
 
@@ -28,6 +28,22 @@ class Springs:
         depths = slice(1, 2 * interface.n_slave_nodes, 2)
         forces[..., depths] = self.penalty * np.where(pairing["active"], z[..., depths], 0)
         return forces
+
+
+class HandledSprings(Springs):
+    """The same springs; who is active is in an object that cannot leave the process."""
+
+    def pair(self, interface, z):
+        active = super().pair(interface, z)["active"]
+        return {"object": Handle(lambda: active)}
+
+    def residual(self, interface, pairing, z):
+        return super().residual(interface, {"active": pairing.handle()}, z)
+
+
+class HandledAtTimes(HandledSprings):
+    def pair(self, interface, z):
+        return super().pair(interface, z) if z[0] < 1000 else Springs.pair(self, interface, z)
 
 
 class RaisesInMake:

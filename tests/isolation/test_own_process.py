@@ -11,7 +11,7 @@ import pytest
 
 from contactverif import Pairing, Subject, load_formulation, load_properties, named_case, verify
 from contactverif.contract.arrays import dense
-from contactverif.contract.errors import MisuseError, PluginError
+from contactverif.contract.errors import ContractError, MisuseError, PluginError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
@@ -63,6 +63,29 @@ def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
     batch = np.array([CASE.z, 2 * CASE.z])
     forces = formulation.residual(CASE.interface, pairing, batch)
     assert np.array_equal(forces[1], formulation.residual(CASE.interface, pairing, 2 * CASE.z))
+
+
+def test_a_handle_stays_in_its_process() -> None:
+    handled, plain = (load_remote(LOADER, name, QUICK).for_case(CASE) for name in ("HandledSprings", "Springs"))
+    interface = CASE.interface
+    assert handled.pair(interface, CASE.z) is None
+    own = handled.own_pairing(interface, CASE.z)
+    assert own is not None
+    assert (own.opaque, own.handle, dict(own)) == (True, None, {})
+    states = np.array([CASE.z, -CASE.z, 2 * CASE.z])
+    expected = [plain.residual(interface, plain.pair(interface, z), z) for z in states]
+    assert np.array_equal(handled.residual(interface, None, states), expected)
+    assert np.array_equal(handled.residual(interface, own, CASE.z), expected[0])
+    other = handled.own_pairing(interface, -CASE.z)
+    assert np.array_equal(handled.residual(interface, other, -CASE.z), expected[1])
+
+
+def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
+    formulation = load_remote(LOADER, "HandledAtTimes", QUICK).for_case(CASE)
+    assert formulation.pair(CASE.interface, CASE.z) is None
+    far = CASE.z + 2000
+    with pytest.raises(ContractError, match="pair: returned a handle in some states, and none in others"):
+        dict(formulation.own_pairing(CASE.interface, far))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from handles import ReusesItsHandle
 from mutate import Mutant, Wrapped
 
 from contactverif.contract.arrays import dense
@@ -131,6 +132,7 @@ class _LastInOneCall(Wrapped):
 
 
 MUTANTS = (
+    Mutant("one object in the handles of all pairings", PURITY, ReusesItsHandle),
     Mutant("residual in one call that pulls", PURITY, _in_one_call(lambda residual, tangent: (-residual, tangent))),
     Mutant(
         "tangent in one call made symmetric",

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from handles import HidesNumbers, WrongTangent
 from mutate import Mutant, Wrapped
 
 import contactverif_nts
 
-SPARSITY, LONG = "tangent.sparsity", "tangent.long"
+DIRECTIONAL, SPARSITY, LONG = "tangent.directional", "tangent.sparsity", "tangent.long"
 GRADES = (2, 4, 6, 8)  # One entry is off by 10 to minus these powers of the largest entry of its block.
 MANY = 100  # A problem with more segments than this on one side is large.
 
@@ -108,6 +109,8 @@ def _rows_behind(interface: Any, matrix: Any) -> None:
 
 
 MUTANTS = (
+    Mutant("real numbers in a handle", DIRECTIONAL, HidesNumbers),
+    Mutant("wrong tangent behind a handle", DIRECTIONAL, WrongTangent),
     *(
         Mutant(f"one entry off by 1e-{power} of its block, above 100 segments", LONG, _spoil_entry(power))
         for power in GRADES

@@ -137,6 +137,16 @@ def test_a_torn_line_is_cut_off_and_another_plan_is_refused(tmp_path: Path) -> N
         Journal(output, {"plan": 2})
 
 
+@pytest.mark.parametrize("line", ["{", "[]", '{"cell": 0}', '{"cell": "x", "record": {}}', "[" * 100000, "\xff\x00"])
+def test_a_damaged_journal_is_one_line(tmp_path: Path, line: str) -> None:
+    output = tmp_path / "a.nc"
+    Journal(output, {"plan": 1})
+    with journal_of(output).open("a", encoding="latin-1") as file:
+        file.write(line + "\n")
+    with pytest.raises(MisuseError, match=r"--out: found .*a.nc.journal, which is damaged \(\w+\); needed"):
+        Journal(output, {"plan": 1})
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -79,13 +79,28 @@ def _run_cells(
     for number, cell in enumerate(plan.cells):
         progress(f"{cell.scene}, mesh {cell.mesh}, penalty {cell.stiffness:g}", number, len(plan.cells))
         if journal is not None and number in journal.finished:
-            records.append(CellRecord.from_dict(journal.finished[number]))
+            records.append(_stored_record(journal, number))
             continue
         records.append(run_cell(cell, loaded, plan.repeats, plan.seed))
         if journal is not None:
             journal.add(number, records[-1].as_dict())
     progress("writing", len(plan.cells), len(plan.cells))
     return records
+
+
+def _stored_record(journal: Journal, number: int) -> CellRecord:
+    """Return the record of a cell that the journal holds.
+
+    Raises
+    ------
+    MisuseError
+        If it is none.
+    """
+    try:
+        return CellRecord.from_dict(journal.finished[number])
+    except (AttributeError, KeyError, TypeError) as error:
+        damage = f"{journal.path}, which is damaged ({type(error).__name__} in cell {number})"
+        raise MisuseError("--out", damage, "an undamaged journal, another name, or no such file") from error
 
 
 def collect_results(

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from contactverif.contract.errors import MisuseError
+from contactverif.foreign_files.ordinary import check_ordinary
 
 SUFFIX = ".journal"
 
@@ -52,11 +53,16 @@ class Journal:
         if not whole:
             self._append(plan)
             return
-        first, *rest = (json.loads(line) for line in whole)
+        try:
+            first, *rest = (json.loads(line) for line in whole)
+            finished = {int(line["cell"]): dict(line["record"]) for line in rest}
+        except (KeyError, RecursionError, TypeError, ValueError) as error:
+            needed = "an undamaged journal, another name, or no such file"
+            raise MisuseError("--out", f"{self.path}, which is damaged ({type(error).__name__})", needed) from error
         if first != json.loads(json.dumps(plan)):
             needed = "the same command and version, or another name, or no such file"
             raise MisuseError("--out", f"{self.path}, the journal of another bench", needed)
-        self.finished = {line["cell"]: line["record"] for line in rest}
+        self.finished = finished
 
     def add(self, number: int, record: dict[str, Any]) -> None:
         """Append the record of a cell that is finished."""
@@ -67,11 +73,12 @@ class Journal:
         """Return the whole lines, after the file ends with the last of them."""
         if not self.path.exists():
             return []
+        check_ordinary(self.path, "--out", "a journal of a bench, or no such file")
         text = self.path.read_bytes()
         end = text.rfind(b"\n") + 1
         if end < len(text):
             os.truncate(self.path, end)
-        return text[:end].decode().splitlines()
+        return text[:end].decode(errors="replace").splitlines()
 
     def _append(self, content: dict[str, Any]) -> None:
         with open(self.path, "a", encoding="utf-8") as file:

@@ -12,7 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from contactverif.contract.errors import MisuseError
+from contactverif.foreign_files.ordinary import check_ordinary
 
+MOST_BYTES = 1 << 30  # A million queries have 100 MB.
 _LONGEST = 60  # The number of characters of a line that an error shows.
 
 
@@ -94,6 +96,9 @@ class TextLines:
         MisuseError
             If it cannot be read.
         """
+        size = check_ordinary(path, str(path), "a text file that can be read").st_size
+        if size > MOST_BYTES:
+            raise MisuseError(str(path), f"{size} bytes", f"a text file of at most {MOST_BYTES}")
         try:
             return cls(str(path), path.read_text(encoding="utf-8"))
         except OSError as error:

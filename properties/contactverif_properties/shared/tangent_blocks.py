@@ -149,7 +149,9 @@ def judge_of(case: Case, subject: Subject) -> BlockJudge:
     pairing = formulation.pair(case.interface, case.z)
     tangent = formulation.tangent(case.interface, pairing, case.z)
     dtype: type = np.float64
-    if subject.traits.takes_complex:
+    if formulation.decides_anew(pairing):  # No smaller step is exact where decisions may change with it.
+        pass
+    elif subject.traits.takes_complex:
         dtype = np.complex128
     elif subject.traits.takes_longdouble:
         dtype = np.longdouble

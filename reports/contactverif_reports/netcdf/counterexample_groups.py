@@ -14,6 +14,7 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
+from contactverif_reports.netcdf.stored_bodies import check_bodies
 from contactverif_reports.netcdf.stored_groups import Group
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
@@ -130,4 +131,6 @@ def case_of_group(dataset: Group) -> Case:
         If the arrays make no case.
     """
     arrays = {str(variable.attrs[ARRAY_NAME]): variable.values for variable in dataset.variables.values()}
-    return Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
+    case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
+    check_bodies(case.parameters)
+    return case
