@@ -25,7 +25,7 @@ import warnings
 from dataclasses import dataclass
 from typing import NoReturn
 
-import psutil  # type: ignore[import-untyped]
+import psutil
 
 # A fork costs milliseconds, since everything is imported already. On macOS a fork may crash in the system's own code.
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"

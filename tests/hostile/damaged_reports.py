@@ -363,10 +363,12 @@ def main(count: int, seed: int) -> int:
     import_everything()
     with tempfile.TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder), write_report)
-        campaign.attack_with_strange_files()
-        for number in range(count):
-            campaign.attack(number, seed)
-    print(campaign.table.text())
+        try:
+            campaign.attack_with_strange_files()
+            for number in range(count):
+                campaign.attack(number, seed)
+        finally:  # Also where Ctrl-C ends it.
+            print(campaign.table.text(), flush=True)
     return int(bool(campaign.harm))
 
 

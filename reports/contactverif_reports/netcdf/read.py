@@ -154,14 +154,10 @@ class _Reader:
 
     def run(self) -> Run:
         """Return the run."""
-        formulations, properties = (self._labels(name) for name in ("formulation", "property"))
-        by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
-        for j, property_id in enumerate(properties):
-            for i, row in self._rows_of(j, property_id, formulations):
-                by_formulation[i][j] = row
+        formulations = self._labels("formulation")
         names, reasons = (self._words(name) for name in ("not_loaded", "not_loaded_reason"))
         run = Run(
-            rows=tuple(row for rows in by_formulation for row in rows.values()),
+            rows=self._rows(formulations),
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
             provided=self._provided_parts(formulations),
             opposite_signs=self._opposite_signs(formulations),
@@ -170,6 +166,14 @@ class _Reader:
         self._check(run, written)
         origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
         return replace(run, provenance=origin)
+
+    def _rows(self, formulations: list[str]) -> tuple[Row, ...]:
+        """Return all rows, formulation by formulation."""
+        by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
+        for j, property_id in enumerate(self._labels("property")):
+            for i, row in self._rows_of(j, property_id, formulations):
+                by_formulation[i][j] = row
+        return tuple(row for rows in by_formulation for row in rows.values())
 
     def _check(self, run: Run, written: Mapping[str, Any]) -> None:
         """Check what the file says twice: the counterexamples, and the counts of the root."""
