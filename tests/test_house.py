@@ -69,7 +69,9 @@ ROOMS = {
     "strategies": Room(("contract", "oracle", "mechanics", "scenes"), ("numpy", "hypothesis"), QUIET),
     # Its worker calls the registry by a name that the registry gives it, and imports nothing of `run`.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil")),
-    "run": Room(("contract", "scenes", "strategies", "isolation"), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
+    "run": Room(
+        ("contract", "scenes", "strategies", "isolation"), ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec")
+    ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
         (*BELOW_RUN, "foreign_files", "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis")
@@ -77,7 +79,7 @@ ROOMS = {
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
         ("contactverif", *BELOW_RUN, "isolation", "run", "studies", *REPORTS, "paper"),
-        ("numpy", "hypothesis", "typer", "rich"),
+        ("numpy", "hypothesis", "typer", "rich", "msgspec"),
     ),
     # What a script imports from `contactverif` itself.
     "contactverif": Room((*BELOW_RUN, "run")),

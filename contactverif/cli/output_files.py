@@ -5,7 +5,7 @@ Rule: everything that can be wrong with a name is said here, before anything tak
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +69,13 @@ class OutputFiles:
             check_writable(name, "--out", f"FILE{suffix}")
             by_suffix[suffix] = name
         return cls(by_suffix, {suffix: name.absolute() for suffix, name in by_suffix.items()})
+
+    def only(self, suffixes: Collection[str]) -> OutputFiles:
+        """Return the files with these suffixes."""
+        names, paths = (
+            {key: path for key, path in files.items() if key in suffixes} for files in (self.names, self.paths)
+        )
+        return OutputFiles(names, paths)
 
     def pictures(self) -> Iterator[Path]:
         """Yield the absolute path of each picture."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +19,7 @@ from contactverif.cli.shared_options import (
     WorkerOptions,
     complete_formulation,
 )
+from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -25,8 +28,11 @@ if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded, Run
     from contactverif.contract.subject import Subject
     from contactverif.isolation.limits import Limits
+    from contactverif.run.run_journal import Journal
 
 LINES_OF_A_PLUGIN = 5
+STOPPED = 130  # The exit status after Ctrl-C.
+NOT_WRITTEN = 2  # The exit status if a file could not be written.
 
 
 def verify(
@@ -58,61 +64,131 @@ def verify(
     place: PlaceOptions,
     workers: WorkerOptions,
     isolation: IsolationOptions,
+    resume: Annotated[
+        Path | None,
+        typer.Option(help="Go on with the run that was to write FILE and was stopped.", metavar="FILE"),
+    ] = None,
 ) -> None:
     """Check every property of a formulation: print a table, draw what fails.
+
+    With --out, every outcome goes to the folder FILE.journal as soon as it is
+    there, and --resume FILE goes on with a run that was stopped or killed.
+    The folder goes when FILE is complete.
 
     \bExit status
       0  every promise is kept, and every property was judged
       1  a promise is broken, a property could not be judged, or a plugin
          does not load
-      2  the command line is wrong; one line says what is needed
+      2  the command line is wrong, or a file cannot be written; one line
+         says what is needed
+      130  stopped by Ctrl-C, after the table of what was judged
 
     \bExamples
       contactverif verify vts-ppt --out vts-ppt.nc --out vts-ppt.html
       contactverif verify nts -p 'patch.*' --seed 7
       contactverif verify mine --mesh punch.msh --slave punch --master base
       contactverif verify vts-me --scene c -p 'patch.*'
+      contactverif verify --resume vts-ppt.nc
     """
+    typed = VerifyOptions(
+        tuple(names or ()),
+        tuple(properties or ()),
+        sampling,
+        tuple(out or ()),
+        pictures,
+        tuple(known or ()),
+        place,
+        workers,
+        isolation,
+    )
+    if resume is not None:
+        job = resumed_job(resume, typed)
+    else:
+        job = new_job(replace(typed, names=tuple(select_names(names or [], all_, isolation.limits()))))
+    raise typer.Exit(run_job(job))
+
+
+def run_job(job: VerifyJob) -> int:
+    """Judge what a job says, show the tables and write the files; return the exit status."""
+    from contactverif.cli.progress import Bar
+    from contactverif.run.completeness import find_gap
+    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.run.runner import RunStopped, run
+    from contactverif.run.workers import WorkerError, worker_pool
+
+    limits = job.options.isolation.limits()
+    with ExitStack() as stack:
+        try:
+            with worker_pool(job.jobs) as executor, Bar() as bar:
+                questions = load_properties(job.options.properties)
+                subjects = [load_formulation(name, limits) for name in job.options.names]
+                journal = stack.enter_context(job.journal())
+                result = run(
+                    subjects,
+                    questions,
+                    profile=job.profile,
+                    interface=job.interface,
+                    scene=job.scene,
+                    known=job.known,
+                    progress=bar.show_progress,
+                    executor=executor,
+                    journal=journal,
+                )
+        except RunStopped as stop:
+            return _show_stopped(stop.run, job)
+        except WorkerError:
+            _say_how_to_go_on(job)
+            raise
+        gap = find_gap(result, subjects, questions, job.sampling) if result.promises_kept else ""
+        # The files are written before anything is shown, so that nothing that was judged is lost.
+        written = write_results(result, job.files)
+        complete = written.paths == job.files.paths and not gap
+        _end_journal(journal, complete)
+    _show_results(result, subjects, questions, written, job.pictures, gap)
+    if not complete:
+        _say_how_to_go_on(job)
+    return _exit_status(result, gap, whole=complete and not journal.trouble)
+
+
+def _end_journal(journal: Journal, complete: bool) -> None:
+    """Remove the journal once the files are complete."""
+    from contactverif.run.journal_folder import remove_journal
+
+    if journal.trouble:
+        _warn(f"the journal could not be written to its end: {journal.trouble}")
+    if complete and journal.folder is not None:
+        remove_journal(journal.folder)
+
+
+def _exit_status(result: Run, gap: str, *, whole: bool) -> int:
+    """Return the exit status; 0 only if nothing is missing in the run or in its files."""
+    if gap:
+        return 1
+    if not whole:
+        return NOT_WRITTEN
+    return 0 if result.promises_kept else 1
+
+
+def _show_results(
+    result: Run,
+    subjects: Sequence[Subject | NotLoaded],
+    questions: Sequence[Property | NotLoaded],
+    files: OutputFiles,
+    folder: PictureFolder | None,
+    gap: str,
+) -> None:
+    """Show the table, the counterexamples, the names of the files, and the last line."""
     from contactverif.cli.console import show
     from contactverif.cli.counterexample_text import how_to_keep
-    from contactverif.cli.progress import Bar
     from contactverif.cli.run_tables import RunTable, summary
-    from contactverif.run.registry import load_formulation, load_properties, matching_ids
-    from contactverif.run.runner import run
-    from contactverif.run.workers import worker_pool
 
-    limits = isolation.limits()
-    names = select_names(names or [], all_, limits)
-    files = OutputFiles.check(out, (REPORT, PAGE))
-    folder = PictureFolder.make(pictures)
-    scene = place.make_scene()
-    interface = place.read_interface()
-    reasons = _known_failures(known or [])
-    jobs = workers.number(len(names), len(matching_ids(properties or ["*"])), sampling.planned_examples())
-    with worker_pool(jobs) as executor, Bar() as bar:
-        questions = load_properties(properties or ["*"])
-        subjects = [load_formulation(name, limits) for name in names]
-        result = run(
-            subjects,
-            questions,
-            profile=sampling.profile or "dev",
-            examples=sampling.examples,
-            seed=sampling.seed,
-            interface=interface,
-            scene=scene,
-            known=reasons,
-            progress=bar.show_progress,
-            executor=executor,
-        )
-    write_results(result, files)  # before anything is shown, so that nothing that was judged is lost
     show(RunTable(result))
     _show_counterexamples(result, subjects, questions, files, folder)
     _show_what_plugins_printed()
     files.announce()
     if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
-    show(summary(result))
-    raise typer.Exit(0 if result.promises_kept else 1)
+    show(f"Not complete: {gap}." if gap else summary(result))
 
 
 def _show_what_plugins_printed() -> None:
@@ -127,18 +203,62 @@ def _show_what_plugins_printed() -> None:
         show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
 
 
-def write_results(result: Run, files: OutputFiles) -> None:
-    """Write the report and the page that the user wants."""
-    if REPORT in files.paths:
+def _show_stopped(result: Run, job: VerifyJob) -> int:
+    """Show what was judged before Ctrl-C, and how to go on; return the exit status."""
+    from contactverif.cli.console import show
+    from contactverif.cli.run_tables import RunTable
+
+    show(RunTable(result))
+    _say_how_to_go_on(job)
+    return STOPPED
+
+
+def _say_how_to_go_on(job: VerifyJob) -> None:
+    """Print the line that goes on with a run."""
+    if job.resume_line:
+        typer.echo(f"what was judged is kept; to go on: {job.resume_line}")
+    else:
+        typer.echo("with --out FILE.nc a run can go on where it was stopped")
+
+
+def _warn(words: str) -> None:
+    """Print a line about a file that could not be written."""
+    typer.echo(f"contactverif: {' '.join(words.split())}", err=True)
+
+
+def write_results(result: Run, files: OutputFiles) -> OutputFiles:
+    """Write the report and the page that the user wants; return those that are there. A line says why one is not."""
+
+    def write_report(path: Path) -> None:
         from contactverif_reports.netcdf.write import write
 
-        write(result, files.paths[REPORT])
-    if PAGE in files.paths:
+        write(result, path)
+
+    def write_html(path: Path) -> None:
         from contactverif_reports.html.pages import write_page
         from contactverif_reports.html.report_page import report_page
 
-        page = report_page(result, files.names.get(REPORT, Path("FILE.nc")))
-        write_page(files.paths[PAGE], page, "--out")
+        write_page(path, report_page(result, files.names.get(REPORT, Path("FILE.nc"))), "--out")
+
+    writers = {REPORT: write_report, PAGE: write_html}
+    return files.only(
+        [suffix for suffix, path in files.paths.items() if _write(writers[suffix], path, files.names[suffix])]
+    )
+
+
+def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
+    """Write a file; return whether it is there."""
+    try:
+        write(path)
+    except MisuseError as error:
+        _warn(f"{name} is not written: {error.found.removeprefix(f'{path}: ')}")
+    except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
+        from contactverif_reports.files import reason_not_to_grow
+
+        _warn(f"{name} is not written: {reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}")
+    else:
+        return True
+    return False
 
 
 def _show_counterexamples(
@@ -188,14 +308,3 @@ def select_names(names: list[str], every: bool, limits: Limits | None = None) ->
     if not names:
         raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
     return names
-
-
-def _known_failures(texts: Sequence[str]) -> dict[str, str]:
-    """Return {property: reason} of each ID=REASON."""
-    reasons = {}
-    for text in texts:
-        property_id, _, reason = text.partition("=")
-        if not (property_id and reason):
-            raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
-        reasons[property_id] = reason
-    return reasons

@@ -5,7 +5,7 @@ Rule for the next editor: pieces may end in any order, and a row does not depend
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import chain
 from math import sqrt
@@ -47,8 +47,9 @@ class OpenRow:
         self.outcomes = OutcomeStore(len(source) if isinstance(source, tuple) else WHOLE)
         self.planned = 0
         self.n_finished = 0
-        self._chunks: dict[int, CaseChunk] = {}  # The drawn chunks without outcomes, by number.
-        self._n_drawn = 0
+        self._chunks: dict[int, CaseChunk | None] = {}  # The chunks without outcomes, by number; None if not drawn.
+        self._sizes: dict[int, int] = {}  # The numbers of their cases.
+        self._n_drawn = self._n_cases = 0
         self._all_drawn = False
         self._flushed = 0
         self._waiting: dict[int, Sequence[Outcome]] = {}
@@ -59,8 +60,8 @@ class OpenRow:
         """Return whether the witness is a case of the property's own finite list, which is judged anyway."""
         return isinstance(self.source, tuple) and any(case is self.witness for case in self.source)
 
-    def expect(self, chunks: Sequence[CaseChunk], *, planned: int, last: bool) -> range:
-        """Note the chunks of a block that will be judged, and return their numbers.
+    def expect(self, chunks: Sequence[CaseChunk], *, planned: int, last: bool) -> list[tuple[int, int]]:
+        """Note the chunks of a block that will be judged.
 
         Parameters
         ----------
@@ -70,14 +71,42 @@ class OpenRow:
             The number of cases that are planned for the whole row.
         last : bool
             No further block follows.
+
+        Returns
+        -------
+        list[tuple[int, int]]
+            The number of each chunk, and the number of its first case.
         """
-        numbers = range(self._n_drawn, self._n_drawn + len(chunks))
-        self._chunks.update(zip(numbers, chunks, strict=True))
-        self._n_drawn, self._all_drawn, self.planned = numbers.stop, last, planned
+        numbers = [self._expect(chunk, chunk.count) for chunk in chunks]
+        self._all_drawn, self.planned = last, planned
         return numbers
 
+    def expect_judged(self, count: int, *, planned: int, last: bool) -> int:
+        """Note a block of cases that are judged already, none of which stays whole, and return its number."""
+        number, _ = self._expect(None, count)
+        self._all_drawn, self.planned = last, planned
+        return number
+
+    def may_keep_whole(self, first: int, outcomes: Iterable[Outcome]) -> bool:
+        """Return whether one of these outcomes may stay whole, if the first of them gets this number."""
+        return any(self.outcomes.keeps_whole(first, outcome) for outcome in outcomes)
+
+    def _expect(self, chunk: CaseChunk | None, count: int) -> tuple[int, int]:
+        number, first = self._n_drawn, self._n_cases
+        self._chunks[number], self._sizes[number] = chunk, count
+        self._n_drawn, self._n_cases = number + 1, first + count
+        return number, first
+
     def add(self, number: int, outcomes: Sequence[Outcome]) -> None:
-        """Add the outcomes of a chunk; those behind a chunk that is not finished wait."""
+        """Add the outcomes of a chunk; those behind a chunk that is not finished wait.
+
+        Raises
+        ------
+        RuntimeError
+            If there are more or fewer outcomes than cases, which is a mistake of the harness.
+        """
+        if len(outcomes) != self._sizes.pop(number):
+            raise RuntimeError(f"{len(outcomes)} outcomes of a chunk with another number of cases")
         self.n_finished += len(outcomes)
         self._waiting[number] = outcomes
         while self._flushed in self._waiting:
@@ -87,7 +116,9 @@ class OpenRow:
     def _flush(self, number: int) -> None:
         chunk, outcomes = self._chunks.pop(number), self._waiting.pop(number)
         wanted = [self.outcomes.keeps_whole(len(self.outcomes) + n, outcome) for n, outcome in enumerate(outcomes)]
-        cases: Sequence[Case | None] = chunk.cases if any(wanted) else [None] * len(outcomes)
+        cases: Sequence[Case | None] = [None] * len(outcomes)
+        if chunk is not None and any(wanted):
+            cases = chunk.cases
         for outcome, case in zip(outcomes, cases, strict=True):
             self.outcomes.append(outcome, case)
 
@@ -126,6 +157,26 @@ class OpenRow:
             verdict = Verdict.UNDECIDED
             reason = row.outcomes[0].reason or reason if on_scene else reason
         self.row = replace(row, verdict=verdict, reason=reason)
+
+    def stop(self, examples: int) -> None:
+        """Make the row of a run that was stopped before all cases were judged.
+
+        Parameters
+        ----------
+        examples : int
+            The number of random cases of the run.
+        """
+        planned = self.planned or (len(self.source) if isinstance(self.source, tuple) else examples)
+        self.row = replace(
+            self.row,
+            planned=planned,
+            outcomes=self.outcomes,
+            witness=self._witness_outcome,
+            verdict=Verdict.NOT_JUDGED,
+            reason=f"stopped: {self.n_finished} of {planned} cases judged"
+            + (", the witness not yet" if self.n_finished == planned else ""),
+            seconds=sum(outcome.seconds for outcome in self.outcomes),
+        )
 
     def _may_stay_undecided(self, row: Row, *, on_scene: bool) -> bool:
         """Return whether nobody promised that the scenes of a row can be decided.

@@ -7,36 +7,16 @@ and without their meshes: all that a report stores. An outcome is made of them a
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple, overload
+from typing import overload
 
-import numpy as np
-
-from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
-from contactverif.contract.case_summary import CaseSummary
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.property import Outcome, Verdict
+from contactverif.run.outcome_forms import OutcomeForm, put_together, take_apart
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.
-
-
-class _Form(NamedTuple):
-    """The words and names that outcomes have in common. Most outcomes of a row have one of a few forms."""
-
-    verdict: Verdict
-    breach: bool
-    measured: bool
-    idle: bool
-    reason: str
-    texts: tuple[str, str, str]
-    values: tuple[str, ...]
-    details: tuple[str, ...]
-    series: tuple[tuple[str, int], ...]
-    parameters: tuple[str, ...]
-    case_name: str
-    kind: str
 
 
 class OutcomeStore(Sequence[Outcome]):
@@ -51,8 +31,8 @@ class OutcomeStore(Sequence[Outcome]):
     def __init__(self, whole: int = WHOLE) -> None:
         self._n_whole = whole
         self._whole: dict[int, Outcome] = {}
-        self._forms: list[_Form] = []
-        self._numbers_of_forms: dict[_Form, int] = {}
+        self._forms: list[OutcomeForm] = []
+        self._numbers_of_forms: dict[OutcomeForm, int] = {}
         self._form_of = array("l")
         self._starts = array("q")
         self._numbers = array("d")
@@ -80,7 +60,7 @@ class OutcomeStore(Sequence[Outcome]):
             self._form_of.append(-1)
             self._starts.append(len(self._numbers))
             return
-        form, numbers = _taken_apart(outcome)
+        form, numbers = take_apart(outcome)
         place = self._numbers_of_forms.setdefault(form, len(self._forms))
         if place == len(self._forms):
             self._forms.append(form)
@@ -105,69 +85,7 @@ class OutcomeStore(Sequence[Outcome]):
             return self._whole[number]
         start = self._starts[number]
         end = self._starts[number + 1] if number + 1 < len(self) else len(self._numbers)
-        return _put_together(self._forms[self._form_of[number]], self._numbers[start:end].tolist())
+        return put_together(self._forms[self._form_of[number]], self._numbers[start:end].tolist())
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[number] for number in range(len(self)))
-
-
-def _taken_apart(outcome: Outcome) -> tuple[_Form, list[float]]:
-    summary, measurement = outcome.summary, outcome.measurement
-    sizes = [float(summary.n_slave_segments), float(summary.n_master_segments)]
-    lengths = [summary.penalty, summary.largest_coordinate, summary.shortest_segment]
-    numbers = [outcome.seconds, *sizes, *lengths, *summary.parameters.values()]
-    values: Mapping[str, float] = {}
-    details: Mapping[str, float] = {}
-    series: tuple[tuple[str, int], ...] = ()
-    texts = "", "", ""
-    if measurement is not None:
-        values, details = measurement.values, measurement.details
-        numbers += values.values()
-        numbers += [measurement.tolerances[name] for name in values]
-        numbers += details.values()
-        series = tuple((name, len(entries)) for name, entries in measurement.series.items())
-        for entries in measurement.series.values():
-            numbers += np.asarray(entries).tolist()
-        texts = measurement.undecided, measurement.broken, measurement.place
-    form = _Form(
-        outcome.verdict,
-        outcome.breach,
-        measurement is not None,
-        measurement is not None and measurement.idle,
-        outcome.reason,
-        texts,
-        tuple(values),
-        tuple(details),
-        series,
-        tuple(summary.parameters),
-        summary.name,
-        summary.kind,
-    )
-    return form, numbers
-
-
-def _put_together(form: _Form, numbers: list[float]) -> Outcome:
-    rest = iter(numbers)
-
-    def read_named(names: Sequence[str]) -> dict[str, float]:
-        return {name: next(rest) for name in names}
-
-    seconds, n_slave, n_master, penalty, largest, shortest = (next(rest) for _ in range(6))
-    parameters = read_named(form.parameters)
-    summary = CaseSummary(
-        int(n_slave), int(n_master), penalty, largest, shortest, parameters, form.case_name, form.kind
-    )
-    measurement = None
-    if form.measured:
-        undecided, broken, place = form.texts
-        measurement = Measurement(
-            read_named(form.values),
-            read_named(form.values),
-            undecided=undecided,
-            broken=broken,
-            place=place,
-            details=read_named(form.details),
-            series={name: freeze([next(rest) for _ in range(length)], np.float64) for name, length in form.series},
-            idle=form.idle,
-        )
-    return Outcome(summary, form.verdict, form.reason, measurement, seconds, form.breach)

@@ -1,13 +1,14 @@
 """The pieces that a run is made of: draw a block of cases, judge some, shrink one, call a formulation first.
 
 A piece is a plain function of data that can be pickled. It runs in the parent or in a worker process, with the same
-result. Rule for the next editor: a piece knows nothing of other pieces, and nothing outside is changed by it.
+result. Rule for the next editor: a piece knows nothing of other pieces, and it changes nothing outside but the journal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
 from contactverif.run import driver, judging
 from contactverif.run.packing import CaseChunk
+from contactverif.run.run_journal import Notes
 from contactverif.run.sampling import Sampling
 from contactverif.run.sign_check import has_opposite_sign
 from contactverif.scenes.named_states import named_case
@@ -68,16 +70,75 @@ def in_chunks(cases: tuple[Case, ...], size: int) -> tuple[CaseChunk, ...]:
     return tuple(CaseChunk(cases[first : first + size]) for first in range(0, len(cases), size))
 
 
+@dataclass(frozen=True, slots=True)
+class JudgedCases:
+    """The outcomes of some cases.
+
+    Attributes
+    ----------
+    outcomes : tuple[Outcome, ...]
+        The outcomes in the order of the cases.
+    trouble : str
+        What kept the process from noting them in the journal; empty if nothing did.
+    """
+
+    outcomes: tuple[Outcome, ...]
+    trouble: str = ""
+
+
+def judge_and_note(
+    question: Property,
+    subject: Subject,
+    chunk: CaseChunk,
+    notes: Notes,
+    earlier: Mapping[int, Outcome],
+    count: Count | None = None,
+) -> JudgedCases:
+    """Judge some cases, and note each outcome at once.
+
+    Parameters
+    ----------
+    question : Property
+        The property.
+    subject : Subject
+        The formulation.
+    chunk : CaseChunk
+        The cases.
+    notes : Notes
+        The place in the journal.
+    earlier : Mapping[int, Outcome]
+        {place in the chunk: outcome} of the cases that are judged already. They are not judged again.
+    count : Callable[[int], None] | None
+        A function that is called with the number of finished cases.
+
+    Returns
+    -------
+    JudgedCases
+        All outcomes, those from earlier too.
+    """
+    return JudgedCases(judge_chunk(question, subject, chunk, count, earlier=earlier, note=notes.add), notes.trouble)
+
+
 def judge_chunk(
-    question: Property, subject: Subject, chunk: CaseChunk, count: Count | None = None
+    question: Property,
+    subject: Subject,
+    chunk: CaseChunk,
+    count: Count | None = None,
+    *,
+    earlier: Mapping[int, Outcome] = MappingProxyType({}),
+    note: Callable[[int, Outcome], None] = lambda place, outcome: None,
 ) -> tuple[Outcome, ...]:
     """Judge some cases; the outcomes hold summaries, because the parent has the cases."""
-    outcomes = []
-    for number, case in enumerate(chunk.cases, start=1):
+    outcomes: list[Outcome] = []
+    for place, case in enumerate(chunk.cases):
+        if place in earlier:
+            outcomes.append(earlier[place])
+            continue
         outcome = judging.judge_case(question, case, subject)
         outcomes.append(replace(outcome, case_or_summary=outcome.summary))
+        note(place, outcomes[-1])
         if count is not None:
-            count(number)
+            count(place + 1)
     return tuple(outcomes)
 
 

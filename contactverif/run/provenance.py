@@ -32,8 +32,7 @@ def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, s
         {attribute of the report: value}.
     """
     return {
-        **{f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES},
-        "python_version": platform.python_version(),
+        **collect_versions(),
         "commit": _commit(),
         "profile": profile,
         "examples": str(examples),
@@ -42,6 +41,12 @@ def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, s
         "platform": platform.platform(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+def collect_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries whose results a run depends on."""
+    versions = {f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES}
+    return versions | {"python_version": platform.python_version()}
 
 
 def _version(package: str) -> str:

@@ -22,17 +22,33 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, STATED_PARTS, Subject
-from contactverif.run.conductor import Conductor, Progress
+from contactverif.run.conductor import Conductor
 from contactverif.run.driver import CaseSource
 from contactverif.run.judging import judge_case
 from contactverif.run.open_row import OpenRow
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
+from contactverif.run.run_journal import Journal, NoJournal
 from contactverif.run.sampling import Sampling
+from contactverif.run.tasks import Progress
 from contactverif.run.witnesses import find_witness
 from contactverif.run.workers import Team
 
-__all__ = ["PROFILES", "Profile", "Progress", "judge_case", "profile_named", "run"]
+__all__ = ["PROFILES", "Profile", "Progress", "RunStopped", "judge_case", "profile_named", "run"]
+
+
+class RunStopped(KeyboardInterrupt):
+    """The user has stopped a run.
+
+    Parameters
+    ----------
+    run : Run
+        The rows as far as they are judged; a row that is not complete is not judged, and its reason says so.
+    """
+
+    def __init__(self, run: Run) -> None:
+        super().__init__("the run was stopped")
+        self.run = run
 
 
 def run(
@@ -47,6 +63,7 @@ def run(
     known: Mapping[str, str] | None = None,
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
+    journal: Journal | None = None,
 ) -> Run:
     """Check every property of every formulation.
 
@@ -73,6 +90,8 @@ def run(
         Worker processes that do the pieces of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
         or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
         process does all.
+    journal : Journal | None
+        The journal, in which every outcome is noted, and whose outcomes are not judged again.
 
     Returns
     -------
@@ -85,6 +104,8 @@ def run(
         If a known failure names no property of this run, or a name stands there twice.
     WorkerError
         If a worker process dies.
+    RunStopped
+        If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
     """
     known = known or {}
     loaded = [subject for subject in subjects if isinstance(subject, Subject)]
@@ -100,28 +121,45 @@ def run(
         interface=interface if scene is None else scene.interface,
         scene=scene,
     )
+    rows = open_rows(loaded, questions, sampling, known)
+    journal = journal or NoJournal()
+    conductor = Conductor(sampling, Team(executor), progress or (lambda _: None), journal)
+
+    def make_run() -> Run:
+        return Run(
+            rows=tuple(conductor.close(row) if isinstance(row, OpenRow) else row for row in rows),
+            not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
+            provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
+            opposite_signs=tuple(subject.name for subject in loaded if subject.name in conductor.opposite_signs),
+            provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=sampling.seed),
+        )
+
+    try:
+        conductor.check_signs(loaded, {question.id: question for question in questions})
+        conductor.judge([row for row in rows if isinstance(row, OpenRow)])
+    except KeyboardInterrupt:
+        raise RunStopped(make_run()) from None
+    finally:
+        journal.close()
+    return make_run()
+
+
+def open_rows(
+    subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling, known: Mapping[str, str]
+) -> list[OpenRow | Row]:
+    """Return a row for each formulation and property: one whose cases are to be judged, or a complete one."""
     sources = {sampling.group(question): sampling.source(question) for question in questions}
-    rows = [
+    return [
         _open(
             subject,
             question,
             sources[sampling.group(question)],
             known=known.get(question.id, ""),
-            on_scene=scene is not None,
+            on_scene=sampling.scene is not None,
         )
-        for subject in loaded
+        for subject in subjects
         for question in questions
     ]
-    conductor = Conductor(sampling, Team(executor), progress or (lambda _: None))
-    conductor.check_signs(loaded, {question.id: question for question in questions})
-    conductor.judge([row for row in rows if isinstance(row, OpenRow)])
-    return Run(
-        rows=tuple(conductor.close(row) if isinstance(row, OpenRow) else row for row in rows),
-        not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
-        provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
-        opposite_signs=tuple(subject.name for subject in loaded if subject.name in conductor.opposite_signs),
-        provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=resolved.seed),
-    )
 
 
 def _check_once(argument: str, names: Sequence[str]) -> None:

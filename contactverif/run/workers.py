@@ -4,7 +4,7 @@ Rules for the next editor:
 
 - A piece that cannot travel, because a notebook or a function defines its formulation, runs in the parent.
 - A worker that dies ends the run with one clear line. The run never waits for a dead worker.
-- Ctrl-C goes to the parent alone, which ends the workers.
+- Ctrl-C goes to the parent alone, which ends the workers. If the parent is killed, they end by themselves.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from contactverif.contract.errors import ContactverifError, MisuseError
@@ -99,14 +101,33 @@ def _context() -> Any:
 
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
-    forkserver.ensure_running()  # It imports while the parent goes on.
+    with _interrupts_wait():  # The server inherits that, and hears no Ctrl-C.
+        forkserver.ensure_running()  # It imports while the parent goes on.
     return context
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Open a block behind which Ctrl-C is heard at the latest."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin() -> None:
     """Leave interrupts to the parent, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent()
+    parent = multiprocessing.parent_process()
+    if parent is not None:  # The server of processes may outlive it.
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
 
 
 class Team:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from contactverif.contract.errors import MisuseError
 
+_LARGE = 2**26  # The size of a large file, in bytes.
+
 
 def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument: str = "path") -> Path:
     """Return the path if its name ends as a file of that kind does.
@@ -62,6 +64,19 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
         raise MisuseError(
             argument, f"{name}: {error.strerror}", "a folder that may be written to, and a name of usual length"
         ) from error
+
+
+def reason_not_to_grow(path: Path) -> str:
+    """Return why a file in the folder of a path cannot become large, such as a full disk; empty if it can."""
+    part = _part(path.resolve())
+    try:
+        with open(part, "wb") as file:
+            os.posix_fallocate(file.fileno(), 0, _LARGE)
+    except OSError as error:
+        return error.strerror or ""
+    finally:
+        part.unlink(missing_ok=True)
+    return ""
 
 
 def made_folder(folder: Path, argument: str) -> None:

@@ -526,25 +526,27 @@ def running(slow_plugin: Path, tmp_path: Path, nts_report: Path) -> Iterator[sub
             process.kill()
 
 
-def left_behind(process: subprocess.Popen[str], folder: Path, report: Path) -> None:
-    """Check that the older report is still there, and no other file."""
-    assert (folder / "r.nc").read_bytes() == report.read_bytes()
-    assert sorted(path.name for path in folder.iterdir()) == ["judging", "r.nc"]
+def left_behind(folder: Path, report: Path) -> None:
+    """Check that the earlier report is there, but not under the name of this one."""
+    assert sorted(path.name for path in folder.iterdir()) == ["judging", "r.nc.journal"]
+    assert (folder / "r.nc.journal" / "earlier.nc").read_bytes() == report.read_bytes()
 
 
-def test_a_killed_run_leaves_the_report_that_was_there(
+def test_a_killed_run_keeps_the_report_that_was_there_apart(
     running: subprocess.Popen[str], tmp_path: Path, nts_report: Path
 ) -> None:
     running.send_signal(signal.SIGKILL)
     assert running.wait(30) == -signal.SIGKILL
-    left_behind(running, tmp_path / "here", nts_report)
+    left_behind(tmp_path / "here", nts_report)
 
 
 def test_a_stopped_run_says_so(running: subprocess.Popen[str], tmp_path: Path, nts_report: Path) -> None:
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=30)
-    assert (running.returncode, out, err) == (130, "", "contactverif: stopped\n")
-    left_behind(running, tmp_path / "here", nts_report)
+    assert (running.returncode, err) == (130, "contactverif: stopped\n")
+    assert "stopped: 0 of 3 cases judged" in out
+    assert out.endswith("what was judged is kept; to go on: contactverif verify --resume r.nc\n")
+    left_behind(tmp_path / "here", nts_report)
 
 
 # ---------------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,273 @@
+"""The job of a run of `verify`: its options, checked and with everything settled that a journal must know.
+
+Rule for the next editor: an option that changes an outcome is a field of `VerifyOptions`, so that the journal has it.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.shared_options import IsolationOptions, PlaceOptions, SamplingOptions, WorkerOptions
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.contract.case import Case
+    from contactverif.contract.interface import Interface
+    from contactverif.run.profiles import Profile
+    from contactverif.run.run_journal import Journal, Plan
+    from contactverif.run.sampling import Sampling
+
+COMMAND = "verify"
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyOptions:
+    """The options of `verify`, as they are typed or as a journal has them."""
+
+    names: tuple[str, ...] = ()
+    properties: tuple[str, ...] = ()
+    sampling: SamplingOptions = field(default_factory=SamplingOptions)
+    out: tuple[Path, ...] = ()
+    pictures: Path | None = None
+    known: tuple[str, ...] = ()
+    place: PlaceOptions = field(default_factory=PlaceOptions)
+    workers: WorkerOptions = field(default_factory=WorkerOptions)
+    isolation: IsolationOptions = field(default_factory=IsolationOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyJob:
+    """A run of `verify` before it begins.
+
+    Attributes
+    ----------
+    options : VerifyOptions
+        The options. The properties are ids, and the seed is a number.
+    profile : Profile
+        The number of cases and the seed.
+    files : OutputFiles
+        The files to write.
+    pictures : PictureFolder | None
+        The folder of pictures.
+    scene : Case | None
+        The scene on which everything is checked.
+    interface : Interface | None
+        The interface on which everything is checked.
+    known : dict[str, str]
+        {property: reason} of the known failures.
+    sources : tuple[Path, ...]
+        The journals whose outcomes are not judged again.
+    resumes : bool
+        The run goes on with its own journal.
+    """
+
+    options: VerifyOptions
+    profile: Profile
+    files: OutputFiles
+    pictures: PictureFolder | None
+    scene: Case | None
+    interface: Interface | None
+    known: dict[str, str]
+    sources: tuple[Path, ...] = ()
+    resumes: bool = False
+
+    @property
+    def jobs(self) -> int:
+        """The number of processes."""
+        n_cases = self.options.sampling.planned_examples()
+        return self.options.workers.number(len(self.options.names), len(self.options.properties), n_cases)
+
+    @property
+    def sampling(self) -> Sampling:
+        """The size and the seed of the run, and the place where it asks."""
+        from contactverif.run.sampling import Sampling
+
+        assert self.profile.seed is not None
+        place = self.interface if self.scene is None else self.scene.interface
+        return Sampling(self.profile.examples, self.profile.seed, place, self.scene)
+
+    @property
+    def output(self) -> Path | None:
+        """The file that the journal belongs to: the report, or else the page."""
+        return self.files.names.get(REPORT) or self.files.names.get(PAGE)
+
+    @property
+    def resume_line(self) -> str:
+        """The command that goes on with this run; empty if it has no journal."""
+        return f"contactverif verify --resume {shlex.quote(str(self.output))}" if self.output is not None else ""
+
+    def plan(self) -> Plan:
+        """Return the plan for the header of a journal."""
+        return make_plan(COMMAND, self.options, self.profile)
+
+    @contextmanager
+    def journal(self) -> Iterator[Journal]:
+        """Open a block with the journal of the run. In it no other process goes on with the same journal."""
+        from contactverif.run.journal_folder import begin_journal, hold_journal, journal_folder, keep_earlier
+        from contactverif.run.run_journal import Journal
+
+        plan = self.plan()
+        if self.output is None:
+            yield Journal(plan, None, self.sources)
+            return
+        folder = journal_folder(self.files.paths[self.output.suffix.lower()])
+        if not self.resumes and (aside := begin_journal(folder, plan, self.files.paths.values())):
+            folder_aside = self.output.parent / aside
+            typer.echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", err=True)
+        with hold_journal(folder, "--resume" if self.resumes else "--out"):
+            keep_earlier(folder, self.files.paths.values())
+            yield Journal(plan, folder, self.sources)
+
+
+def new_job(options: VerifyOptions, *, fresh_seed: int | None = None) -> VerifyJob:
+    """Return the job of options as they were typed.
+
+    Parameters
+    ----------
+    options : VerifyOptions
+        The options; the names are those of formulations.
+    fresh_seed : int | None
+        The seed if neither the options nor the profile have one; None draws a new one.
+
+    Raises
+    ------
+    MisuseError
+        If an option is wrong.
+    """
+    from contactverif.run.profiles import profile_named
+    from contactverif.run.registry import matching_ids
+
+    sampling = options.sampling
+    profile = profile_named(sampling.profile or "dev").resolve(
+        examples=sampling.examples, seed=sampling.seed, fresh=fresh_seed
+    )
+    files = OutputFiles.check(list(options.out), (REPORT, PAGE))
+    folder = PictureFolder.make(options.pictures)
+    settled = replace(
+        options,
+        properties=matching_ids(options.properties or ("*",)),
+        sampling=SamplingOptions(profile.examples, profile.seed, profile.name),
+    )
+    scene = options.place.make_scene()
+    interface = options.place.read_interface()
+    return VerifyJob(settled, profile, files, folder, scene, interface, _known_failures(options.known))
+
+
+def resumed_job(output: Path, typed: VerifyOptions) -> VerifyJob:
+    """Return the job that goes on with a run that was stopped.
+
+    Parameters
+    ----------
+    output : Path
+        The report that the run was to write, or its page.
+    typed : VerifyOptions
+        The options beside `--resume`. Only a number of processes may be among them.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such journal, versions differ, or there are other options.
+    """
+    from contactverif.run.journal_folder import journal_folder, read_plan
+
+    folder = journal_folder(output)
+    if output.exists() and not folder.exists():
+        raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")
+    plan = read_plan(folder, "--resume")
+    _check_alone(typed)
+    options = options_of(plan, COMMAND, "--resume")
+    others = [path for path in options.out if path.suffix.lower() != output.suffix.lower()]
+    workers = typed.workers if typed.workers.jobs is not None else options.workers
+    job = new_job(replace(options, out=(output, *others), workers=workers))
+    return replace(job, sources=(folder,), resumes=True)
+
+
+def make_plan(command: str, options: VerifyOptions, profile: Profile) -> Plan:
+    """Return the plan of a command, for the header of its journal."""
+    import msgspec
+
+    from contactverif.run.run_journal import Plan
+
+    assert profile.seed is not None
+    return Plan(
+        command=command,
+        options=msgspec.to_builtins(options, enc_hook=str),
+        folder=os.getcwd(),
+        versions=versions_of(options),
+        formulations=options.names,
+        properties=options.properties,
+        profile=profile.name,
+        examples=profile.examples,
+        seed=profile.seed,
+    )
+
+
+def versions_of(options: VerifyOptions) -> dict[str, str]:
+    """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
+    from contactverif.run.code_digests import code_digests
+    from contactverif.run.provenance import collect_versions
+
+    return collect_versions() | code_digests(options.names, options.properties)
+
+
+def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
+    """Return the options that a journal has, with files relative to today's working folder.
+
+    Raises
+    ------
+    MisuseError
+        If the journal is of another command, its options are none, or versions differ.
+    """
+    import msgspec
+
+    from contactverif.run.journal_folder import check_versions
+
+    if plan.command != command:
+        raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")
+    try:
+        options = msgspec.convert(plan.options, VerifyOptions, dec_hook=_to_path)
+    except (msgspec.ValidationError, TypeError) as error:
+        raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
+    check_versions(plan.versions, versions_of(options), argument)
+    if os.getcwd() == plan.folder:
+        return options
+    base = Path(plan.folder)
+    mesh = options.place.mesh and base / options.place.mesh
+    pictures = options.pictures and base / options.pictures
+    place = replace(options.place, mesh=mesh)
+    return replace(options, out=tuple(base / path for path in options.out), pictures=pictures, place=place)
+
+
+def _to_path(kind: type, value: Any) -> Any:
+    if kind is Path and isinstance(value, str):
+        return Path(value)
+    raise TypeError(f"{kind.__name__} expected")
+
+
+def _check_alone(typed: VerifyOptions) -> None:
+    """Refuse other options beside `--resume`: the journal has them all."""
+    defaults = VerifyOptions()
+    for name in (entry.name for entry in fields(VerifyOptions)):
+        if name != "workers" and getattr(typed, name) != getattr(defaults, name):
+            needed = "--jobs at most: all other options come from the journal"
+            raise MisuseError("--resume", f"{name} beside it", needed)
+
+
+def _known_failures(texts: Sequence[str]) -> dict[str, str]:
+    """Return {property: reason} of each ID=REASON."""
+    reasons = {}
+    for text in texts:
+        property_id, _, reason = text.partition("=")
+        if not (property_id and reason):
+            raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
+        reasons[property_id] = reason
+    return reasons

@@ -1,0 +1,137 @@
+"""A run of `verify` that is killed, stopped, or has no room to write: what is judged is kept, and the run goes on."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from asking import Ask, asking
+
+from contactverif.run.journal_folder import begin_journal, journal_folder
+from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.outcome_store import OutcomeStore
+from contactverif.run.run_journal import NO_PLAN
+from contactverif_reports.netcdf.differences import same_data
+
+MAIN = [sys.executable, "-c", "from contactverif.cli import main; main()"]
+IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
+RUN = ("verify", "nts", "vts-ppt", *(word for id_ in IDS for word in ("-p", id_)), "--examples", "60", "--seed", "1")
+N_ROWS = 6
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    return asking(monkeypatch, capsys)
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    report = tmp_path_factory.mktemp("unbroken") / "r.nc"
+    subprocess.run([*MAIN, *RUN, "--out", str(report)], check=True, capture_output=True)
+    return report
+
+
+def size_of(journal: Path) -> int:
+    return sum(path.stat().st_size for path in journal.glob("*.outcomes"))
+
+
+def kill_at(size: int, arguments: list[str], journal: Path) -> None:
+    """Run a command, kill it with SIGKILL when the journal has a size, and wait until its workers have ended."""
+    with subprocess.Popen([*MAIN, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        watched = psutil.Process(process.pid)
+        deadline = time.monotonic() + 120
+        while size_of(journal) < size:
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.001)
+        children = watched.children(recursive=True)
+        process.kill()
+    _, alive = psutil.wait_procs(children, timeout=60)
+    assert alive == []
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_run_that_is_killed_again_and_again_ends_with_the_report_of_an_unbroken_one(
+    ask: Ask, unbroken: Path, tmp_path: Path, jobs: str
+) -> None:
+    report, journal = tmp_path / "r.nc", tmp_path / "r.nc.journal"
+    kill_at(1, [*RUN, "--jobs", jobs, "--out", str(report)], journal)
+    for more in (8_000,):
+        kill_at(size_of(journal) + more, ["verify", "--resume", str(report)], journal)
+        assert not report.exists()
+    known = KnownOutcomes([journal], N_ROWS, 1000)
+    known.close()
+    assert known.n_outcomes > 0
+    assert known.n_twice == 0
+    answer = ask("verify", "--resume", report, "--jobs", "1")
+    assert (answer.status, answer.err) == (0, "")
+    assert f"report: {report}" in answer.out
+    assert same_data(unbroken, report) == []
+    assert list(tmp_path.iterdir()) == [report]
+
+
+def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
+    answer = ask("verify", "--resume", tmp_path / "none.nc")
+    assert (
+        answer.err
+        == "contactverif: --resume: found no journal none.nc.journal; needed that of a run that was stopped\n"
+    )
+    answer = ask("verify", "--resume", unbroken)
+    assert answer.status == 2
+    assert "which is complete" in answer.err
+    begin_journal(journal_folder(tmp_path / "r.nc"), NO_PLAN, [])
+    answer = ask("verify", "nts", "--resume", tmp_path / "r.nc")
+    assert answer.status == 2
+    assert "names beside it; needed --jobs at most" in answer.err
+
+
+def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = tmp_path / "r.nc"
+    kill_at(1, [*RUN, "--out", str(report)], tmp_path / "r.nc.journal")
+    monkeypatch.setattr("contactverif.run.code_digests._digest", lambda files: "another")
+    answer = ask("verify", "--resume", report)
+    assert answer.status == 2
+    assert answer.err.startswith("contactverif: --resume: found code of contactverif")
+    assert answer.err.endswith("here; needed the same, or a new run\n")
+
+
+def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
+    """The limit stops the journal, the report and the page."""
+    report = tmp_path / "r.nc"
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); "
+    command = [sys.executable, "-c", limit + MAIN[-1], *RUN, "--out", str(report), "--out", str(tmp_path / "r.html")]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 2
+    assert "patch.flat.transmission" in answer.stdout
+    lines = answer.stderr.splitlines()
+    assert lines == [
+        f"contactverif: {report} is not written: File too large",
+        f"contactverif: {tmp_path / 'r.html'} is not written: File too large",
+        "contactverif: the journal could not be written to its end: File too large",
+    ]
+    assert [path.name for path in tmp_path.iterdir()] == ["r.nc.journal"]
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 16384
+    assert ask("verify", "--resume", report).status == 0
+    assert same_data(unbroken, report) == []
+    assert (tmp_path / "r.html").exists()
+
+
+def test_a_run_that_lost_an_outcome_is_not_green(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    append = OutcomeStore.append
+    losses: list[object] = []
+
+    def lose_one(store: OutcomeStore, *arguments: object) -> None:
+        if len(store) == 3 and not losses:
+            losses.extend(arguments)
+        else:
+            append(store, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(OutcomeStore, "append", lose_one)
+    answer = ask("verify", "vts-ppt", "-p", "patch.flat.resultant", "--examples", "20", "--out", tmp_path / "r.nc")
+    assert answer.status == 1
+    assert "Not complete: vts-ppt patch.flat.resultant: outcomes of 19 of 20 cases." in answer.out
