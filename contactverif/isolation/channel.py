@@ -1,4 +1,4 @@
-"""Frames of bytes over a socket: four bytes of length, then the bytes.
+"""Frames of bytes over a socket: eight bytes of length, then the bytes.
 
 Rule for the next editor: the other end may send anything, or nothing, or a byte now and then. So a frame has a deadline
 for all of it, and no memory is taken before its bytes have come.
@@ -6,9 +6,12 @@ for all of it, and no memory is taken before its bytes have come.
 
 from __future__ import annotations
 
+import os
+import select
 import socket
 import struct
-from time import monotonic
+from math import ceil, inf
+from time import perf_counter
 
 _LENGTH = struct.Struct("<Q")
 _PIECE = 1 << 16
@@ -39,10 +42,15 @@ class Channel:
     """
 
     def __init__(self, end: socket.socket, largest: int = 1 << 62) -> None:
+        end.setblocking(False)
         self._end, self._largest = end, largest
+        self._file = end.fileno()
         self._rest = b""
+        self._polls = {event: select.poll() for event in (select.POLLIN, select.POLLOUT)}
+        for event, poll in self._polls.items():
+            poll.register(self._file, event)
 
-    def send(self, *frames: bytes, seconds: float | None = None) -> None:
+    def send(self, *frames: bytes, seconds: float = inf) -> None:
         """Send some frames.
 
         Raises
@@ -50,17 +58,19 @@ class Channel:
         ClosedError
             If the other end is closed.
         TooLateError
-            If the other end does not read for so many seconds.
+            If the other end does not read all of it within so many seconds.
         """
-        self._end.settimeout(seconds)
-        try:
-            self._end.sendall(b"".join(part for frame in frames for part in (_LENGTH.pack(len(frame)), frame)))
-        except TimeoutError:
-            raise TooLateError from None
-        except OSError:
-            raise ClosedError from None
+        data = memoryview(b"".join(part for frame in frames for part in (_LENGTH.pack(len(frame)), frame)))
+        deadline = perf_counter() + seconds
+        while data:
+            try:
+                data = data[os.write(self._file, data[:_LARGEST_PIECE]) :]
+            except BlockingIOError:
+                self._wait(select.POLLOUT, deadline)
+            except OSError:
+                raise ClosedError from None
 
-    def receive(self, seconds: float | None = None) -> bytes:
+    def receive(self, seconds: float = inf) -> bytes:
         """Return the next frame.
 
         Raises
@@ -72,20 +82,18 @@ class Channel:
         TooLargeError
             If the frame is too long.
         """
-        data = self._rest
-        if not data:
-            self._end.settimeout(seconds)
-            data = self._read(_PIECE)
+        deadline = perf_counter() + seconds
+        data = self._rest or self._read(_PIECE, deadline)
         end = _LENGTH.size + _LENGTH.unpack_from(data)[0] if len(data) >= _LENGTH.size else 1 << 63
         if end > len(data):
-            return self._receive_in_pieces(data, None if seconds is None else monotonic() + seconds)
+            return self._receive_in_pieces(data, deadline)
         self._rest = data[end:]  # All of it came at once, as nearly always.
         return data[_LENGTH.size : end]
 
-    def _receive_in_pieces(self, data: bytes, deadline: float | None) -> bytes:
+    def _receive_in_pieces(self, data: bytes, deadline: float) -> bytes:
         parts, have = [data], len(data)
         while have < _LENGTH.size:
-            parts.append(self._read_before(deadline, _PIECE))
+            parts.append(self._read(_PIECE, deadline))
             have += len(parts[-1])
         head = b"".join(parts)
         length = int(_LENGTH.unpack_from(head)[0])
@@ -94,30 +102,27 @@ class Channel:
         whole = _LENGTH.size + length
         parts, have = [head], len(head)
         while have < whole:
-            parts.append(self._read_before(deadline, min(max(whole - have, _PIECE), _LARGEST_PIECE)))
+            parts.append(self._read(min(max(whole - have, _PIECE), _LARGEST_PIECE), deadline))
             have += len(parts[-1])
         together = b"".join(parts)
         self._rest = together[whole:]
         return together[_LENGTH.size : whole]
 
-    def _read_before(self, deadline: float | None, size: int) -> bytes:
-        if deadline is not None:
-            left = deadline - monotonic()
-            if left <= 0:
-                raise TooLateError
-            self._end.settimeout(left)
-        return self._read(size)
-
-    def _read(self, size: int) -> bytes:
+    def _read(self, size: int, deadline: float) -> bytes:
+        self._wait(select.POLLIN, deadline)
         try:
-            data = self._end.recv(size)
-        except TimeoutError:
-            raise TooLateError from None
+            data = os.read(self._file, size)
         except OSError:
             data = b""
         if not data:
             raise ClosedError
         return data
+
+    def _wait(self, event: int, deadline: float) -> None:
+        """Wait until the socket can be read or written."""
+        left = None if deadline == inf else max(0, ceil(1000 * (deadline - perf_counter())))
+        if not self._polls[event].poll(left):
+            raise TooLateError
 
     def close(self) -> None:
         """Close this end."""

@@ -32,6 +32,8 @@ from contactverif.isolation.messages import MessageError, Reply, decode_reply
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
 _run = uuid.uuid4().hex
+_LIBC = ctypes.CDLL(None)
+_CALLS_ON_A_CORE = 32  # The judge may be moved to another core now and then.
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
 _LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in its own memory.
@@ -75,6 +77,7 @@ class PluginProcess:
         assert self._process.stdout is not None
         self.output = Output(self._process.stdout)
         self._known_verbs: set[str] = set()
+        self._n_sent, self._core = 0, -1
 
     def send(self, verb: str, requests: Iterable[bytes]) -> None:
         """Send requests.
@@ -91,12 +94,26 @@ class PluginProcess:
         PluginError
             If the process has ended, or does not read. It is ended then.
         """
+        if self._n_sent % _CALLS_ON_A_CORE == 0:
+            self._follow()
+        self._n_sent += 1
         try:
             self._channel.send(*requests, seconds=self._limits.start_seconds)
         except TooLateError:
             raise self._end_with(f"{verb}: its process does not listen", "hang") from None
         except ClosedError:
             raise self._end_with(verb, "") from None
+
+    def _follow(self) -> None:
+        """Put the process on the core of the judge, for one of the two always waits for the other.
+
+        To wake a process on another core that sleeps takes longer than most answers.
+        """
+        core = _core_of_judge()
+        if core not in (-1, self._core):
+            with suppress(OSError):
+                os.sched_setaffinity(self._process.pid, {core})
+            self._core = core
 
     def receive(self, verb: str) -> Reply:
         """Return the next reply.
@@ -196,11 +213,16 @@ def _end_at_exit() -> None:
     util.Finalize(None, end_marked, exitpriority=10)
 
 
+def _core_of_judge() -> int:
+    """Return the number of the core that this process runs on, −1 where nobody says."""
+    return int(_LIBC.sched_getcpu()) if sys.platform == "linux" else -1
+
+
 def adopt_orphans() -> None:
     """Become the parent of whatever a plugin's process leaves behind, so that `end_marked` finds it. Linux only."""
     global _adopts
     if sys.platform == "linux":
-        _adopts = ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
+        _adopts = _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
 
 
 def end_marked() -> None:

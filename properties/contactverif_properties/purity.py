@@ -16,6 +16,10 @@ change of the residual from one state to the other over the way between them. A 
 that was changed, fails in words. A pairing with a handle is made twice at one state, with another state in between: it
 must have the same entries and give the same answers.
 
+A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
+depend on: the seed of hashes, the number of threads, and the state that was asked first. The pairing is the same, and
+the residual is held to that of the first process as a batch is held to a loop, since threads may add in another order.
+
 Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a batch
 is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape) as if
 nodes had moved by uX. That changes an entry by uX times the slope of K, the larger of |K|/ℓ and the change of the
@@ -55,6 +59,12 @@ BATCHED = Quantity(
     "8u",
     "A batch may round otherwise, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
 )
+ELSEWHERE = Quantity(
+    "difference from a second process",
+    "1",
+    "8u",
+    "Threads may add in another order, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
+)
 IN_ONE_CALL = Quantity(
     "entries of residual and tangent in one call that change with the order of calls", "1", "0", REASON
 )
@@ -87,8 +97,9 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     Measurement
         The entries of the residual that change in a repeated call, the entries of residual, tangent and contact points
         that change with the order of calls, and the difference between a batch and a loop, where the formulation takes
-        batches. The batch holds the state and one so near that its pairing is nearly the same. Where the formulation
-        computes residual and tangent in one call, its differences from the two calls at these two states.
+        batches. The difference from a second process, where the formulation has one of its own. The batch holds the
+        state and one so near that its pairing is nearly the same. Where the formulation computes residual and tangent
+        in one call, its differences from the two calls at these two states.
     """
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
@@ -131,6 +142,14 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         values[BATCHED.name] = compare_batch(state, near, forces, batch)
         tolerances[BATCHED.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+    if (there := subject.elsewhere()) is not None:
+        far = there.with_penalty(penalty)
+        far.residual(other, far.pair(other, z_other), z_other)
+        if far.pair(interface, z) != pairing:
+            broken.append("the pairing of a state differs in another process")
+        forces_there = np.array([far.residual(interface, pairing, u) for u in (z, near)])
+        values[ELSEWHERE.name] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
+        tolerances[ELSEWHERE.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
     if "residual_and_tangent" in formulation.provides:
         values[IN_ONE_CALL.name], tolerances[IN_ONE_CALL.name] = changes.residual_and_tangent, 0.0
         tangents = np.array([dense(formulation.tangent(interface, pairing, u)) for u in (z, near)])
@@ -213,7 +232,7 @@ PURITY = Property(
     id="purity",
     family="invariants",
     summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
-    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
+    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, ELSEWHERE, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=any_cases,
     measure=measure_purity,
     promise=lambda traits: True,

@@ -46,6 +46,20 @@ class HandledAtTimes(HandledSprings):
         return super().pair(interface, z) if z[0] < 1000 else Springs.pair(self, interface, z)
 
 
+class KnowsItsProcess(Springs):
+    """Its forces depend on the seed of hashes, which differs from process to process."""
+
+    def residual(self, interface, pairing, z):
+        return super().residual(interface, pairing, z) * (1 + 1e-9 * (hash("spring") % 1000))
+
+
+class PairsByThreads(Springs):
+    """Its pairing depends on the number of threads."""
+
+    def pair(self, interface, z):
+        return {**super().pair(interface, z), "threads": np.array([int(os.environ.get("OMP_NUM_THREADS", "1"))])}
+
+
 class RaisesInMake:
     def __init__(self, *, penalty):
         if penalty != 1.0:

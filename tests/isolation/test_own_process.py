@@ -8,6 +8,7 @@ import time
 import numpy as np
 import psutil
 import pytest
+from isolation import hostile_few
 
 from contactverif import Pairing, Subject, load_formulation, load_properties, named_case, verify
 from contactverif.contract.arrays import dense
@@ -134,6 +135,25 @@ def test_one_that_always_ends_its_process_is_not_asked_for_ever(monkeypatch: pyt
     assert reasons[-1] == "not asked: its process ended 2 times"
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Springs", None),
+        ("KnowsItsProcess", "difference from a second process"),
+        ("PairsByThreads", "the pairing of a state differs in another process"),
+    ],
+)
+def test_purity_asks_a_second_process(name: str, words: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONHASHSEED", "1")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    (question,) = load_properties(["purity"])
+    (here,) = verify([Subject(name, getattr(hostile_few, name))], [question], examples=4, seed=1).rows
+    (there,) = verify([load_remote(LOADER, name, QUICK)], [question], examples=4, seed=1).rows
+    assert here.verdict is Verdict.PASS
+    assert there.verdict is (Verdict.FAIL if words else Verdict.PASS), there.reason
+    assert words is None or words in there.reason
+
+
 def test_a_damaged_pairing_of_the_judge_is_refused_there_as_here() -> None:
     formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
     pairing = Pairing({"other": np.zeros(3, np.int64)})
@@ -154,8 +174,12 @@ def test_a_formulation_that_cannot_be_imported_is_not_loaded() -> None:
 
 def test_nothing_it_started_is_left_behind() -> None:
     ask(load_remote(LOADER, "LeavesChildren", QUICK))
-    marked = [p.pid for p in psutil.process_iter() if _is_marked(p)]
-    assert len(marked) >= 2
+    for _ in range(500):
+        marked = [p.pid for p in psutil.process_iter() if _is_marked(p)]
+        if len(marked) > 1:
+            break
+        time.sleep(0.01)
+    assert len(marked) > 1
     host.end_all()
     time.sleep(0.1)
     assert not [pid for pid in marked if psutil.pid_exists(pid) and psutil.Process(pid).status() != "zombie"]
