@@ -249,7 +249,7 @@ class CheckedFormulation:
         self._check_size(interface, z)
         pairing = self._pairing_at(interface, pairing, z)
         tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
-        return _check_tangent("tangent", tangent, z.size)
+        return _check_tangent("tangent", tangent, z.size, copy=not self._remote)
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing | None, z: FloatArray
@@ -264,7 +264,9 @@ class CheckedFormulation:
         if not isinstance(answer, tuple) or len(answer) != 2:
             kind = f"a tuple of {len(answer)}" if isinstance(answer, tuple) else f"a {type(answer).__name__}"
             raise ContractError(f"{verb}: returned {kind}; needed a tuple (residual, tangent)")
-        return _check_forces(f"{verb}[0]", answer[0], z), _check_tangent(f"{verb}[1]", answer[1], z.size)
+        return _check_forces(f"{verb}[0]", answer[0], z), _check_tangent(
+            f"{verb}[1]", answer[1], z.size, copy=not self._remote
+        )
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points at one state z (n_unknowns,)."""
@@ -321,15 +323,19 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
     return copy
 
 
-def _check_tangent(verb: str, tangent: Any, size: int) -> Any:
-    """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb."""
+def _check_tangent(verb: str, tangent: Any, size: int, *, copy: bool) -> Any:
+    """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb.
+
+    What came from another process is a checked copy already.
+    """
     if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
         raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
     if tangent.shape != (size, size):
         raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
     if tangent.dtype != np.float64:
         raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
-    tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
+    if copy:
+        tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
     entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
     if not np.isfinite(entries).all():
         raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
