@@ -367,7 +367,7 @@ def main(count: int, seed: int) -> int:
             campaign.attack_with_strange_files()
             for number in range(count):
                 campaign.attack(number, seed)
-        finally:  # Also where Ctrl-C ends it.
+        finally:  # Where Ctrl-C ends it, too.
             print(campaign.table.text(), flush=True)
     return int(bool(campaign.harm))
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
+import numpy as np
 import pytest
 from damage import BYTES
 from damaged_reports import TREES, Campaign, lie_about_sizes, write_report
 
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.netcdf import stored_groups
+from contactverif.scenes.catalogue import load_scene
+from contactverif_reports.netcdf import bench_file, stored_groups
+from contactverif_reports.netcdf.bench_file import read_bench
 from contactverif_reports.netcdf.read import read_run
+from contactverif_reports.netcdf.stored_bodies import check_bodies
 
+BENCH = Path(__file__).parents[2] / "reports" / "bench" / "bench.nc"
 N_CHANGED, N_WRITTEN = 15, 5  # Files of each kind of damage, to the bytes and to the contents.
 # Small damage may hit what nobody reads, such as a comment or the space between two arrays.
 HARMLESS = ("one bit", "one byte", "another attribute", "an attribute is missing", "other numbers")
@@ -78,3 +85,63 @@ def test_counts_that_contradict_each_other_are_damage(campaign: Campaign) -> Non
                 file.setncattr(change, 99)
         with pytest.raises(MisuseError, match=words):
             read_run(path)
+
+
+@pytest.mark.parametrize("kind", BYTES)
+def test_a_damaged_file_of_a_bench_is_read_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:
+    whole = BENCH.read_bytes()
+    for number in range(3):
+        (tmp_path / "a.nc").write_bytes(BYTES[kind](whole, random.Random(f"{kind}/{number}")))
+        try:
+            results = read_bench(tmp_path / "a.nc")
+        except MisuseError as error:
+            reason = str(error)
+        else:
+            reason = f"FILE: {len(results.cells)} cells"
+        assert reason.startswith("FILE: ")
+        assert "\n" not in reason
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("outcome", lambda values: values + 7, "a code without a meaning"),
+        ("scene", lambda values: values - 9, "a code without a meaning"),
+        ("stiffness", lambda values: values * np.nan, "a penalty is no finite number"),
+        ("formulation", lambda values: np.full_like(values, values[0]), "two formulations have one name"),
+        ("error", lambda values: values[:, :, :1], "errors has the shape"),
+    ],
+)
+def test_a_bench_that_contradicts_itself_is_damage(
+    name: str, change: Callable[[np.ndarray], np.ndarray], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    groups = bench_file.read_groups(BENCH, "FILE", "a bench")
+    variable = groups["/"][name]
+    variables = {**groups["/"], name: replace(variable, values=change(variable.values))}
+    monkeypatch.setattr(
+        bench_file, "read_groups", lambda *_: {**groups, "/": replace(groups["/"], variables=variables)}
+    )
+    with pytest.raises(MisuseError, match=f"which is damaged .*{words}"):
+        read_bench(BENCH)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("contact", lambda values: values * 1e300, "holds a number that no node has"),
+        ("cells", lambda values: values + 0.5, "holds a number that no node has"),
+        ("cells", lambda values: np.full_like(values, -1.0), "are not those that are there"),
+        ("count", lambda values: values + 1, "are not those that are there"),
+        ("nodes", lambda values: values[:, 0], "has the shape"),
+        ("young", lambda values: values * np.nan, "has the shape .* or NaN"),
+    ],
+)
+def test_bodies_are_checked_before_they_are_drawn(
+    name: str, change: Callable[[np.ndarray], np.ndarray], words: str
+) -> None:
+    parameters = dict(load_scene("c-prime").case().parameters)
+    check_bodies(parameters)
+    parameters[f"bodies_{name}"] = change(np.array(parameters[f"bodies_{name}"]))
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match=words):
+        check_bodies(parameters)
+    check_bodies({"penetration": np.array(1.0)})
