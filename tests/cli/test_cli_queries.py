@@ -100,7 +100,7 @@ def test_the_exact_answers_may_have_another_name(ask: Ask, file: Path, tmp_path:
     assert ask("score", file, "--built-in", "--exact", exact).status == 0
     answer = ask("score", file, "--built-in")
     assert answer.status == 2
-    assert "queries.exact.txt: found No such file" in answer.err
+    assert "queries.exact.txt, which does not exist" in answer.err
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_exact_answers_may_have_another_name(ask: Ask, file: Path, tmp_path:
             ("score", "FILE", "--", "FOLDER/none"),
             "none: No such file or directory; needed a program that can be started",
         ),
-        (("score", "FOLDER/none.txt", "--built-in"), "none.txt: found No such file or directory; needed a text file"),
+        (("score", "FOLDER/none.txt", "--built-in"), "none.txt, which does not exist; needed a text file"),
     ],
 )
 def test_a_mistake_is_one_line(

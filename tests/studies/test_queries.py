@@ -211,7 +211,7 @@ def test_answers_to_other_queries_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match=r"missing\.txt: found No such file"):
+    with pytest.raises(MisuseError, match=r"missing\.txt, which does not exist"):
         read_queries(tmp_path / "missing.txt")
     (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(MisuseError, match=r"binary\.txt: found bytes that are no UTF-8 text"):

@@ -96,9 +96,9 @@ class TextLines:
         MisuseError
             If it cannot be read.
         """
-        size = check_ordinary(path, str(path), "a text file that can be read").st_size
+        size = check_ordinary(path, "FILE", "a text file that can be read").st_size
         if size > MOST_BYTES:
-            raise MisuseError(str(path), f"{size} bytes", f"a text file of at most {MOST_BYTES}")
+            raise MisuseError("FILE", f"{path} of {size} bytes", f"a text file of at most {MOST_BYTES}")
         try:
             return cls(str(path), path.read_text(encoding="utf-8"))
         except OSError as error:
