@@ -166,16 +166,17 @@ class OpenRow:
         examples : int
             The number of random cases of the run.
         """
+        outcomes = tuple(chain(self.outcomes, *(self._waiting[number] for number in sorted(self._waiting))))
         planned = self.planned or (len(self.source) if isinstance(self.source, tuple) else examples)
         self.row = replace(
             self.row,
             planned=planned,
-            outcomes=self.outcomes,
+            outcomes=outcomes,
             witness=self._witness_outcome,
             verdict=Verdict.NOT_JUDGED,
             reason=f"stopped: {self.n_finished} of {planned} cases judged"
             + (", the witness not yet" if self.n_finished == planned else ""),
-            seconds=sum(outcome.seconds for outcome in self.outcomes),
+            seconds=sum(outcome.seconds for outcome in outcomes),
         )
 
     def _may_stay_undecided(self, row: Row, *, on_scene: bool) -> bool:

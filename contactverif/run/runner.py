@@ -11,9 +11,12 @@ Rules for the next editor:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
+from operator import attrgetter
+from typing import TypeVar
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -35,6 +38,8 @@ from contactverif.run.witnesses import find_witness
 from contactverif.run.workers import Team
 
 __all__ = ["PROFILES", "Profile", "Progress", "RunStopped", "judge_case", "profile_named", "run"]
+
+_Kind = TypeVar("_Kind")
 
 
 class RunStopped(KeyboardInterrupt):
@@ -108,10 +113,9 @@ def run(
         If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
     """
     known = known or {}
-    loaded = [subject for subject in subjects if isinstance(subject, Subject)]
-    questions = [question for question in properties if isinstance(question, Property)]
-    _check_once("formulation", [subject.name for subject in loaded])
-    _check_once("property", [question.id for question in questions])
+    loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
+    _check_once("formulation", map(attrgetter("name"), loaded))
+    _check_once("property", map(attrgetter("id"), questions))
     _check_known(known, properties)
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
@@ -124,24 +128,33 @@ def run(
     rows = open_rows(loaded, questions, sampling, known)
     journal = journal or NoJournal()
     conductor = Conductor(sampling, Team(executor), progress or (lambda _: None), journal)
-
-    def make_run() -> Run:
-        return Run(
-            rows=tuple(conductor.close(row) if isinstance(row, OpenRow) else row for row in rows),
-            not_loaded=tuple(item for item in (*subjects, *properties) if isinstance(item, NotLoaded)),
-            provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
-            opposite_signs=tuple(subject.name for subject in loaded if subject.name in conductor.opposite_signs),
-            provenance=collect_provenance(profile=resolved.name, examples=resolved.examples, seed=sampling.seed),
-        )
-
+    make_run = partial(_make_run, conductor, rows, (*subjects, *properties), resolved)
     try:
         conductor.check_signs(loaded, {question.id: question for question in questions})
-        conductor.judge([row for row in rows if isinstance(row, OpenRow)])
+        conductor.judge(_of_kind(OpenRow, rows))
     except KeyboardInterrupt:
         raise RunStopped(make_run()) from None
     finally:
         journal.close()
     return make_run()
+
+
+def _make_run(
+    conductor: Conductor,
+    rows: Sequence[OpenRow | Row],
+    items: Sequence[Subject | Property | NotLoaded],
+    profile: Profile,
+) -> Run:
+    """Return the run with all rows as far as they are judged; the items are those that were to be judged."""
+    assert profile.seed is not None
+    loaded = _of_kind(Subject, items)
+    return Run(
+        rows=tuple(conductor.close(row) if isinstance(row, OpenRow) else row for row in rows),
+        not_loaded=tuple(_of_kind(NotLoaded, items)),
+        provided={subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in loaded},
+        opposite_signs=tuple(subject.name for subject in loaded if subject.name in conductor.opposite_signs),
+        provenance=collect_provenance(profile=profile.name, examples=profile.examples, seed=profile.seed),
+    )
 
 
 def open_rows(
@@ -162,7 +175,11 @@ def open_rows(
     ]
 
 
-def _check_once(argument: str, names: Sequence[str]) -> None:
+def _of_kind(kind: type[_Kind], items: Iterable[object]) -> list[_Kind]:
+    return [item for item in items if isinstance(item, kind)]
+
+
+def _check_once(argument: str, names: Iterable[str]) -> None:
     for name, times in Counter(names).items():
         if times > 1:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")

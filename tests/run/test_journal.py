@@ -31,7 +31,7 @@ from contactverif.run.known_outcomes import KnownOutcomes
 from contactverif.run.outcome_store import OutcomeStore
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run_journal import NO_PLAN, Journal
-from contactverif.run.runner import run
+from contactverif.run.runner import Progress, RunStopped, run
 from contactverif.run.sampling import Sampling
 from contactverif.scenes.named_states import named_case
 
@@ -186,6 +186,21 @@ def test_a_block_that_is_judged_is_not_drawn(
     second = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, None, [tmp_path]))
     assert numbers == [0]
     assert facts(first) == facts(second)
+
+
+def test_a_run_that_is_stopped_says_how_far_each_row_is() -> None:
+    def interrupt(step: Progress) -> None:
+        if (step.formulation, step.property_id, step.count) == ("vts-ppt", "patch.flat.transmission", 28):
+            raise KeyboardInterrupt
+
+    subjects, questions = [load_formulation("vts-ppt")], load_properties(PROPERTY_IDS[1:])
+    with pytest.raises(RunStopped) as stopped:
+        run(subjects, questions, examples=EXAMPLES, seed=3, progress=interrupt)
+    first, second = stopped.value.run.rows
+    assert (first.verdict, len(first.outcomes)) == (Verdict.PASS, 30)
+    assert (second.verdict, second.judged, second.planned) == (Verdict.NOT_JUDGED, 25, 30)
+    assert second.reason == "stopped: 25 of 30 cases judged"
+    assert not stopped.value.run.promises_kept
 
 
 # ---------------------------------------------------------------------------------------------------------------------
