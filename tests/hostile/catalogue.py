@@ -36,19 +36,6 @@ AT_IMPORT = {
     "raises-at-import": ("hostile_import_raises", "caught", "Raise SystemExit with status 0 when it is imported."),
     "process-import-exits": ("hostile_import_patches", "either", "Make every later import end the process."),
 }
-# The nastiest ten, which the tests run.
-QUICK = (
-    "dies-exit-0",
-    "dies-at-import",
-    "dies-segfault",
-    "hangs-loop-in-c",
-    "memory-slow-leak",
-    "raises-name-with-controls",
-    "process-success-at-exit",
-    "process-vandal",
-    "prints-write-rubbish-everywhere",
-    "leaves-daemon-without-environment",
-)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,10 @@ PROPERTY = "balance.force"  # It asks for a pairing and a residual, and everybod
 FOR_KINDS = {"process": "patch.flat.nodal", "cheats": "patch.flat.transmission", "inputs": "purity"}
 FOR_VERBS = {"tangent": "tangent.directional", "contact_points": "projection.place"}
 EXAMPLES = 4
-MODES = {"process": ("--isolation", "process", "--time-limit", "2", "--memory-limit", "1024"), "inline": ()}
+MODES = {
+    "process": ("--isolation", "process", "--time-limit", "2", "--memory-limit", "1024"),
+    "inline": ("--isolation", "inline"),
+}
 SECONDS = 300.0  # The longest run; one without a hostile plugin takes a few seconds.
 GROUP = 8  # Plugins of one run.
 ALONE = ("memory", "leaves", "says")  # Plugins of these kinds run alone.
@@ -169,7 +172,7 @@ def _is_complete(run: Run, plugin: str, properties: tuple[str, ...]) -> bool:
     """Return whether every row is there, the plugin's too, and every planned case has an outcome."""
     loaded = all(item.formulation != plugin for item in run.not_loaded)
     expected = {*OTHERS, plugin} if loaded else set(OTHERS)
-    rows = {(row.formulation, row.property_id) for row in run.rows}
+    rows = {(row.formulation, row.property_id) for row in run.rows if row.formulation in expected}
     planned = all(len(row.outcomes) == row.planned for row in run.rows)
     return planned and rows == {(name, question) for name in expected for question in properties}
 
@@ -227,7 +230,7 @@ def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
             more: list[str] = []
             answers, result = (False, False, False), ""
             if run is not None:
-                answers, result, more = _look(plugin, run, finish, alone)
+                answers, result, more = _look(plugin, run, finish, alone, properties)
             elif plugin.ends == STOPS:  # Nobody can go on without the parent; what counts is that no report is broken.
                 ended, answers = finish.status is not None, (True, True, finish.status not in (0, None))
             verdicts = (ended, *answers, not finish.left, clean)
@@ -239,11 +242,11 @@ def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
 
 
 def _look(
-    plugin: HostilePlugin, run: Run, finish: Finish, alone: Run
+    plugin: HostilePlugin, run: Run, finish: Finish, alone: Run, properties: tuple[str, ...]
 ) -> tuple[tuple[bool, bool, bool], str, list[str]]:
     """Return what the report says: (others unchanged, report complete, exit status right), the verdict, remarks."""
     changes = [line for name in OTHERS for line in differences(only(run, name, name), only(alone, name, name))]
-    complete = _is_complete(run, plugin.name, questions(plugin))
+    complete = _is_complete(run, plugin.name, properties)
     wrong = _status_is_right(plugin, run, finish, alone)
     return (not changes, complete, not wrong), _result(run, plugin.name), [*changes[:1], *([wrong] if wrong else [])]
 

@@ -39,8 +39,8 @@ looked up outside of the harness:
 - *output clean*: what is printed has no control characters, and less than 100 kB.
 
 """
-SUMMARY = """{plugins} plugins in a process of their own: {whole} are contained in everything, and of {answers} answers
-{yes} are yes.
+SUMMARY = """{plugins} plugins{rest} in a process of their own: {whole} are contained in everything, and of
+{answers} answers {yes} are yes.
 {inline}
 """
 INLINE = """In the process of the harness (`--isolation inline`), {whole} of {plugins} are contained, {lost} lose the
@@ -110,7 +110,9 @@ def summary() -> str:
             lost=sum(row["report complete"] == "no" for row in inline),
             zero=sum(row["status"] == "0" and row["exit status right"] == "no" for row in inline),
         )
-    numbers = {"plugins": len(process), "whole": sum(map(is_whole, process)), "answers": len(answers)}
+    missing = len(PLUGINS) - len(process)
+    rest = f" ({missing} more have not run yet)" if missing else ""
+    numbers = {"plugins": len(process), "rest": rest, "whole": sum(map(is_whole, process)), "answers": len(answers)}
     return SUMMARY.format(**numbers, yes=sum(answers), inline=words)
 
 

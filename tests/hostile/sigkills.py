@@ -95,7 +95,6 @@ COMMANDS = {
     "verify -j2": Command(
         (*_COUNTED, "--examples", "250", "--jobs", "2"), ("verify", "--resume", "report.nc"), jobs=2, share=0.2
     ),
-    "campaign": Command(_SHARDED, _SHARDED, share=0.2, compare=lambda a, b: []),
     "compare": Command(
         ("compare", "nts-ar", "--against", "vts-ppt", "-p", "patch.flat.*", "--examples", "60", "--seed", "1",
          "--out", "report.nc"), share=0.1,
@@ -106,6 +105,7 @@ COMMANDS = {
         share=0.1, compare=lambda a, b: [],
     ),
     "paper": Command(("paper", "--out", "paper", "--jobs", "2"), jobs=2, share=0.1, compare=_same_files),
+    "campaign": Command(_SHARDED, _SHARDED, share=0.2, compare=lambda a, b: []),
 }  # fmt: skip
 
 
@@ -165,6 +165,8 @@ def unbroken(name: str) -> Unbroken:
     folder.mkdir()
     begin = time.monotonic()
     status = start(folder, COMMANDS[name].words, "asked").wait()
+    if status not in (0, 1):
+        raise SystemExit(f"{name}: exit status {status}: {(folder / 'asked.log').read_text(errors='replace')[-500:]}")
     return Unbroken(folder, time.monotonic() - begin, status)
 
 
