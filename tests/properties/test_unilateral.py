@@ -18,8 +18,8 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import judge_case, run
+from contactverif.scenes.flat_states import Turn, flat_master, flat_state
 from contactverif.scenes.named_states import named_case
-from contactverif.strategies import flat_cases
 from contactverif_mortar import mortar, mortar_lm
 from contactverif_properties.nodal_push import NODAL_PUSH, allowed_pushes
 from contactverif_properties.shared.openings import lift_slave
@@ -68,12 +68,19 @@ def test_who_is_right_passes(name: str, case: str) -> None:
     assert outcome.measurement is not None
 
 
-def test_nodes_that_face_free_ends_exactly_are_undecided() -> None:
-    """Both nodes of a segment on one of its own length: without τ roundoff decides whether they are over it."""
+@pytest.mark.parametrize("turn", [(1, 0, 1), (0, 1, 1), (-1, 0, 1)])
+def test_nodes_a_rounding_beyond_free_ends_are_undecided(turn: Turn) -> None:
+    """A segment longer than the one below it by the last bit of a coordinate: without τ no node is over that one."""
+    last_bit = float(np.spacing(1.0))
+    over, beyond = (
+        flat_state("", [-excess, 1 + excess], flat_master([0, 1]), depth=0.25, turn=turn) for excess in (last_bit, 0.5)
+    )
     without_tau = load_subject("nts:tau=0")
-    result = run([without_tau], [replace(UNILATERAL, cases=flat_cases)], examples=300, seed=0)
-    assert result.rows[0].verdict is Verdict.PASS, result.rows[0].reason
-    assert any(outcome.verdict is Verdict.UNDECIDED for outcome in result.rows[0].outcomes)
+    outcome = judge_case(UNILATERAL, over, without_tau)
+    assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
+    assert outcome.reason == "a kink: moved by roundoff, it begins one way and not another"
+    assert judge_case(UNILATERAL, over, load_subject("nts")).verdict is Verdict.PASS
+    assert judge_case(UNILATERAL, beyond, without_tau).verdict is Verdict.FAIL
 
 
 class Augmented:
