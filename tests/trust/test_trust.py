@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from page import PAGE, campaign_counts, caught_alone, kill_rows, page
+from page import PAGE, campaign_counts, caught_alone, kill_rows, page, size_of
 from reasons import SHARED
 from subjects import load_property
 from tables import FOLDER, read
@@ -49,3 +49,9 @@ def test_every_property_is_in_the_kill_matrix_and_catches_its_mutants() -> None:
 
 def test_a_property_without_a_mutant_of_its_own_has_a_reason() -> None:
     assert {name for name, mutants in caught_alone().items() if not mutants} == set(SHARED)
+
+
+def test_most_counterexamples_have_a_segment_a_side_and_none_is_large() -> None:
+    sizes = [size_of(row)[0] for row in read("smallest_cases.csv")]
+    assert sum(size <= 3 for size in sizes) >= 0.9 * len(sizes)
+    assert max(sizes) <= 8
