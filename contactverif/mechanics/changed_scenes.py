@@ -18,6 +18,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.bulk import CACHE_SIZE
 from contactverif.mechanics.scene import Scene
 
+# What a scene has in any place, to the last bit. It is not made anew.
+PLACELESS = ("unknowns", "slices", "stiffness", "load", "transformation", "imposed_displacements", "start")
+
 
 @lru_cache(maxsize=CACHE_SIZE)
 def change_units(scene: Scene, length: float, modulus: float) -> Scene:
@@ -119,4 +122,8 @@ def move(scene: Scene, x: float, y: float) -> Scene:
         if (nodes - (x, y) != body.nodes).any():
             raise MisuseError("move", f"({x}, {y}), which rounds a node of {body.name}", "a way that rounds no node")
         bodies.append(replace(body, nodes=nodes))
-    return replace(scene, bodies=tuple(bodies))
+    moved = replace(scene, bodies=tuple(bodies))
+    if moved.bodies_in_reach == scene.bodies_in_reach:
+        for name in PLACELESS:
+            moved.__dict__[name] = getattr(scene, name)  # Where `cached_property` keeps it.
+    return moved

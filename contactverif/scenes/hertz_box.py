@@ -24,13 +24,13 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache, partial
+from dataclasses import dataclass, field
+from functools import cache, lru_cache, partial
 from math import ceil, gcd, log1p, sqrt
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
@@ -44,6 +44,7 @@ ZONE = 0.28  # Equally long segments reach at least this far beyond the edges of
 COARSEST = 16  # Number of the parabola's segments across the contact on the coarsest mesh.
 RATIO = 8 / 7  # The flat has at least so many segments for each of the parabola's.
 GROWTH = 0.3  # Cells grow by this share of their distance from the zone on the coarsest mesh, by √h/h₀ of it on others.
+CACHE_SIZE = 256  # The number of exact fields that are remembered: those of all meshes, penalties and bodies are 144.
 _POINTS = 8  # Number of Gauss points on each edge of a loaded side.
 
 
@@ -278,19 +279,33 @@ def exact_displacements(box: HertzBox, penalty: float | None, number: int, x: Fl
     FloatArray, shape (n, 2)
         The flat's displacements are those relative to its named point; the parabola's are such that both surfaces fit.
     """
-    pressure = box.pressure(penalty)
+    return _exact_displacements(box, penalty, number, _Places(x.tobytes(), x), across)
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Places that are equal if their bytes are. The array is the caller's, whose strides may decide the last bit."""
+
+    key: bytes
+    x: FloatArray = field(compare=False)
+
+
+@lru_cache(maxsize=CACHE_SIZE)
+def _exact_displacements(box: HertzBox, penalty: float | None, number: int, places: _Places, across: int) -> FloatArray:
+    """Return what `exact_displacements` does; both choices of the slave and all formulations ask for the same."""
+    pressure, x = box.pressure(penalty), places.x
     young, poisson = box.young[number], box.poisson[number]
     moves = surface_displacements(pressure, x, young, poisson)
     if number == 1:
         lines, depth, _ = mesh_lines(1, across)
         named = box.half_width * lines[np.abs(lines).argmin()], box.half_width * depth[-1]
         moves -= [0, 1] * displacements(pressure, np.array(named[:1]), np.array(named[1:]), young, poisson)[0]
-        return moves * [1, -1]
+        return freeze(moves * [1, -1], np.float64)
     centre = np.zeros(1)
     below = exact_displacements(box, penalty, 1, centre, across)[0, 1]
     layer = 0.0 if penalty is None else pressure.peak / penalty
     moves[:, 1] += below - layer - surface_displacements(pressure, centre, young, poisson)[0, 1]
-    return moves
+    return freeze(moves, np.float64)
 
 
 def exact_forces(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_slave: bool) -> FloatArray:

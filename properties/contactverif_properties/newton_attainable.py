@@ -43,9 +43,9 @@ from contactverif_properties.shared.applicability import refuse_dependent_multip
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
     Conditioning,
+    conditioning_of,
     difference_quotient,
     forces_quantity,
-    measure_conditioning,
 )
 from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.kinks import find_kink
@@ -210,7 +210,8 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
     state = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)
     forces = system.formulation.residual(scene.interface, pairing, z)
     to_unknowns = dense(system.transformation).T  # (n_free + n_multipliers, n_unknowns + n_multipliers)
-    rows = to_unknowns @ difference_quotient(state, system.formulation, pairing)
+    derivative = difference_quotient(state, system.formulation, pairing)
+    rows = to_unknowns @ derivative
     matrix = dense(system.stiffness) + rows @ to_unknowns.T
     condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= system.size * UNIT_ROUNDOFF:
@@ -230,7 +231,7 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
         inverse=np.abs(linalg.inv(matrix)),
         contact=contact,
         terms=terms,
-        conditioning=measure_conditioning(state, system.formulation, pairing, forces),
+        conditioning=conditioning_of(state, derivative, forces),
     )
 
 
@@ -248,19 +249,20 @@ def settle(solution: Solution, case: Case, way: float) -> Attained:
     """
     near, n = solution.system, solution.system.scene.interface.n_unknowns
     far = replace(near, scene=move(near.scene, way, way))
-    u, added, settled = solution.u, 0.0, []
-    for _ in range(1 + N_STEPS):
+    u, residual, added, settled = solution.u, solution.u, 0.0, []
+    for number in range(1 + N_STEPS):
+        if number:
+            change = near.step(solution.matrix, -residual).change
+            assert change is not None  # The matrix has an inverse.
+            u = u + change
         pairing, z = far.pair(u), far.state(u)
         back = np.concatenate([z[:n] - way, z[n:]])
         forces = far.formulation.residual(far.scene.interface, pairing, z)
         same = near.formulation.residual(near.scene.interface, pairing, back)
         added = max(added, solution.conditioning.count_roundings(forces - same))
-        residual = far.residual(u, pairing)
+        residual = far.balance(u, forces)
         largest = float(np.abs(z[:n]).max())
         settled.append((over(np.abs(residual), solution.roundoff(largest)), u, largest, pairing))
-        change = near.step(solution.matrix, -residual).change
-        assert change is not None  # The matrix has an inverse.
-        u = u + change
     attained, u, largest, pairing = min(settled[1:], key=lambda rest: rest[0])
     allowed = float((solution.inverse @ solution.roundoff(largest) / solution.units).max())
     length = float(np.abs((u - solution.u) / solution.units).max())

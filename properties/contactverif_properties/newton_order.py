@@ -155,7 +155,8 @@ def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing
             u = solution + distance * length * direction * units
             if not _pairs_alike(system, case, pairing, u, distance * length):
                 continue
-            matrix, _ = system.matrix(u, pairing)
+            _, tangent = system.forces_and_tangent(u, pairing)
+            matrix = system.stiffness + system.contact_stiffness(u, pairing, tangent)
             step = system.step(matrix, -system.residual(u, pairing)).change
             count += 1
             before.append(distance * length)

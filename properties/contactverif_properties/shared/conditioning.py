@@ -138,8 +138,22 @@ def measure_conditioning(
     Conditioning
         For each node and each constraint row.
     """
+    return conditioning_of(case, difference_quotient(case, formulation, pairing), forces)
+
+
+def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Conditioning:
+    """Return what `measure_conditioning` does, from the `difference_quotient` of the state.
+
+    Parameters
+    ----------
+    case : Case
+        The state near the origin, with its multipliers if any.
+    derivative : FloatArray, shape (n, n)
+        The difference quotient of the residual there, n = n_unknowns + n_multipliers.
+    forces : Array, shape (n_unknowns + n_multipliers,)
+        The residual of that state.
+    """
     n_nodes = case.interface.n_nodes
-    derivative = difference_quotient(case, formulation, pairing)
     inputs = np.concatenate([_distances(case), np.abs(case.multipliers)])
     sizes = _row_sizes(forces, n_nodes)
     floor = np.concatenate([np.full(n_nodes, sizes[:n_nodes].max()), np.full(case.n_multipliers, 0.0)])

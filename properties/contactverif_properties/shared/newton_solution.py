@@ -36,6 +36,8 @@ def length_units(system: System, u: FloatArray, pairing: Pairing | None) -> Floa
 
     It is 1 for a position, and for a multiplier the change that does as much to the forces.
     """
+    if not system.n_multipliers:
+        return np.ones(system.size)
     return scale_factors(system.matrix(u, pairing)[0], system.scene.n_free)[1]
 
 
