@@ -119,20 +119,24 @@ def _exit_status(error: Exception) -> int:
             return _refuse(str(MisuseError(argument, error.found, error.needed)))
         case ContactverifError():
             return _refuse(str(error))
-        case OSError(strerror=str()) | MemoryError():
+        case OSError(strerror=str()) | MemoryError() | UnicodeEncodeError():
             return _refuse(_words_of_machine(error))
         case typer.Abort():
             return _STOPPED
     return _refuse(_words_of_usage_error(error))
 
 
-def _words_of_machine(error: OSError | MemoryError) -> str:
+def _words_of_machine(error: OSError | MemoryError | UnicodeEncodeError) -> str:
     """Return what the machine cannot do: a disk is full, a folder may not be entered, a name is too long."""
+    if isinstance(error, UnicodeEncodeError):
+        return f"{name_line(error.object)!a}: its characters do not exist in this locale's {error.encoding}"
     if isinstance(error, MemoryError):
         return f"there is not enough memory for this command ({one_line(str(error)) or 'no number is known'})"
     if error.errno in (errno.ENOSPC, errno.EIO, errno.EDQUOT) and error.filename is None:
         _discard_output()
         return f"the output cannot be written: {error.strerror}"
+    if isinstance(error, FileNotFoundError) and error.filename is None:
+        return "the working folder does not exist any more"
     name = f"{name_line(os.fsdecode(error.filename))}: " if isinstance(error.filename, str | bytes) else ""
     return f"{name}{error.strerror}"
 

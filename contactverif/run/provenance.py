@@ -11,6 +11,9 @@ from datetime import UTC, datetime
 from importlib import metadata
 from urllib.parse import unquote, urlparse
 
+import numpy as np
+from threadpoolctl import threadpool_info
+
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 
 
@@ -33,6 +36,8 @@ def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, s
     """
     return {
         **collect_versions(),
+        "blas": _blas(),
+        "cpu_features": _cpu_features(),
         "commit": _commit(),
         "profile": profile,
         "examples": str(examples),
@@ -54,6 +59,25 @@ def _version(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "not installed"
+
+
+def _blas() -> str:
+    """Return library, version and kernel of each BLAS; the last bits of a solution depend on the kernel."""
+    libraries = [
+        " ".join(str(entry[key]) for key in ("internal_api", "version", "architecture") if entry.get(key))
+        for entry in threadpool_info()
+        if entry["user_api"] == "blas"
+    ]
+    return "; ".join(sorted(set(libraries))) or "unknown"
+
+
+def _cpu_features() -> str:
+    """Return the groups of instructions that numpy has found and may use, beyond those it always uses."""
+    try:
+        extensions = np.show_config(mode="dicts")["SIMD Extensions"]
+        return " ".join([*extensions.get("baseline", []), *extensions.get("found", [])]) or "unknown"
+    except (AttributeError, KeyError, TypeError):  # A numpy that was built in another way.
+        return "unknown"
 
 
 def _commit() -> str:

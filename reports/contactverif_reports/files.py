@@ -45,7 +45,7 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
         If there is no such folder, nothing may be written there, or the path is no ordinary file.
     """
     name = os.fspath(path)
-    target = Path(path).resolve()
+    target = Path(os.path.realpath(path))  # Of links that form a loop, `resolve` raises an error.
     if not name or name.endswith(os.sep):
         raise MisuseError(argument, f"{name!r}, which names no file", f"the name of a file, {form}")
     if target.is_dir():
@@ -102,7 +102,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     Whatever stops it (an exception, a signal, a full disk) leaves the file that was there as it was; a temporary
     `.NAME.PID.part` that a killed process left behind is removed by the next one that writes the same name.
     """
-    target = Path(path).resolve()
+    target = Path(os.path.realpath(path))
     _remove_stale(target)
     part = _part(target)
     try:

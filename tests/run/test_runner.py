@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_info
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -469,7 +470,19 @@ def test_a_run_knows_what_is_provided_and_where_it_comes_from() -> None:
     facts = result.provenance
     assert (facts["profile"], facts["examples"], facts["seed"]) == ("ci", "5", "0")
     assert facts["numpy_version"] == np.__version__
-    assert facts.keys() >= {"commit", "platform", "created", "command", "python_version", "contactverif_version"}
+    kernels = {entry["architecture"] for entry in threadpool_info() if entry.get("architecture")}
+    assert all(kernel in facts["blas"] for kernel in kernels)
+    assert set(np.show_config(mode="dicts")["SIMD Extensions"]["found"]) <= set(facts["cpu_features"].split())
+    assert facts.keys() >= {
+        "commit",
+        "platform",
+        "created",
+        "command",
+        "python_version",
+        "contactverif_version",
+        "blas",
+        "cpu_features",
+    }
     assert all(isinstance(value, str) and value for value in facts.values())
 
 

@@ -23,7 +23,7 @@ from contactverif_reports.bench.work_precision import (
 )
 from contactverif_reports.html.pages import render, svg_inline
 
-_FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "platform", "threads")
+_FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "blas", "platform", "threads")
 
 
 def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:

@@ -19,7 +19,7 @@ from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
 
-_FACTS = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "platform")
+_FACTS = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "blas", "platform")
 _FIGURE_WIDTH = 5.6  # The width of a figure in inches; two stand side by side on a wide page.
 _LEGEND_SIZE = 7  # The size of the legend's letters in points; with larger ones it is wider than the figure.
 

@@ -28,7 +28,8 @@ ROOT_NOTE = (
 SUMMARY, COUNTEREXAMPLES, TIMING, CASE = "summary", "counterexamples", "timing", "case"
 NAMED_CASES = "named_cases"  # The group of the named cases that some formulation fails; only some reports have it.
 RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING, NAMED_CASES})
-OFF_THE_RECORD = frozenset({"created", "command", "platform"})  # Root attributes in which two equal runs may differ.
+# Root attributes in which two equal runs may differ.
+OFF_THE_RECORD = frozenset({"created", "command", "platform", "blas", "cpu_features"})
 PARTS = ("pair", "tangent", "contact_points")
 
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"
