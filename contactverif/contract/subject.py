@@ -24,8 +24,8 @@ from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. Whoever has none lacks nothing.
-MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them,
-POINTS_A_SEGMENT = 1000  # and looks at each point in exact numbers.
+MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
+POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
 
@@ -102,9 +102,9 @@ class Subject:
         """The number of times that the process of the plugin has ended; 0 if it has none of its own."""
         return int(getattr(self._make, "n_ended", 0))
 
-    def elsewhere(self) -> Subject | None:
+    def in_second_process(self) -> Subject | None:
         """Return the same formulation in another process than this one's; None if it has no process of its own."""
-        make = getattr(self._make, "elsewhere", None)
+        make = getattr(self._make, "second_factory", None)
         return None if make is None else Subject.of_parts(self.name, make, self.traits, self._parts)
 
     @property

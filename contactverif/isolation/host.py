@@ -34,8 +34,8 @@ from contactverif.isolation.messages import (
 )
 from contactverif.isolation.process import PluginProcess, end_marked
 
-_MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more,
-_MOST_HANGS = 5  # and after so many calls without an answer.
+_MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
+_MOST_HANGS = 5  # After so many calls without an answer neither.
 _SHELF = 256  # The number of interfaces and pairings that a process keeps for further questions.
 _FORGET = 64  # The number of what can be forgotten before the process is told.
 _QUEUE = 16  # The number of questions that wait.
@@ -80,7 +80,7 @@ class Host:
         The name of the formulation.
     limits : Limits
         The limits of the process.
-    elsewhere : bool
+    second : bool
         The process differs from the first one in its hash seed and its number of threads.
 
     Attributes
@@ -97,13 +97,13 @@ class Host:
         The end of what the process printed.
     """
 
-    def __init__(self, loader: str, name: str, limits: Limits, *, elsewhere: bool) -> None:
+    def __init__(self, loader: str, name: str, limits: Limits, *, second: bool) -> None:
         self._load = Load(loader, name)
-        self._limits, self._elsewhere = limits, elsewhere
+        self._limits, self._second = limits, second
         self._process: PluginProcess | None = None
         self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
         self._queue: list[Request] = []
-        self._asked: list[Question] = []
+        self._questions: list[Question] = []
         self._forgotten: list[int] = []
         self._number = 0
         self.methods: frozenset[str] = frozenset()
@@ -121,13 +121,13 @@ class Host:
         if self.n_ended >= _MOST_ENDS or self.n_hangs >= _MOST_HANGS:
             words = f"no answer came {self.n_hangs} times" if self.n_hangs >= _MOST_HANGS else ""
             raise PluginError(words or f"its process ended {self.n_ended} times", "not asked")
-        self._process = PluginProcess(self._limits, elsewhere=self._elsewhere)
+        self._process = PluginProcess(self._limits, second=self._second)
         self.n_started += 1
-        for kept in (self._shelf, self._queue, self._asked, self._forgotten):
-            kept.clear()
+        for store in (self._shelf, self._queue, self._questions, self._forgotten):
+            store.clear()
         question = Question("import")
         self._queue.append(self._load)
-        self._asked.append(question)
+        self._questions.append(question)
         self.flush()
         if isinstance(question.answer, Failure):
             raise_failure(question.answer, loading=True)
@@ -163,15 +163,15 @@ class Host:
 
         Only pairings are kept.
         """
-        if len(self._asked) >= _QUEUE:
+        if len(self._questions) >= _QUEUE:
             self.flush()
-        of_interface = self._shared(interface)
-        of_pairing = None if pairing is None else self._shared(pairing)
+        of_interface = self._share(interface)
+        of_pairing = None if pairing is None else self._share(pairing)
         self._number += 1
         question = Question(verb)
         packed = None if z is None else pack_array(z)
         self._queue.append(Ask(verb, formulation, of_interface, of_pairing, packed, self._number))
-        self._asked.append(question)
+        self._questions.append(question)
         return question, self._number
 
     def keep(self, item: Interface | Pairing, number: int) -> None:
@@ -181,7 +181,7 @@ class Host:
             _, (_, oldest) = self._shelf.popitem(last=False)
             self._forgotten.append(oldest)
 
-    def _shared(self, item: Interface | Pairing) -> int:
+    def _share(self, item: Interface | Pairing) -> int:
         """Return the number of something there, after a request to keep it if it is not there."""
         if id(item) in self._shelf:
             self._shelf.move_to_end(id(item))
@@ -200,8 +200,8 @@ class Host:
 
     def flush(self) -> None:
         """Send what waits in the queue, and give each question its answer."""
-        requests, questions = self._queue, self._asked
-        self._queue, self._asked = [], []
+        requests, questions = self._queue, self._questions
+        self._queue, self._questions = [], []
         if len(self._forgotten) > _FORGET:
             requests.append(Forget(self._forgotten))  # At the end, for a question that waits may need it.
             self._forgotten = []
@@ -262,11 +262,11 @@ def raise_failure(failure: Failure, *, loading: bool = False) -> None:
 _HOSTS: dict[tuple[str, str, Limits, bool], Host] = {}
 
 
-def host_of(loader: str, name: str, limits: Limits, *, elsewhere: bool = False) -> Host:
+def host_of(loader: str, name: str, limits: Limits, *, second: bool = False) -> Host:
     """Return the host of a formulation in this process of the judge."""
-    key = loader, name, limits, elsewhere
+    key = loader, name, limits, second
     if key not in _HOSTS:
-        _HOSTS[key] = Host(loader, name, limits, elsewhere=elsewhere)
+        _HOSTS[key] = Host(loader, name, limits, second=second)
     return _HOSTS[key]
 
 

@@ -61,11 +61,11 @@ def load_remote(loader: str, name: str, limits: Limits) -> Subject | NotLoaded:
     """
     factory = RemoteFactory(loader, name, limits)
     try:
-        found = _found(name, factory, factory.host.load())
+        item = _read_finding(name, factory, factory.host.load())
     except ContractError as error:
         return _not_loaded(name, error)
-    assert not isinstance(found, Wrapper)
-    return found
+    assert not isinstance(item, Wrapper)
+    return item
 
 
 def survey(loader: str, names: Iterable[str], limits: Limits) -> Iterator[Subject | Wrapper | NotLoaded]:
@@ -85,7 +85,7 @@ def survey(loader: str, names: Iterable[str], limits: Limits) -> Iterator[Subjec
         process = process or PluginProcess(limits)
         try:
             process.send("import", [encode(Survey(loader, name))])
-            yield _found(name, RemoteFactory("", name, limits), process.receive("import"))
+            yield _read_finding(name, RemoteFactory("", name, limits), process.receive("import"))
         except PluginError as error:
             process = None if error.ended else process
             yield _not_loaded(name, error)
@@ -100,7 +100,7 @@ def _not_loaded(name: str, error: ContractError) -> NotLoaded:
     return NotLoaded(name, f"{error.cause}: {error}" if ended else str(error))  # type: ignore[attr-defined]
 
 
-def _found(name: str, factory: RemoteFactory, reply: Reply) -> Subject | Wrapper | NotLoaded:
+def _read_finding(name: str, factory: RemoteFactory, reply: Reply) -> Subject | Wrapper | NotLoaded:
     """Return what a process says that a name is."""
     match reply:
         case Unloaded(reason):
@@ -116,10 +116,10 @@ def _found(name: str, factory: RemoteFactory, reply: Reply) -> Subject | Wrapper
 
 def _traits(words: Mapping[str, Any]) -> Traits:
     """Return the traits that a plugin's process states, checked."""
-    given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}
-    if isinstance(given.get("source"), str):
-        given["source"] = one_line(given["source"])
+    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}
+    if isinstance(values.get("source"), str):
+        values["source"] = one_line(values["source"])
     try:
-        return Traits(**given)
+        return Traits(**values)
     except TypeError as error:
         raise ContractError(f"traits: {error}") from None

@@ -1,4 +1,4 @@
-"""What the judge and a plugin's process say to each other, and arrays as bytes.
+"""The messages between the judge and a plugin's process, and arrays as bytes.
 
 Rules for the next editor: a message holds numbers, words and bytes, never an object. Whatever comes from the plugin's
 process is decoded by these schemas and by `unpack_array` alone, since a plugin may write there what it likes.

@@ -43,7 +43,7 @@ _CODE = "import sys; sys.path[:] = {path!r}; from contactverif.isolation.worker 
 # One thread for linear algebra, as in the judge's process (`contactverif.run.one_thread`): the same bits.
 _THREADS = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM")}
 # A second process of the same plugin differs in what no answer may depend on.
-_ELSEWHERE = {"PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2"}
+_OTHER_SETTINGS = {"PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2"}
 
 
 class PluginProcess:
@@ -53,16 +53,16 @@ class PluginProcess:
     ----------
     limits : Limits
         Its limits.
-    elsewhere : bool
+    second : bool
         Start it with another hash seed and another number of threads.
     """
 
-    def __init__(self, limits: Limits, *, elsewhere: bool = False) -> None:
+    def __init__(self, limits: Limits, *, second: bool = False) -> None:
         _end_at_exit()
         self._limits = limits
         ours, theirs = socket.socketpair()
         code = _CODE.format(path=[*filter(None, sys.path)], end=theirs.fileno(), memory=limits.memory)
-        environment = os.environ | _THREADS | {MARK: _run, "TMPDIR": _folder()} | (_ELSEWHERE if elsewhere else {})
+        environment = os.environ | _THREADS | {MARK: _run, "TMPDIR": _folder()} | (_OTHER_SETTINGS if second else {})
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.DEVNULL,

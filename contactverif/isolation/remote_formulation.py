@@ -26,18 +26,18 @@ class RemoteFactory:
 
     Parameters
     ----------
-    loader, name, limits, elsewhere : str, str, Limits or bool
+    loader, name, limits, second : str, str, Limits or bool
         The arguments of `Host`.
     """
 
-    def __init__(self, loader: str, name: str, limits: Limits, *, elsewhere: bool = False) -> None:
+    def __init__(self, loader: str, name: str, limits: Limits, *, second: bool = False) -> None:
         self._key = loader, name, limits
-        self._elsewhere = elsewhere
+        self._second = second
 
     @property
     def host(self) -> Host:
         """The host in this process of the judge."""
-        return host_of(*self._key, elsewhere=self._elsewhere)
+        return host_of(*self._key, second=self._second)
 
     @property
     def n_ended(self) -> int:
@@ -45,9 +45,9 @@ class RemoteFactory:
         return self.host.n_ended
 
     @property
-    def elsewhere(self) -> RemoteFactory | None:
+    def second_factory(self) -> RemoteFactory | None:
         """The factory of the same formulation in a second process."""
-        return None if self._elsewhere else RemoteFactory(*self._key, elsewhere=True)
+        return None if self._second else RemoteFactory(*self._key, second=True)
 
     def __call__(self, *, penalty: float) -> RemoteFormulation:
         """Return the formulation with a penalty."""
@@ -120,22 +120,22 @@ class RemoteFormulation:
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns)."""
-        arrays = _unpacked("residual", self._answer("residual", interface, pairing, z))
-        return _named(arrays, "residual", "residual")
+        arrays = _unpack("residual", self._answer("residual", interface, pairing, z))
+        return _pick(arrays, "residual", "residual")
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns), an array or a coo array."""
-        return _tangent(_unpacked("tangent", self._answer("tangent", interface, pairing, z)), "tangent", z.size)
+        return _tangent(_unpack("tangent", self._answer("tangent", interface, pairing, z)), "tangent", z.size)
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[Any, Any]:
         """Return residual (n_unknowns,) and tangent."""
         verb = "residual_and_tangent"
-        arrays = _unpacked(verb, self._answer(verb, interface, pairing, z))
-        return _named(arrays, verb, "residual"), _tangent(arrays, verb, z.size)
+        arrays = _unpack(verb, self._answer(verb, interface, pairing, z))
+        return _pick(arrays, verb, "residual"), _tangent(arrays, verb, z.size)
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points."""
-        arrays = _unpacked("contact_points", self._answer("contact_points", interface, pairing, z))
+        arrays = _unpack("contact_points", self._answer("contact_points", interface, pairing, z))
         try:
             return ContactPoints(**arrays)
         except (MisuseError, TypeError) as error:
@@ -166,7 +166,7 @@ class RemotePairing(Pairing):
         if self._content is None:
             if self._question.answer is None:
                 self._host.flush()
-            whole = Pairing(_unpacked("pair", self._question.result()))
+            whole = Pairing(_unpack("pair", self._question.result()))
             whole.check_bounds(self._interface)
             self.check()
             self._content = dict(whole)
@@ -197,14 +197,14 @@ class RemotePairing(Pairing):
         """Do nothing: the bounds are checked where the plugin is, and once more when somebody looks into it."""
 
 
-def _unpacked(verb: str, answer: Answer) -> dict[str, Array]:
+def _unpack(verb: str, answer: Answer) -> dict[str, Array]:
     try:
         return {name: unpack_array(array) for name, array in answer.arrays.items()}
     except MessageError as error:
         raise ContractError(f"{verb}: {error}") from None
 
 
-def _named(arrays: dict[str, Array], verb: str, name: str) -> Array:
+def _pick(arrays: dict[str, Array], verb: str, name: str) -> Array:
     if name not in arrays:
         raise ContractError(f"{verb}: an answer without its {name}")
     return arrays[name]
@@ -213,7 +213,7 @@ def _named(arrays: dict[str, Array], verb: str, name: str) -> Array:
 def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
     if "dense" in arrays:
         return arrays["dense"]
-    data, row, col = (_named(arrays, verb, name) for name in ("data", "row", "col"))
+    data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
     try:
         return sparse.coo_array((data, (row, col)), shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:

@@ -92,11 +92,11 @@ def _limit_memory(megabytes: int) -> None:
 
 
 class Desk:
-    """What a plugin's process keeps: the formulation, and by number its instances, interfaces and pairings."""
+    """The store of a plugin's process: the formulation, and by number its instances, interfaces and pairings."""
 
     def __init__(self) -> None:
         self._subject: Subject | None = None
-        self._kept: dict[int, Any] = {}
+        self._store: dict[int, Any] = {}
 
     def reply(self, request: Request) -> Reply | None:
         """Return the reply to a request; None if it has none."""
@@ -110,15 +110,15 @@ class Desk:
             case Ask():
                 return self._ask(request)
             case Make(number, penalty):
-                self._kept[number] = self._made(penalty)
+                self._store[number] = self._make(penalty)
             case Share(number, nodes, slave, master):
                 surfaces = (Surface(unpack_array(segments)) for segments in (slave, master))
-                self._kept[number] = Interface(unpack_array(nodes), *surfaces)
+                self._store[number] = Interface(unpack_array(nodes), *surfaces)
             case SharePairing(number, arrays):
-                self._kept[number] = Pairing({name: unpack_array(array) for name, array in arrays.items()})
+                self._store[number] = Pairing({name: unpack_array(array) for name, array in arrays.items()})
             case Forget(numbers):
                 for number in numbers:
-                    self._kept.pop(number, None)
+                    self._store.pop(number, None)
             case Load(loader, name) | Survey(loader, name):
                 return self._load(loader, name)
         return None
@@ -126,16 +126,16 @@ class Desk:
     def _load(self, loader: str, name: str) -> Reply:
         module, _, function = loader.partition(":")
         load: Callable[[str], Any] = getattr(import_module(module), function)
-        found = load(name)
-        if isinstance(found, NotLoaded):
-            return Unloaded(found.reason)
-        if not isinstance(found, Subject):
-            return Wraps(str(found.summary))
-        self._subject = found
-        methods = found.provides | ({"n_multipliers"} if found.counts_multipliers else set())
-        return Loaded(_words_of_traits(found.traits), sorted(methods))
+        item = load(name)
+        if isinstance(item, NotLoaded):
+            return Unloaded(item.reason)
+        if not isinstance(item, Subject):
+            return Wraps(str(item.summary))
+        self._subject = item
+        methods = item.provides | ({"n_multipliers"} if item.counts_multipliers else set())
+        return Loaded(_words_of_traits(item.traits), sorted(methods))
 
-    def _made(self, penalty: float) -> CheckedFormulation | Exception:
+    def _make(self, penalty: float) -> CheckedFormulation | Exception:
         """Return the formulation with a penalty, or the error of its factory, which the first question is told."""
         assert self._subject is not None
         try:
@@ -146,10 +146,10 @@ class Desk:
             return error
 
     def _ask(self, ask: Ask) -> Reply:
-        formulation: CheckedFormulation | Exception = self._kept[ask.formulation]
+        formulation: CheckedFormulation | Exception = self._store[ask.formulation]
         if isinstance(formulation, Exception):
             raise formulation
-        interface: Interface = self._kept[ask.interface]
+        interface: Interface = self._store[ask.interface]
         if ask.verb == "n_multipliers":
             return Answer({}, 0.0, formulation.n_multipliers(interface))
         assert ask.z is not None
@@ -157,10 +157,10 @@ class Desk:
         if ask.verb == "pair":
             pairing = formulation.own_pairing(interface, z)
             assert pairing is not None
-            self._kept[ask.keep] = pairing  # A handle stays here.
+            self._store[ask.keep] = pairing  # A handle stays here.
             arrays = {name: pack_array(array) for name, array in pairing.items()}
             return Answer(arrays, formulation.plugin.seconds, opaque=pairing.opaque)
-        pairing = None if ask.pairing is None else self._kept[ask.pairing]
+        pairing = None if ask.pairing is None else self._store[ask.pairing]
         answer = getattr(formulation, ask.verb)(interface, pairing, z)
         return Answer(_PACKERS[ask.verb](answer), formulation.plugin.seconds)
 
@@ -175,13 +175,13 @@ class Stopwatch:
     def __getattr__(self, name: str) -> Any:
         method = getattr(self._plugin, name)
 
-        def timed(*arguments: Any) -> Any:
+        def call(*arguments: Any) -> Any:
             start = perf_counter()
             answer = method(*arguments)
             self.seconds = perf_counter() - start
             return answer
 
-        return timed
+        return call
 
 
 def _pack_residual(forces: np.ndarray[Any, Any]) -> dict[str, PackedArray]:

@@ -39,7 +39,7 @@ _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
 
-_LOADER = f"{__name__}:load_formulation"  # How a plugin's own process loads a name.
+_LOADER = f"{__name__}:load_formulation"  # A plugin's own process loads a name by it.
 _SURVEYOR = f"{__name__}:load_with_defaults"
 
 
@@ -59,8 +59,8 @@ def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
     if limits is None:
         return tuple(name for name in formulation_names() if _load_wrapper(name) is None)
     names = formulation_names()
-    found = survey(_SURVEYOR, names, limits)
-    return tuple(name for name, item in zip(names, found, strict=True) if not isinstance(item, Wrapper))
+    items = survey(_SURVEYOR, names, limits)
+    return tuple(name for name, item in zip(names, items, strict=True) if not isinstance(item, Wrapper))
 
 
 def property_ids() -> tuple[str, ...]:

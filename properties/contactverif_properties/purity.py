@@ -59,7 +59,7 @@ BATCHED = Quantity(
     "8u",
     "A batch may round otherwise, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
 )
-ELSEWHERE = Quantity(
+SECOND_PROCESS = Quantity(
     "difference from a second process",
     "1",
     "8u",
@@ -142,14 +142,14 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         values[BATCHED.name] = compare_batch(state, near, forces, batch)
         tolerances[BATCHED.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
-    if (there := subject.elsewhere()) is not None:
+    if (there := subject.in_second_process()) is not None:
         far = there.with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
         forces_there = np.array([far.residual(interface, pairing, u) for u in (z, near)])
-        values[ELSEWHERE.name] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
-        tolerances[ELSEWHERE.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        values[SECOND_PROCESS.name] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
+        tolerances[SECOND_PROCESS.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
     if "residual_and_tangent" in formulation.provides:
         values[IN_ONE_CALL.name], tolerances[IN_ONE_CALL.name] = changes.residual_and_tangent, 0.0
         tangents = np.array([dense(formulation.tangent(interface, pairing, u)) for u in (z, near)])
@@ -232,7 +232,7 @@ PURITY = Property(
     id="purity",
     family="invariants",
     summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
-    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, ELSEWHERE, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
+    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=any_cases,
     measure=measure_purity,
     promise=lambda traits: True,

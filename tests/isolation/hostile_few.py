@@ -31,7 +31,7 @@ class Springs:
 
 
 class HandledSprings(Springs):
-    """The same springs; who is active is in an object that cannot leave the process."""
+    """Springs again; who is active is in an object that cannot leave the process."""
 
     def pair(self, interface, z):
         active = super().pair(interface, z)["active"]

@@ -70,9 +70,9 @@ def test_a_handle_stays_in_its_process() -> None:
     handled, plain = (load_remote(LOADER, name, QUICK).for_case(CASE) for name in ("HandledSprings", "Springs"))
     interface = CASE.interface
     assert handled.pair(interface, CASE.z) is None
-    own = handled.own_pairing(interface, CASE.z)
-    assert own is not None
-    assert (own.opaque, own.handle, dict(own)) == (True, None, {})
+    pairing = handled.own_pairing(interface, CASE.z)
+    assert pairing is not None
+    assert (pairing.opaque, pairing.handle, dict(pairing)) == (True, None, {})
     states = np.array([CASE.z, -CASE.z, 2 * CASE.z])
     expected = [plain.residual(interface, plain.pair(interface, z), z) for z in states]
     assert np.array_equal(handled.residual(interface, None, states), expected)
