@@ -76,7 +76,7 @@ def test_a_handle_stays_in_its_process() -> None:
     states = np.array([CASE.z, -CASE.z, 2 * CASE.z])
     expected = [plain.residual(interface, plain.pair(interface, z), z) for z in states]
     assert np.array_equal(handled.residual(interface, None, states), expected)
-    assert np.array_equal(handled.residual(interface, own, CASE.z), expected[0])
+    assert np.array_equal(handled.residual(interface, pairing, CASE.z), expected[0])
     other = handled.own_pairing(interface, -CASE.z)
     assert np.array_equal(handled.residual(interface, other, -CASE.z), expected[1])
 
