@@ -18,7 +18,7 @@ def _parts(version: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def _promised() -> dict[str, tuple[int, ...]]:
+def _read_promised() -> dict[str, tuple[int, ...]]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     lines = [*project["dependencies"], *project["optional-dependencies"]["test"]]
     matches = [re.fullmatch(r"([A-Za-z0-9-]+)>=([0-9.]+)", line) for line in lines]
@@ -26,14 +26,14 @@ def _promised() -> dict[str, tuple[int, ...]]:
     return {match[1]: _parts(match[2]) for match in matches if match and match[1] not in NOT_RUN}
 
 
-def _tested() -> dict[str, tuple[int, ...]]:
+def _read_tested() -> dict[str, tuple[int, ...]]:
     lines = (ROOT / "tests" / "floors.txt").read_text(encoding="utf-8").splitlines()
     entries = [line.split("==") for line in lines if not line.startswith("#")]
     return {name: _parts(version) for name, version in entries}
 
 
-def test_each_lowest_version_is_installed_where_floors_are_tested() -> None:
-    assert _tested() == _promised()
+def test_each_lowest_version_is_installed_where_floors_are_read_tested() -> None:
+    assert _read_tested() == _read_promised()
 
 
 def test_the_environment_installs_the_list() -> None:

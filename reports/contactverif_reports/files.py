@@ -45,7 +45,7 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
         If there is no such folder, nothing may be written there, or the path is no ordinary file.
     """
     name = os.fspath(path)
-    target = Path(os.path.realpath(path))  # Of links that form a loop, `resolve` raises an error.
+    target = Path(os.path.realpath(path))  # `resolve` raises an error for links that form a loop.
     if not name or name.endswith(os.sep):
         raise MisuseError(argument, f"{name!r}, which names no file", f"the name of a file, {form}")
     if target.is_dir():

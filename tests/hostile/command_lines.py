@@ -46,7 +46,7 @@ class Line(NamedTuple):
     arguments: tuple[str, ...]
     columns: str | None
     streams: str  # "", or which stream is closed or full.
-    folder_is_gone: bool
+    without_folder: bool
 
 
 class Ending(NamedTuple):
@@ -119,7 +119,7 @@ def draw_line(rng: random.Random, files: Files) -> Line:
         streams=rng.choice(["stdout closed", "stderr closed", "both closed", "stdout full"])
         if rng.random() < 0.1
         else "",
-        folder_is_gone=rng.random() < 0.03,
+        without_folder=rng.random() < 0.03,
     )
 
 
@@ -207,10 +207,10 @@ def _become(line: Line, files: Files, out: int, err: int) -> None:
     try:
         os.setsid()
         os.chdir(files.folder)
-        if line.folder_is_gone:
-            gone = Path(tempfile.mkdtemp())
-            os.chdir(gone)
-            gone.rmdir()
+        if line.without_folder:
+            deleted = Path(tempfile.mkdtemp())
+            os.chdir(deleted)
+            deleted.rmdir()
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(out, 1)
         os.dup2(err, 2)

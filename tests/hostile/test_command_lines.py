@@ -12,8 +12,8 @@ from command_lines import BAD, Files, Line, draw_line, run_line, run_lines
 SAMPLE = 25
 
 
-def _line(*arguments: str, streams: str = "", folder_is_gone: bool = False) -> Line:
-    return Line(arguments, None, streams, folder_is_gone)
+def _line(*arguments: str, streams: str = "", without_folder: bool = False) -> Line:
+    return Line(arguments, None, streams, without_folder)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_a_closed_stream_changes_no_status(files: Files, streams: str) -> None:
 
 
 def test_a_working_folder_that_is_gone_is_one_line(files: Files) -> None:
-    ending = run_line(_line("verify", "nts", "--out", "a.nc", folder_is_gone=True), files)
+    ending = run_line(_line("verify", "nts", "--out", "a.nc", without_folder=True), files)
     assert ending.word == "2"
     assert ending.last_words == "contactverif: the working folder does not exist any more\n"
 

@@ -21,7 +21,7 @@ from contactverif.studies.queries.query_file import Queries, queries_text, read_
 from contactverif.studies.queries.text_lines import TextLines
 
 _LONGEST = 600  # Seconds that a program may run.
-_MOST_BYTES = 10_000_000  # What a program may write besides a hundred times the length of its questions.
+_MOST_BYTES = 10_000_000  # A program may write so many besides a hundred times the length of its questions.
 _RUNS = 5  # The fastest of these runs counts, with and without queries: what disturbs a machine only adds time.
 
 
