@@ -125,6 +125,20 @@ def test_a_jump_of_the_derivative_counts_too() -> None:
     assert measure_jump(state, subject(Sided).for_case(state), REACH, directions)[1] == pytest.approx(2.0)
 
 
+def test_a_smooth_derivative_changes_by_its_own_slope() -> None:
+    class Stiffening(Springs):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            forces = 0 * z
+            forces[1] = 400 * z[1] ** 2
+            return forces
+
+    state = over_a_node(1 / 7)
+    directions = np.ones((1, state.z.size))
+    reach = 2.0**-40  # So short that the error of a difference hides it.
+    formulation = subject(Stiffening).for_case(state)
+    assert measure_jump(state, formulation, reach, directions)[1] == pytest.approx(800 * reach, rel=1e-3)
+
+
 def test_a_tangent_that_jumps_everywhere_excuses_nothing() -> None:
     class Restless(Sided):
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:

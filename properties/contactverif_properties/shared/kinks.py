@@ -113,7 +113,7 @@ def measure_jump(
         The largest change of a force.
     slope_change : float
         The largest change of an entry of the derivative of the residual on its pairing, less what differences may be
-        wrong by.
+        wrong by; or that of a smooth answer, if it is larger.
     """
     force, slope = _answers(case, formulation, case.z)
     others = [
@@ -123,8 +123,26 @@ def measure_jump(
     noise = DIFFERENCE_ERROR * _rounding_share(case) ** (2 / 3) * float(np.abs(slope).max())
     return (
         max(float(np.abs(other_force - force).max()) for other_force, _ in others),
-        max(0.0, slope_change - noise),
+        max(slope_change - noise, reach * _measure_curvature(case, formulation, directions)),
     )
+
+
+def _measure_curvature(case: Case, formulation: CheckedFormulation, directions: FloatArray) -> float:
+    """Return by how much an entry of the derivative changes a length of the way, on the pairing of the state.
+
+    A segment that is seen nearly edge-on turns the tangent by many times uX/ℓ, and no jump shows it: so small a change
+    is lost in the error of differences. A longer way shows it, as long as the answer is smooth.
+    """
+    pairing = formulation.pair(case.interface, case.z)
+    way = case.shortest_segment * _rounding_share(case) ** (1 / 6)
+    curvature = 0.0
+    for direction in directions:
+        back, forth = (
+            _differentiate(case, formulation, pairing, case.z + sign * way * direction)[1] for sign in (-1, 1)
+        )
+        noise = DIFFERENCE_ERROR * _rounding_share(case) ** (2 / 3) * float(np.abs(forth).max() + np.abs(back).max())
+        curvature = max(curvature, (float(np.abs(forth - back).max()) - noise) / (2 * way))
+    return curvature
 
 
 def _forces(case: Case, formulation: CheckedFormulation, z: FloatArray) -> FloatArray:
@@ -134,7 +152,13 @@ def _forces(case: Case, formulation: CheckedFormulation, z: FloatArray) -> Float
 
 def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return forces at z with its own pairing, and their derivative on that pairing by central differences."""
-    pairing = formulation.pair(case.interface, z)
+    return _differentiate(case, formulation, formulation.pair(case.interface, z), z)
+
+
+def _differentiate(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, z: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return forces at z on a pairing, and their derivative by central differences."""
     step = case.shortest_segment * _rounding_share(case) ** (1 / 3)
     moves = step * np.eye(z.size)
     forces = formulation.residual(case.interface, pairing, np.concatenate([z[None], z + moves, z - moves]))
