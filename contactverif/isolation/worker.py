@@ -32,7 +32,6 @@ from contactverif.isolation.messages import (
     Ask,
     Failure,
     Forget,
-    Load,
     Loaded,
     Make,
     PackedArray,
@@ -40,7 +39,6 @@ from contactverif.isolation.messages import (
     Request,
     Share,
     SharePairing,
-    Survey,
     Unloaded,
     Wraps,
     decode_request,
@@ -100,28 +98,42 @@ class Desk:
 
     def reply(self, request: Request) -> Reply | None:
         """Return the reply to a request; None if it has none."""
-        try:
-            return self._reply(request)
-        except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
-            return _failure(error)
-
-    def _reply(self, request: Request) -> Reply | None:
         match request:
-            case Ask():
-                return self._ask(request)
-            case Make(number, penalty):
-                self._store[number] = self._make(penalty)
-            case Share(number, nodes, slave, master):
-                surfaces = (Surface(unpack_array(segments)) for segments in (slave, master))
-                self._store[number] = Interface(unpack_array(nodes), *surfaces)
-            case SharePairing(number, arrays):
-                self._store[number] = Pairing({name: unpack_array(array) for name, array in arrays.items()})
+            case Make(number) | Share(number) | SharePairing(number):
+                self._store[number] = self._make_or_fail(request)
+                return None
             case Forget(numbers):
                 for number in numbers:
                     self._store.pop(number, None)
-            case Load(loader, name) | Survey(loader, name):
-                return self._load(loader, name)
-        return None
+                return None
+        try:
+            return self._ask(request) if isinstance(request, Ask) else self._load(request.loader, request.name)
+        except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
+            return _failure(error)
+
+    def _make_or_fail(self, request: Make | Share | SharePairing) -> Any:
+        """Return what the judge wants to be kept, or the error that came instead: who asks for it is told.
+
+        A request that has no reply must never get one, or the judge would take each reply for that of another question.
+        """
+        try:
+            match request:
+                case Make(_, penalty):
+                    return self._make(penalty)
+                case Share(_, nodes, slave, master):
+                    surfaces = (Surface(unpack_array(segments)) for segments in (slave, master))
+                    return Interface(unpack_array(nodes), *surfaces)
+                case SharePairing(_, arrays):
+                    return Pairing({name: unpack_array(array) for name, array in arrays.items()})
+        except BaseException as error:
+            return error
+
+    def _get(self, number: int) -> Any:
+        """Return what is kept under a number, or raise the error that is kept instead."""
+        item = self._store[number]
+        if isinstance(item, BaseException):
+            raise item
+        return item
 
     def _load(self, loader: str, name: str) -> Reply:
         module, _, function = loader.partition(":")
@@ -135,21 +147,16 @@ class Desk:
         methods = item.provides | ({"n_multipliers"} if item.counts_multipliers else set())
         return Loaded(_words_of_traits(item.traits), sorted(methods))
 
-    def _make(self, penalty: float) -> CheckedFormulation | Exception:
-        """Return the formulation with a penalty, or the error of its factory, which the first question is told."""
+    def _make(self, penalty: float) -> CheckedFormulation:
+        """Return the formulation with a penalty."""
         assert self._subject is not None
-        try:
-            formulation = self._subject.with_penalty(penalty)
-            formulation.plugin = Stopwatch(formulation.plugin)
-            return formulation
-        except Exception as error:
-            return error
+        formulation = self._subject.with_penalty(penalty)
+        formulation.plugin = Stopwatch(formulation.plugin)
+        return formulation
 
     def _ask(self, ask: Ask) -> Reply:
-        formulation: CheckedFormulation | Exception = self._store[ask.formulation]
-        if isinstance(formulation, Exception):
-            raise formulation
-        interface: Interface = self._store[ask.interface]
+        formulation: CheckedFormulation = self._get(ask.formulation)
+        interface: Interface = self._get(ask.interface)
         if ask.verb == "n_multipliers":
             return Answer({}, 0.0, formulation.n_multipliers(interface))
         assert ask.z is not None
@@ -160,7 +167,7 @@ class Desk:
             self._store[ask.keep] = pairing  # A handle stays here.
             arrays = {name: pack_array(array) for name, array in pairing.items()}
             return Answer(arrays, formulation.plugin.seconds, opaque=pairing.opaque)
-        pairing = None if ask.pairing is None else self._store[ask.pairing]
+        pairing = None if ask.pairing is None else self._get(ask.pairing)
         answer = getattr(formulation, ask.verb)(interface, pairing, z)
         return Answer(_PACKERS[ask.verb](answer), formulation.plugin.seconds)
 
