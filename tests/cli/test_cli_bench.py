@@ -63,7 +63,7 @@ def test_what_became_slower_is_told_by_ratio(ask: Ask, tmp_path: Path) -> None:
         (["nts", "--scene", "disk"], "--scene: found 'disk'; needed one of "),
         (["nts", "--jobs", "2"], "--jobs: found 2; needed 1: solutions side by side would disturb their times"),
         (["nts", "--repeats", "0"], "--repeats: found 0; needed at least 1, at most 1000"),
-        (["nts", "--against", "no-such.nc"], "FILE: found no file no-such.nc; needed a file that "),
+        (["nts", "--against", "no-such.nc"], "FILE: found no-such.nc, which does not exist; needed a file that "),
         (["a.nc", "nts"], "NAME: found a.nc and more; needed formulations alone, or one file of a bench"),
         (["nts", "--out", "a.svg"], "--out: found 'a.svg'; needed a name that ends in .nc, .html or .md"),
     ],

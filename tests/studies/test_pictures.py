@@ -175,7 +175,7 @@ def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
     solved = solve_scene(load_scene("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), load("vts-ppt")])
     assert [solution.formulation for solution in solved.solutions] == ["vts-ppt"]
     assert solved.failures == {
-        "raising": "residual: RuntimeError: no licence\nleft",
+        "raising": "residual: RuntimeError: no licence left",
         "absent": "not loaded: ModuleNotFoundError",
     }
 
