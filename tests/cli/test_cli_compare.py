@@ -224,7 +224,7 @@ MISTAKES = [
     (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations: a report .*"),
     (["a.nc", "b.nc", "--out", "r.nc"], r"--out: found 'r.nc'; needed a name that ends in .html"),
     (["a.nc", "b.nc"], r"OLD.nc: found a.nc, which does not exist; needed a report that .*"),
-    ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file .*; needed a report that .* wrote"),
+    ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file.*; needed a report that .* wrote"),
 ]  # fmt: skip
 
 
