@@ -17,9 +17,11 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.bench_command import bench
+from contactverif.cli.campaign_command import campaign
 from contactverif.cli.compare_command import compare
 from contactverif.cli.draw_command import draw
 from contactverif.cli.list_command import list_installed
+from contactverif.cli.merge_command import merge
 from contactverif.cli.paper_command import paper
 from contactverif.cli.queries_command import queries
 from contactverif.cli.replay_command import replay
@@ -41,6 +43,8 @@ app = typer.Typer(
 COMMANDS: dict[str, Callable[..., None]] = {
     "list": list_installed,
     "verify": verify,
+    "campaign": campaign,
+    "merge": merge,
     "compare": compare,
     "report": report,
     "replay": replay,

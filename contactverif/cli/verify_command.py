@@ -184,14 +184,14 @@ def _show_results(
 
     show(RunTable(result))
     _show_counterexamples(result, subjects, questions, files, folder)
-    _show_what_plugins_printed()
+    show_what_plugins_printed()
     files.announce()
     if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
     show(f"Not complete: {gap}." if gap else summary(result))
 
 
-def _show_what_plugins_printed() -> None:
+def show_what_plugins_printed() -> None:
     """End the processes of the plugins, and show the last lines that each of them printed."""
     from rich.text import Text
 

@@ -68,6 +68,8 @@ class VerifyJob:
         The journals whose outcomes are not judged again.
     resumes : bool
         The run goes on with its own journal.
+    again : str
+        The command that goes on with the run, if it is not `verify --resume`.
     """
 
     options: VerifyOptions
@@ -79,6 +81,7 @@ class VerifyJob:
     known: dict[str, str]
     sources: tuple[Path, ...] = ()
     resumes: bool = False
+    again: str = ""
 
     @property
     def jobs(self) -> int:
@@ -103,6 +106,8 @@ class VerifyJob:
     @property
     def resume_line(self) -> str:
         """The command that goes on with this run; empty if it has no journal."""
+        if self.again:
+            return self.again
         return f"contactverif verify --resume {shlex.quote(str(self.output))}" if self.output is not None else ""
 
     def plan(self) -> Plan:

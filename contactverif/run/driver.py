@@ -113,6 +113,11 @@ def draw_block(
     return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
 
 
+def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
+    """Return whether a strategy is drawn block by block; otherwise the first block has all cases."""
+    return not isinstance(source, tuple) and _block_of(source, seed, examples, 0) is not None
+
+
 def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
     """Return the case with this number of those of `draw_cases`."""
     if isinstance(source, tuple):

@@ -114,8 +114,8 @@ def run(
     """
     known = known or {}
     loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
-    _check_once("formulation", map(attrgetter("name"), loaded))
-    _check_once("property", map(attrgetter("id"), questions))
+    check_once("formulation", map(attrgetter("name"), loaded))
+    check_once("property", map(attrgetter("id"), questions))
     _check_known(known, properties)
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
@@ -179,7 +179,14 @@ def _of_kind(kind: type[_Kind], items: Iterable[object]) -> list[_Kind]:
     return [item for item in items if isinstance(item, kind)]
 
 
-def _check_once(argument: str, names: Iterable[str]) -> None:
+def check_once(argument: str, names: Iterable[str]) -> None:
+    """Check that no name stands there twice.
+
+    Raises
+    ------
+    MisuseError
+        If one does.
+    """
     for name, times in Counter(names).items():
         if times > 1:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")

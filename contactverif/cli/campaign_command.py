@@ -1,0 +1,95 @@
+"""The command `campaign`: it judges one shard of a run, and keeps its outcomes for `merge`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.cli.verify_command import select_names, show_what_plugins_printed
+from contactverif.cli.verify_job import VerifyJob, VerifyOptions, make_plan, new_job
+
+if TYPE_CHECKING:
+    from contactverif.run.run_journal import Plan
+    from contactverif.run.shards import Shard
+
+CAMPAIGN = "campaign"
+_SEED = 0  # The seed if there is none: all shards must have the same.
+
+
+def campaign(
+    *,
+    names: Annotated[
+        list[str],
+        typer.Argument(
+            help="Formulations, as in verify.",
+            metavar="NAME",
+            autocompletion=complete_formulation,
+        ),
+    ],
+    properties: PropertyGlobs = None,
+    sampling: SamplingOptions,
+    shard: Annotated[str, typer.Option(help="The shard: its number from 1, and the number of all.", metavar="I/N")],
+    out: Annotated[Path, typer.Option(help="The folder of all shards.", metavar="FOLDER")],
+    isolation: IsolationOptions,
+) -> None:
+    """Judge one shard of a run, for many processes or machines.
+
+    Each shard is a process by itself, and merge makes the report of all. A
+    shard that was stopped or killed goes on where it was, and one that is
+    done is skipped. Without --seed the seed is 0.
+
+    \bExit status
+      0  the shard is done, whatever merge will say of its outcomes
+      1  a plugin does not load
+      2  the command line is wrong, or the folder cannot be written
+      130  stopped by Ctrl-C; the same command goes on
+
+    \bExample
+      contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
+      contactverif merge runs --out nts-ar.nc
+    """
+    from contactverif.run.journal_folder import hold_journal
+    from contactverif.run.shards import Shard, open_shard
+    from contactverif_reports.files import made_folder
+
+    piece = Shard.parse(shard)
+    options = VerifyOptions(
+        tuple(select_names(names, False, isolation.limits())), tuple(properties or ()), sampling, isolation=isolation
+    )
+    job = new_job(options, fresh_seed=_SEED)
+    plan = piece.plan(make_plan(CAMPAIGN, job.options, job.profile))
+    made_folder(out, "--out")
+    folder = out.absolute() / piece.folder
+    if open_shard(folder, plan):
+        typer.echo(f"shard {piece.text} is done already")
+        return
+    with hold_journal(folder, "--out"):
+        count = _judge(piece, job, folder, plan)
+    typer.echo(f"shard {piece.text} is done: {count} outcomes")
+
+
+def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
+    """Load what the job names, and judge the shard; return the number of its outcomes."""
+    from contactverif.cli.progress import Bar
+    from contactverif.contract.foreign_text import name_line, one_line
+    from contactverif.contract.property import Property
+    from contactverif.contract.result import NotLoaded
+    from contactverif.contract.subject import Subject
+    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.run.shards import judge_shard
+
+    limits = job.options.isolation.limits()
+    items = [*(load_formulation(name, limits) for name in job.options.names), *load_properties(job.options.properties)]
+    for item in items:
+        if isinstance(item, NotLoaded):
+            typer.echo(f"contactverif: {name_line(item.formulation)} does not load: {one_line(item.reason)}", err=True)
+            raise typer.Exit(1)
+    subjects = [item for item in items if isinstance(item, Subject)]
+    questions = [item for item in items if isinstance(item, Property)]
+    with Bar() as bar:
+        count = judge_shard(shard, subjects, questions, job.sampling, bar.show_progress, folder, plan)
+    show_what_plugins_printed()
+    return count

@@ -1,0 +1,182 @@
+"""A campaign: a run in shards gives the report of one run, and a campaign that is not whole gives none."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from asking import Ask, asking
+
+from contactverif.contract.property import Property
+from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.registry import load_properties
+from contactverif_reports.netcdf.differences import same_data
+from contactverif_reports.netcdf.read import read_run
+
+IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")  # One strategy for two, and a list.
+NAMES = ("nts", "vts-ppt")
+WORDS = (*NAMES, *(word for id_ in IDS for word in ("-p", id_)), "--examples", "43", "--seed", "1")
+N = 3
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    """Return a function that runs `contactverif` with blocks of ten cases."""
+    for module in ("driver", "conductor", "shards"):
+        monkeypatch.setattr(f"contactverif.run.{module}.BLOCK", 10)
+    return asking(monkeypatch, capsys)
+
+
+def judge_shard(ask: Ask, folder: Path, number: int, *more: str) -> str:
+    answer = ask("campaign", *WORDS, *more, "--shard", f"{number}/{N}", "--out", folder)
+    assert (answer.status, answer.err) == (0, "")
+    return answer.out
+
+
+def name(number: int) -> str:
+    return f"shard-{number}-of-{N}"
+
+
+def cut_in_half(journal: Path) -> None:
+    """Leave a journal as if its process had been killed."""
+    (path,) = journal.glob("*.outcomes")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def count(folder: Path) -> tuple[int, int]:
+    """Return the numbers of judged cases and of further outcomes of the same cases."""
+    known = KnownOutcomes(sorted(folder.glob("shard-*")), len(NAMES) * len(IDS), 100)
+    known.close()
+    return known.n_outcomes, known.n_twice
+
+
+@pytest.mark.parametrize("in_blocks", [True, False])
+def test_the_merged_report_is_that_of_one_run(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
+) -> None:
+    """It is so, too, where hypothesis' engine draws all cases at once, and for a shard that was killed."""
+    monkeypatch.setattr("contactverif.run.driver.AVAILABLE", in_blocks)
+    single = ask("verify", *WORDS, "--out", tmp_path / "single.nc")
+    shards = tmp_path / "shards"
+    for number in (3, 1, 2):
+        judge_shard(ask, shards, number)
+    (shards / name(1) / "done").unlink()
+    cut_in_half(shards / name(1))
+    judge_shard(ask, shards, 1)
+    assert len([*(shards / name(1)).glob("*.outcomes")]) == 2
+    merged = ask("merge", shards, "--out", tmp_path / "merged.nc", "--out", tmp_path / "merged.html")
+    assert merged.status == single.status
+    assert merged.err == ""
+    assert same_data(tmp_path / "single.nc", tmp_path / "merged.nc") == []
+    rows = read_run(tmp_path / "merged.nc").rows
+    n_cases = sum(len(row.outcomes) + (row.witness is not None and row.property_id != "hard.deep") for row in rows)
+    assert count(shards) == (n_cases, 0)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["merged.html", "merged.nc", "shards", "single.nc"]
+
+
+def test_the_exit_status_of_a_broken_promise_is_that_of_verify(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The harness is told that `nts` promises what it cannot keep."""
+    question = next(iter(load_properties(["patch.flat.single"])))
+    monkeypatch.setattr(
+        "contactverif.run.registry.load_properties", lambda globs: [replace(question, promise=lambda traits: True)]
+    )
+    assert isinstance(question, Property)
+    words = ("nts", "-p", "patch.flat.single", "--examples", "4")
+    assert ask("campaign", *words, "--shard", "1/1", "--out", tmp_path).status == 0
+    assert ask("merge", tmp_path, "--out", tmp_path / "r.nc").status == 1
+
+
+@pytest.fixture(scope="module")
+def campaign_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return an empty folder, in which the first test that needs a campaign makes one."""
+    return tmp_path_factory.mktemp("campaign") / "shards"
+
+
+@pytest.fixture
+def shards(ask: Ask, campaign_folder: Path, tmp_path: Path) -> Path:
+    """Return the folder of a finished campaign, which a test may damage."""
+    if not campaign_folder.exists():
+        for number in range(1, N + 1):
+            judge_shard(ask, campaign_folder, number)
+    return Path(shutil.copytree(campaign_folder, tmp_path / "shards"))
+
+
+def test_a_shard_that_is_done_is_skipped(ask: Ask, shards: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("contactverif.run.registry.load_formulation", None)
+    assert judge_shard(ask, shards, 2) == "shard 2/3 is done already\n"
+
+
+def refusal(ask: Ask, shards: Path) -> str:
+    answer = ask("merge", shards, "--out", shards.parent / "r.nc")
+    assert answer.status == 2
+    assert answer.out == ""
+    assert [path.name for path in shards.parent.iterdir()] == ["shards"]
+    return answer.err
+
+
+def test_a_folder_without_shards_is_refused(ask: Ask, tmp_path: Path) -> None:
+    answer = ask("merge", tmp_path, "--out", tmp_path / "r.nc")
+    assert (
+        answer.err
+        == f"contactverif: FOLDER: found no shard in {tmp_path}; needed the folder that campaign --out made\n"
+    )
+
+
+def test_a_missing_shard_is_refused_by_name(ask: Ask, shards: Path) -> None:
+    shutil.rmtree(shards / name(2))
+    assert refusal(ask, shards) == "contactverif: FOLDER: found no shard-2-of-3; needed all 3 shards\n"
+
+
+def test_an_unfinished_shard_is_refused_by_name(ask: Ask, shards: Path) -> None:
+    (shards / name(2) / "done").unlink()
+    needed = "needed its end: the same campaign with --shard 2/3 goes on"
+    assert refusal(ask, shards) == f"contactverif: FOLDER: found shard-2-of-3, which is not finished; {needed}\n"
+
+
+def test_a_damaged_shard_is_refused_by_name_and_can_be_mended(ask: Ask, shards: Path) -> None:
+    whole = count(shards)
+    cut_in_half(shards / name(2))
+    assert "found shard-2-of-3, damaged: " in refusal(ask, shards)
+    judge_shard(ask, shards, 2)
+    assert count(shards) == whole
+    (shards / name(2) / "header").write_bytes(b"")
+    assert "found shard-2-of-3 with a damaged header" in refusal(ask, shards)
+
+
+def test_a_shard_of_another_plan_is_refused_by_name(ask: Ask, shards: Path) -> None:
+    shutil.rmtree(shards / name(2))
+    judge_shard(ask, shards, 2, "--seed", "2")
+    flaw = "shard-2-of-3 with another plan than that of shard-1-of-3 (seed)"
+    assert refusal(ask, shards) == f"contactverif: FOLDER: found {flaw}; needed shards of one campaign\n"
+    answer = ask("campaign", *WORDS, "--shard", "2/3", "--out", shards)
+    assert answer.status == 2
+    assert "found shard-2-of-3 of another plan (seed); needed the same plan, or another folder" in answer.err
+
+
+def test_a_copy_under_another_name_is_refused(ask: Ask, shards: Path) -> None:
+    shutil.rmtree(shards / name(2))
+    shutil.copytree(shards / name(1), shards / name(2))
+    assert "found shard-2-of-3, whose header says 1/3; needed shard 2/3" in refusal(ask, shards)
+
+
+def test_shards_of_two_counts_are_refused(ask: Ask, shards: Path) -> None:
+    (shards / "shard-1-of-4").mkdir()
+    assert "found shard-1-of-3 and shard-1-of-4; needed shards of one campaign" in refusal(ask, shards)
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/3", "-1/3", "1/3/5"])
+def test_a_shard_is_a_number_of_a_number(ask: Ask, tmp_path: Path, text: str) -> None:
+    answer = ask("campaign", "nts", f"--shard={text}", "--out", tmp_path / "r")
+    assert answer.status == 2
+    assert f"--shard: found {text!r}; needed I/N" in answer.err
+
+
+def test_a_plugin_that_does_not_load_is_no_shard_that_is_done(ask: Ask, tmp_path: Path) -> None:
+    answer = ask("campaign", "vts-me:n=x", "-p", "balance.force", "--shard", "1/1", "--out", tmp_path)
+    assert answer.status in (1, 2)
+    assert len(answer.err.splitlines()) == 1
+    assert not [*tmp_path.rglob("done")]
