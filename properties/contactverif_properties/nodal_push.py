@@ -20,7 +20,10 @@ Dual shape functions are negative in places and may pull. A formulation says so 
 witness, and None promises nothing, so that a right dual mortar method of a stranger is not accused. The pressures of
 contact points are judged for all formulations, by `unilateral`.
 
-**Undecided.** Never.
+**Undecided.** A failing case is undecided where every node that is pulled belongs to a segment of the master round a
+corner: the neighbour of the one that a point faces, turned by more than 60°. Where an area of competence reaches round
+such a corner, a part of its force has its foot far past the ends of the neighbour, and Eq. 6 leaves that ξ unclipped, too.
+Points do not report their parts.
 
 **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
 """
@@ -49,6 +52,9 @@ from contactverif_properties.shared.roundoff import (
     sum_larger_forces,
 )
 
+CORNER = (
+    0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie past a neighbour by its whole length.
+)
 CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
@@ -79,11 +85,30 @@ def measure_nodal_push(case: Case, subject: Subject) -> Measurement:
         return Measurement({PULL.name: 0.0}, {PULL.name: 0.0}, idle=True)
     forces = -residual.reshape(-1, 2)
     normals, allowance = allowed_pushes(formulation, state)
-    pulls = [
-        _distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(forces) if force.any()
-    ]
+    pulls = np.array([_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(forces)])
     tolerance = segment_tolerance(state, residual, state.largest_coordinate)
-    return Measurement({PULL.name: max(0.0, *pulls) / size}, {PULL.name: tolerance})
+    pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
+    undecided = ""
+    if pulled and pulled <= _nodes_round_corners(formulation, state):
+        undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
+    return Measurement({PULL.name: max(0.0, float(pulls.max())) / size}, {PULL.name: tolerance}, undecided)
+
+
+def _nodes_round_corners(formulation: CheckedFormulation, state: Case) -> set[int]:
+    """Return the nodes of all master segments that a point faces beside a corner of more than 60°."""
+    if "contact_points" not in formulation.provides:
+        return set()
+    pairing = formulation.pair(state.interface, state.z)
+    nodes: set[int] = set()
+    for each in split_passes(state, formulation.contact_points(state.interface, pairing, state.z)):
+        master = each.interface.master
+        for segment, normal in zip(each.points.master_segment, each.points.normal, strict=True):
+            for neighbour in master.neighbours[segment] if segment >= 0 else ():
+                along = np.diff(each.positions[master.segments[neighbour]], axis=0)[0]
+                outward = np.array([along[1], -along[0]]) / np.hypot(*along)  # The body is on the left.
+                if neighbour >= 0 and normal @ outward < CORNER:
+                    nodes.update(each.numbers[master.segments[neighbour]].tolist())
+    return nodes
 
 
 def release_some(state: Case) -> FloatArray:
