@@ -22,8 +22,8 @@ contact points are judged for all formulations, by `unilateral`.
 
 **Undecided.** A failing case is undecided where every node that is pulled belongs to a segment of the master round a
 corner: the neighbour of the one that a point faces, turned by more than 60°. Where an area of competence reaches round
-such a corner, a part of its force has its foot far past the ends of the neighbour, and Eq. 6 leaves that ξ unclipped, too.
-Points do not report their parts.
+such a corner, a part of its force has its foot far past the ends of the neighbour, and Eq. 6 leaves that ξ unclipped,
+too. Points do not report their parts.
 
 **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
 """
@@ -52,9 +52,7 @@ from contactverif_properties.shared.roundoff import (
     sum_larger_forces,
 )
 
-CORNER = (
-    0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie past a neighbour by its whole length.
-)
+CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
