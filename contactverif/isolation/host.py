@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from time import monotonic
 from typing import Any
+
+import psutil
 
 from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
@@ -36,6 +39,7 @@ from contactverif.isolation.process import PluginProcess, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
 _MOST_HANGS = 5  # After so many calls without an answer neither.
+_LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces and pairings that a process keeps for further questions.
 _FORGET = 64  # The number of what can be forgotten before the process is told.
 _QUEUE = 16  # The number of questions that wait.
@@ -95,6 +99,8 @@ class Host:
         Pairings have a handle, which stays in the process; None until the first one is known.
     last_words : bytes
         The end of what the process printed.
+    last_asked : float
+        The time of the last question, by the clock of `time.monotonic`.
     """
 
     def __init__(self, loader: str, name: str, limits: Limits, *, second: bool) -> None:
@@ -110,6 +116,7 @@ class Host:
         self.opaque: bool | None = None
         self.n_ended = self.n_hangs = self.n_started = 0
         self.last_words = b""
+        self.last_asked = 0.0
 
     def load(self) -> Reply:
         """Start the process anew, and return what loading the formulation gave."""
@@ -121,6 +128,7 @@ class Host:
         if self.n_ended >= _MOST_ENDS or self.n_hangs >= _MOST_HANGS:
             words = f"no answer came {self.n_hangs} times" if self.n_hangs >= _MOST_HANGS else ""
             raise PluginError(words or f"its process ended {self.n_ended} times", "not asked")
+        _make_room(self._load.name)
         self._process = PluginProcess(self._limits, second=self._second)
         self.n_started += 1
         for store in (self._shelf, self._queue, self._questions, self._forgotten):
@@ -146,6 +154,11 @@ class Host:
         self._number += 1
         self._queue.append(Make(self._number, penalty))
         return self._number, self.n_started
+
+    @property
+    def has_process(self) -> bool:
+        """Whether there is a process now."""
+        return self._process is not None
 
     def is_alive(self, started: int) -> bool:
         """Return whether the process of this number is still the one that answers."""
@@ -200,6 +213,7 @@ class Host:
 
     def flush(self) -> None:
         """Send what waits in the queue, and give each question its answer."""
+        self.last_asked = monotonic()
         requests, questions = self._queue, self._questions
         self._queue, self._questions = [], []
         if len(self._forgotten) > _FORGET:
@@ -268,6 +282,19 @@ def host_of(loader: str, name: str, limits: Limits, *, second: bool = False) -> 
     if key not in _HOSTS:
         _HOSTS[key] = Host(loader, name, limits, second=second)
     return _HOSTS[key]
+
+
+def _make_room(name: str) -> None:
+    """End the processes that were not asked for the longest time, until there is memory for another one.
+
+    Each takes some hundred megabytes, and a run may have dozens. One that is asked again starts again. Those of the
+    formulation of that name stay, since the case that is judged may hold a pairing there.
+    """
+    others = [host for (_, other, _, _), host in _HOSTS.items() if other != name and host.has_process]
+    for host in sorted(others, key=lambda host: host.last_asked):
+        if psutil.virtual_memory().available >= _LEAST_MEMORY:
+            return
+        host.end()
 
 
 def end_all() -> dict[str, bytes]:

@@ -154,6 +154,17 @@ def test_purity_asks_a_second_process(name: str, words: str | None, monkeypatch:
     assert words is None or words in there.reason
 
 
+def test_processes_make_room_where_memory_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second = (load_remote(LOADER, name, QUICK) for name in ("Springs", "HandledSprings"))
+    ask(first)
+    monkeypatch.setattr(host, "_LEAST_MEMORY", 1 << 60)
+    ask(second)
+    third = load_remote(LOADER, "RaisesInMake", QUICK)
+    assert [subject._make.host.has_process for subject in (first, second, third)] == [False, False, True]
+    ask(first)  # It starts again, and that is no mistake of the plugin.
+    assert first.n_ended == 0
+
+
 def test_a_damaged_pairing_of_the_judge_is_refused_there_as_here() -> None:
     formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
     pairing = Pairing({"other": np.zeros(3, np.int64)})
