@@ -126,6 +126,8 @@ def _exit_status(error: Exception) -> int:
         case OSError(strerror=str()) | MemoryError() | UnicodeEncodeError():
             return _refuse(_words_of_machine(error))
         case typer.Abort():
+            if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what a user types.
+                raise error.__cause__
             return _STOPPED
     return _refuse(_words_of_usage_error(error))
 

@@ -42,6 +42,8 @@ _SECONDS_TO_READ = 1.0
 _CODE = "import sys; sys.path[:] = {path!r}; from contactverif.isolation.worker import main; main({end}, {memory})"
 # One thread for linear algebra, as in the judge's process (`contactverif.run.one_thread`): the same bits.
 _THREADS = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM")}
+# A plugin that limits the size of files would cut the compiled modules of the harness, which all runs share.
+_NO_TRACES = {"PYTHONDONTWRITEBYTECODE": "1"}
 # A second process of the same plugin differs in what no answer may depend on.
 _OTHER_SETTINGS = {"PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2"}
 
@@ -62,7 +64,12 @@ class PluginProcess:
         self._limits = limits
         ours, theirs = socket.socketpair()
         code = _CODE.format(path=[*filter(None, sys.path)], end=theirs.fileno(), memory=limits.memory)
-        environment = os.environ | _THREADS | {MARK: _run, "TMPDIR": _folder()} | (_OTHER_SETTINGS if second else {})
+        environment = (
+            os.environ
+            | _THREADS
+            | {MARK: _run, "TMPDIR": _folder(), **_NO_TRACES}
+            | (_OTHER_SETTINGS if second else {})
+        )
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.DEVNULL,

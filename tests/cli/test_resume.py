@@ -103,8 +103,19 @@ def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypa
 def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
     """The limit stops the journal, the report and the page."""
     report = tmp_path / "r.nc"
+    # Python would cut the modules, too, that it compiles and stores at such a limit.
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); "
-    command = [sys.executable, "-c", limit + MAIN[-1], *RUN, "--out", str(report), "--out", str(tmp_path / "r.html")]
+    command = [
+        sys.executable,
+        "-B",
+        "-c",
+        limit + MAIN[-1],
+        *RUN,
+        "--out",
+        str(report),
+        "--out",
+        str(tmp_path / "r.html"),
+    ]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     assert answer.returncode == 2
     assert "patch.flat.transmission" in answer.stdout
