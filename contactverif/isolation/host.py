@@ -99,7 +99,7 @@ class Host:
         Pairings have a handle, which stays in the process; None until the first one is known.
     last_words : bytes
         The end of what the process printed.
-    last_asked : float
+    last_question : float
         The time of the last question, by the clock of `time.monotonic`.
     """
 
@@ -116,7 +116,7 @@ class Host:
         self.opaque: bool | None = None
         self.n_ended = self.n_hangs = self.n_started = 0
         self.last_words = b""
-        self.last_asked = 0.0
+        self.last_question = 0.0
 
     def load(self) -> Reply:
         """Start the process anew, and return what loading the formulation gave."""
@@ -157,7 +157,7 @@ class Host:
 
     @property
     def has_process(self) -> bool:
-        """Whether there is a process now."""
+        """Return whether there is a process now."""
         return self._process is not None
 
     def is_alive(self, started: int) -> bool:
@@ -213,7 +213,7 @@ class Host:
 
     def flush(self) -> None:
         """Send what waits in the queue, and give each question its answer."""
-        self.last_asked = monotonic()
+        self.last_question = monotonic()
         requests, questions = self._queue, self._questions
         self._queue, self._questions = [], []
         if len(self._forgotten) > _FORGET:
@@ -291,7 +291,7 @@ def _make_room(name: str) -> None:
     formulation of that name stay, since the case that is judged may hold a pairing there.
     """
     others = [host for (_, other, _, _), host in _HOSTS.items() if other != name and host.has_process]
-    for host in sorted(others, key=lambda host: host.last_asked):
+    for host in sorted(others, key=lambda host: host.last_question):
         if psutil.virtual_memory().available >= _LEAST_MEMORY:
             return
         host.end()
