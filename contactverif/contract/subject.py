@@ -26,6 +26,8 @@ OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. Whoever has none lacks nothing.
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
+COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
+_ENTRIES = (np.float64, np.int32, np.int64)
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
 
@@ -155,6 +157,8 @@ class CheckedFormulation:
         The plugin itself, for whoever times it: nothing that it answers is checked.
     provides : frozenset[str]
         The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
+    passes_on : bool
+        A csr or csc matrix is returned as the plugin made it, for another process that looks into it. False by default.
 
     Raises
     ------
@@ -174,13 +178,18 @@ class CheckedFormulation:
         self.provides = provides
         # A plugin in a process of its own gets a whole batch, and the loop is there; new pairings are made there, too.
         self._remote = getattr(plugin, "loops", False) is True
+        self.passes_on = False
+        self._counts_there = self._remote and traits.enforcement != "multiplier"
         self._counts: dict[int, tuple[Interface, int]] = {}  # It holds the interfaces, so that no id is used again.
 
     def n_multipliers(self, interface: Interface) -> int:
         """Return the number of multipliers behind the positions in z; 0 if the plugin does not mention any.
 
-        The plugin is called once for each interface: one that counts differently later breaks its own shapes.
+        The plugin is called once for each interface: one that counts differently later breaks its own shapes. In a
+        process of its own, one that promises none is called with the first question, and fails there if it has any.
         """
+        if self._counts_there:
+            return 0
         if id(interface) not in self._counts:
             self._counts[id(interface)] = interface, self._count_multipliers(interface)
         return self._counts[id(interface)][1]
@@ -249,7 +258,7 @@ class CheckedFormulation:
         self._check_size(interface, z)
         pairing = self._pairing_at(interface, pairing, z)
         tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
-        return _check_tangent("tangent", tangent, z.size, copy=not self._remote)
+        return self._check_tangent("tangent", tangent, z.size)
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing | None, z: FloatArray
@@ -264,9 +273,7 @@ class CheckedFormulation:
         if not isinstance(answer, tuple) or len(answer) != 2:
             kind = f"a tuple of {len(answer)}" if isinstance(answer, tuple) else f"a {type(answer).__name__}"
             raise ContractError(f"{verb}: returned {kind}; needed a tuple (residual, tangent)")
-        return _check_forces(f"{verb}[0]", answer[0], z), _check_tangent(
-            f"{verb}[1]", answer[1], z.size, copy=not self._remote
-        )
+        return _check_forces(f"{verb}[0]", answer[0], z), self._check_tangent(f"{verb}[1]", answer[1], z.size)
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points at one state z (n_unknowns,)."""
@@ -288,6 +295,21 @@ class CheckedFormulation:
                 first = outliers[0]
                 raise ContractError(f"contact_points: {name} {numbers[first]}; needed −1 to {limits[first] - 1}")
         return points
+
+    def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
+        """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb.
+
+        What came from another process is a copy already.
+        """
+        _check_matrix(verb, tangent, size)
+        if self.passes_on and compressed_parts(tangent):
+            return tangent
+        if not self._remote or getattr(tangent, "format", "") in ("csr", "csc"):
+            tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
+        entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
+        if not np.isfinite(entries).all():
+            raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
+        return tangent
 
     def _check_size(self, interface: Interface, z: Array) -> None:
         """Check that z has the positions and the multipliers of the formulation, no more and no less."""
@@ -323,23 +345,22 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
     return copy
 
 
-def _check_tangent(verb: str, tangent: Any, size: int, *, copy: bool) -> Any:
-    """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb.
-
-    What came from another process is a checked copy already.
-    """
+def _check_matrix(verb: str, tangent: Any, size: int) -> None:
+    """Check that a tangent is a matrix (size, size) of floats, dense or sparse."""
     if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
         raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
     if tangent.shape != (size, size):
         raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
     if tangent.dtype != np.float64:
         raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
-    if copy:
-        tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
-    entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
-    if not np.isfinite(entries).all():
-        raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
-    return tangent
+
+
+def compressed_parts(matrix: Any) -> dict[str, Array]:
+    """Return the arrays of a csr or csc matrix as a plugin made it; none for another matrix, or if one is unusual."""
+    names = COMPRESSED if getattr(matrix, "format", "") in ("csr", "csc") else ()
+    parts = {name: getattr(matrix, name) for name in names}
+    usual = all(type(part) is np.ndarray and part.dtype in _ENTRIES for part in parts.values())
+    return parts if usual else {}
 
 
 def _copy_entries(verb: str, tangent: Any) -> Any:

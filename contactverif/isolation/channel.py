@@ -50,8 +50,8 @@ class Channel:
         for event, poll in self._polls.items():
             poll.register(self._file, event)
 
-    def send(self, *frames: bytes, seconds: float = inf) -> None:
-        """Send some frames.
+    def send(self, frame: bytes, seconds: float = inf) -> None:
+        """Send a frame.
 
         Raises
         ------
@@ -60,7 +60,7 @@ class Channel:
         TooLateError
             If the other end does not read all of it within so many seconds.
         """
-        data = memoryview(b"".join(part for frame in frames for part in (_LENGTH.pack(len(frame)), frame)))
+        data = memoryview(_LENGTH.pack(len(frame)) + frame)
         deadline = perf_counter() + seconds
         while data:
             try:
@@ -78,7 +78,7 @@ class Channel:
         ClosedError
             If the other end is closed.
         TooLateError
-            If the whole frame is not there within so many seconds.
+            If the whole frame is not there within so many seconds. What has come is kept for the next call.
         TooLargeError
             If the frame is too long.
         """
@@ -91,22 +91,26 @@ class Channel:
         return data[_LENGTH.size : end]
 
     def _receive_in_pieces(self, data: bytes, deadline: float) -> bytes:
-        parts, have = [data], len(data)
-        while have < _LENGTH.size:
-            parts.append(self._read(_PIECE, deadline))
-            have += len(parts[-1])
-        head = b"".join(parts)
+        head = self._gather(data, _LENGTH.size, deadline)
         length = int(_LENGTH.unpack_from(head)[0])
         if length > self._largest:
             raise TooLargeError(f"{length} bytes")
         whole = _LENGTH.size + length
-        parts, have = [head], len(head)
-        while have < whole:
-            parts.append(self._read(min(max(whole - have, _PIECE), _LARGEST_PIECE), deadline))
-            have += len(parts[-1])
-        together = b"".join(parts)
+        together = self._gather(head, whole, deadline)
         self._rest = together[whole:]
         return together[_LENGTH.size : whole]
+
+    def _gather(self, data: bytes, size: int, deadline: float) -> bytes:
+        """Return the data and what follows it, so many bytes at least."""
+        parts, have = [data], len(data)
+        while have < size:
+            try:
+                parts.append(self._read(min(max(size - have, _PIECE), _LARGEST_PIECE), deadline))
+            except TooLateError:
+                self._rest = b"".join(parts)
+                raise
+            have += len(parts[-1])
+        return b"".join(parts)
 
     def _read(self, size: int, deadline: float) -> bytes:
         self._wait(select.POLLIN, deadline)

@@ -35,6 +35,7 @@ from contactverif.isolation.messages import (
     encode,
     pack_array,
 )
+from contactverif.isolation.one_core import JUDGE
 from contactverif.isolation.process import PluginProcess, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
@@ -225,7 +226,7 @@ class Host:
                 question.answer = ended
             return
         try:
-            self._exchange([encode(request) for request in requests], requests, questions)
+            self._exchange(requests, questions)
         except PluginError as error:
             for question in questions:
                 question.answer = error if question.answer is None else question.answer
@@ -234,20 +235,22 @@ class Host:
             self._note_output()
             self._process = None
 
-    def _exchange(self, frames: Sequence[bytes], requests: Sequence[Request], questions: Sequence[Question]) -> None:
-        """Send frames and receive the answers: all together if they are small, else each answer before the next."""
+    def _exchange(self, requests: Sequence[Request], questions: Sequence[Question]) -> None:
+        """Send requests and receive the answers: all together if they are small, else each answer before the next."""
         assert self._process is not None
-        if sum(map(len, frames)) <= _TOGETHER:
-            self._process.send(questions[0].verb if questions else "make", frames)
-            for question in questions:
-                question.answer = self._process.receive(question.verb)
+        frame = encode(requests)
+        if len(frame) <= _TOGETHER:
+            self._answer(questions, self._process.ask(frame, [question.verb for question in questions]))
             return
         unanswered = iter(questions)
-        for frame, request in zip(frames, requests, strict=True):
-            self._process.send(questions[0].verb if questions else "make", [frame])
-            if isinstance(request, Ask | Load):
-                question = next(unanswered)
-                question.answer = self._process.receive(question.verb)
+        for request in requests:
+            waiting = [next(unanswered)] if isinstance(request, Ask | Load) else []
+            self._answer(waiting, self._process.ask(encode([request]), [question.verb for question in waiting]))
+
+    @staticmethod
+    def _answer(questions: Sequence[Question], replies: Sequence[Reply]) -> None:
+        for question, reply in zip(questions, replies, strict=True):
+            question.answer = reply
 
     def _note_output(self) -> None:
         if self._process is not None:
@@ -301,6 +304,7 @@ def end_all() -> dict[str, bytes]:
     """End the processes of all plugins, and return the last words that those of each name printed."""
     for host in _HOSTS.values():
         host.end()
+    JUDGE.let_go()
     if _HOSTS:
         end_marked()
     printed = {name: host.last_words for (_, name, _, _), host in _HOSTS.items() if host.last_words}

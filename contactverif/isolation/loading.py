@@ -84,8 +84,8 @@ def survey(loader: str, names: Iterable[str], limits: Limits) -> Iterator[Subjec
     for name in names:
         process = process or PluginProcess(limits)
         try:
-            process.send("import", [encode(Survey(loader, name))])
-            yield _read_finding(name, RemoteFactory("", name, limits), process.receive("import"))
+            (reply,) = process.ask(encode([Survey(loader, name)]), ["import"])
+            yield _read_finding(name, RemoteFactory("", name, limits), reply)
         except PluginError as error:
             process = None if error.ended else process
             yield _not_loaded(name, error)

@@ -6,6 +6,7 @@ process is decoded by these schemas and by `unpack_array` alone, since a plugin 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -123,27 +124,27 @@ Request = Load | Survey | Make | Share | SharePairing | Forget | Ask
 Reply = Answer | Failure | Loaded | Unloaded | Wraps
 
 _encoder = msgspec.msgpack.Encoder()
-_request_decoder: msgspec.msgpack.Decoder[Request] = msgspec.msgpack.Decoder(Request)
-_reply_decoder: msgspec.msgpack.Decoder[Reply] = msgspec.msgpack.Decoder(Reply)
+_request_decoder: msgspec.msgpack.Decoder[list[Request]] = msgspec.msgpack.Decoder(list[Request])
+_reply_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(list[Reply])
 
 
-def encode(message: Request | Reply) -> bytes:
-    """Return a message as bytes."""
-    return _encoder.encode(message)
+def encode(messages: Sequence[Request] | Sequence[Reply]) -> bytes:
+    """Return messages as bytes."""
+    return _encoder.encode(messages)
 
 
-def decode_request(data: bytes) -> Request:
-    """Return the message that the judge sent."""
+def decode_requests(data: bytes) -> list[Request]:
+    """Return the messages that the judge sent."""
     return _request_decoder.decode(data)
 
 
-def decode_reply(data: bytes) -> Reply:
-    """Return the message that a plugin's process sent.
+def decode_replies(data: bytes) -> list[Reply]:
+    """Return the messages that a plugin's process sent.
 
     Raises
     ------
     MessageError
-        If it is none.
+        If there are none.
     """
     try:
         return _reply_decoder.decode(data)

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from multiprocessing import util
@@ -28,18 +28,19 @@ import psutil
 from contactverif.contract.errors import PluginError
 from contactverif.isolation.channel import Channel, ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.limits import MEGABYTE, Limits
-from contactverif.isolation.messages import MessageError, Reply, decode_reply
+from contactverif.isolation.messages import MessageError, Reply, decode_replies
+from contactverif.isolation.one_core import JUDGE
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
 _run = uuid.uuid4().hex
 _LIBC = ctypes.CDLL(None)
-_CALLS_ON_A_CORE = 32  # The judge may be moved to another core now and then.
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
 _LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in its own memory.
 _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
-_CODE = "import sys; sys.path[:] = {path!r}; from contactverif.isolation.worker import main; main({end}, {memory})"
+_CODE = """import sys; sys.path[:] = {path!r}
+from contactverif.isolation.worker import main; main({end}, {progress}, {memory})"""
 # One thread for linear algebra, as in the judge's process (`contactverif.run.one_thread`): the same bits.
 _THREADS = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM")}
 # A plugin that limits the size of files would cut the compiled modules of the harness, which all runs share.
@@ -63,19 +64,22 @@ class PluginProcess:
         _end_at_exit()
         self._limits = limits
         ours, theirs = socket.socketpair()
-        code = _CODE.format(path=[*filter(None, sys.path)], end=theirs.fileno(), memory=limits.memory)
+        self._progress = _file_of_one_byte()
+        ends = {"end": theirs.fileno(), "progress": self._progress.fileno()}
+        code = _CODE.format(path=[*filter(None, sys.path)], **ends, memory=limits.memory)
         environment = (
             os.environ
             | _THREADS
             | {MARK: _run, "TMPDIR": _folder(), **_NO_TRACES}
             | (_OTHER_SETTINGS if second else {})
         )
+        JUDGE.let_go()  # Whoever is started while the judge is held is held, too.
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            pass_fds=(theirs.fileno(),),
+            pass_fds=tuple(ends.values()),
             env=environment,
             start_new_session=True,
         )
@@ -84,75 +88,77 @@ class PluginProcess:
         assert self._process.stdout is not None
         self.output = Output(self._process.stdout)
         self._known_verbs: set[str] = set()
-        self._n_sent, self._core = 0, -1
+        self._core = -1
 
-    def send(self, verb: str, requests: Iterable[bytes]) -> None:
-        """Send requests.
+    def ask(self, frame: bytes, verbs: Sequence[str]) -> Sequence[Reply]:
+        """Send requests and return the replies.
 
         Parameters
         ----------
-        verb : str
-            The method that is asked first, for messages.
-        requests : Iterable[bytes]
+        frame : bytes
             The requests, encoded.
-
-        Raises
-        ------
-        PluginError
-            If the process has ended, or does not read. It is ended then.
-        """
-        if self._n_sent % _CALLS_ON_A_CORE == 0:
-            self._follow()
-        self._n_sent += 1
-        try:
-            self._channel.send(*requests, seconds=self._limits.start_seconds)
-        except TooLateError:
-            raise self._end_with(f"{verb}: its process does not listen", "hang") from None
-        except ClosedError:
-            raise self._end_with(verb, "") from None
-
-    def _follow(self) -> None:
-        """Put the process on the core of the judge, for one of the two always waits for the other.
-
-        To wake a process on another core that sleeps takes longer than most answers.
-        """
-        core = _core_of_judge()
-        if core not in (-1, self._core):
-            with suppress(OSError):
-                os.sched_setaffinity(self._process.pid, {core})
-            self._core = core
-
-    def receive(self, verb: str) -> Reply:
-        """Return the next reply.
-
-        Parameters
-        ----------
-        verb : str
-            The method that was asked, for messages. Its first call may take longer.
+        verbs : Sequence[str]
+            The methods that are asked, for messages. The first call of each may take longer.
 
         Returns
         -------
-        Reply
-            What the process says, of a known kind, with nothing else checked.
+        Sequence[Reply]
+            What the process says to each question, of a known kind, with nothing else checked.
 
         Raises
         ------
         PluginError
             If the process ends, hangs or says what nobody can read. It is ended then.
         """
-        seconds = self._limits.seconds if verb in self._known_verbs else self._limits.start_seconds
+        if len(verbs) > 1:
+            os.pwrite(self._progress.fileno(), b"\0", 0)
+        self._follow()
         try:
-            reply = decode_reply(self._channel.receive(seconds))
+            self._channel.send(frame, seconds=self._limits.start_seconds)
+            if not verbs:
+                return ()
+            replies = decode_replies(self._receive(verbs))
+            if len(replies) != len(verbs):
+                raise MessageError(f"{len(replies)} answers to {len(verbs)} questions")
         except TooLateError:
-            raise self._end_with(f"{verb}: no answer within {seconds:g} s", "hang") from None
+            raise self._end_with(f"{self._last_verb(verbs)}: its process does not listen", "hang") from None
         except ClosedError:
-            raise self._end_with(verb, "") from None
+            raise self._end_with(self._last_verb(verbs), "") from None
         except TooLargeError as error:
-            raise self._end_with(f"{verb}: an answer of {error}", "memory") from None
+            raise self._end_with(f"{self._last_verb(verbs)}: an answer of {error}", "memory") from None
         except MessageError as error:
-            raise self._end_with(f"{verb}: {error}", "channel") from None
-        self._known_verbs.add(verb)
-        return reply
+            raise self._end_with(f"{self._last_verb(verbs)}: {error}", "channel") from None
+        self._known_verbs.update(verbs)
+        return replies
+
+    def _last_verb(self, verbs: Sequence[str]) -> str:
+        """Return the method that the process is working on, as it says."""
+        return verbs[self._count_answers(verbs)] if verbs else "make"
+
+    def _count_answers(self, verbs: Sequence[str]) -> int:
+        """Return the number of questions that the process has done with, as it says; less than there are."""
+        # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
+        return min((os.pread(self._progress.fileno(), 1, 0) or b"\0")[0], len(verbs) - 1)
+
+    def _receive(self, verbs: Sequence[str]) -> bytes:
+        """Return the next frame, each of the methods having its own time."""
+        number = 0
+        while True:
+            verb = verbs[number]
+            seconds = self._limits.seconds if verb in self._known_verbs else self._limits.start_seconds
+            with suppress(TooLateError):
+                return self._channel.receive(seconds)
+            before, number = number, self._count_answers(verbs)
+            if number <= before:
+                raise self._end_with(f"{verb}: no answer within {seconds:g} s", "hang")
+
+    def _follow(self) -> None:
+        """Put the process on the core of the judge."""
+        JUDGE.ask()
+        if JUDGE.core not in (-1, self._core):
+            with suppress(OSError):
+                os.sched_setaffinity(self._process.pid, {JUDGE.core})
+            self._core = JUDGE.core
 
     def _end_with(self, words: str, kind: str) -> PluginError:
         """End the process, and return the error; without a kind, the one that the end of the process tells."""
@@ -178,6 +184,7 @@ class PluginProcess:
             self._process.kill()
         self._process.wait()
         self.output.wait()
+        self._progress.close()
 
 
 class Output:
@@ -207,6 +214,18 @@ class Output:
         self._thread.join(_SECONDS_TO_READ)
 
 
+def _file_of_one_byte() -> IO[bytes]:
+    """Return a file of one byte, without a name."""
+    if hasattr(os, "memfd_create"):
+        number = os.memfd_create("progress")
+    else:
+        number, path = tempfile.mkstemp()
+        os.unlink(path)
+    file = os.fdopen(number, "r+b", buffering=0)
+    file.write(b"\0")
+    return file
+
+
 @cache
 def _folder() -> str:
     """Return the folder for temporary files of the plugins of this process of the judge."""
@@ -218,11 +237,6 @@ def _end_at_exit() -> None:
     """Let this process end its plugins' processes when it ends. One of a pool does not call what `atexit` has."""
     atexit.register(end_marked)
     util.Finalize(None, end_marked, exitpriority=10)
-
-
-def _core_of_judge() -> int:
-    """Return the number of the core that this process runs on, −1 where nobody says."""
-    return int(_LIBC.sched_getcpu()) if sys.platform == "linux" else -1
 
 
 def adopt_orphans() -> None:

@@ -16,9 +16,12 @@ from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.subject import COMPRESSED
 from contactverif.isolation.host import Host, Question, host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer, MessageError, unpack_array
+
+_COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
 
 
 class RemoteFactory:
@@ -124,7 +127,7 @@ class RemoteFormulation:
         return _pick(arrays, "residual", "residual")
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
-        """Return the tangent (n_unknowns, n_unknowns), an array or a coo array."""
+        """Return the tangent (n_unknowns, n_unknowns), an array or a matrix of scipy.sparse."""
         return _tangent(_unpack("tangent", self._answer("tangent", interface, pairing, z)), "tangent", z.size)
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[Any, Any]:
@@ -211,10 +214,15 @@ def _pick(arrays: dict[str, Array], verb: str, name: str) -> Array:
 
 
 def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
+    """Return the tangent (size, size): dense, or a matrix in the format in which it came, with no entry checked."""
     if "dense" in arrays:
         return arrays["dense"]
-    data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
+    kind = next((kind for kind in _COMPRESSED if f"{kind} data" in arrays), "coo")
     try:
-        return sparse.coo_array((data, (row, col)), shape=(size, size))
+        if kind == "coo":
+            data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
+            return sparse.coo_array((data, (row, col)), shape=(size, size))
+        parts = tuple(_pick(arrays, verb, f"{kind} {name}") for name in COMPRESSED)
+        return _COMPRESSED[kind](parts, shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:
-        raise ContractError(f"{verb}: returned a broken matrix: {error}") from None
+        raise ContractError(f"{verb}: returned a broken {kind} matrix: {error}") from None

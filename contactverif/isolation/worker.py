@@ -8,6 +8,7 @@ checked here first, so that an error has the same words as in the judge's own pr
 from __future__ import annotations
 
 import faulthandler
+import mmap
 import os
 import socket
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from contactverif.contract.foreign_text import describe_error
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import CheckedFormulation, Subject, compressed_parts
 from contactverif.contract.traits import Traits
 from contactverif.isolation.channel import Channel, ClosedError
 from contactverif.isolation.limits import MEGABYTE
@@ -41,7 +42,7 @@ from contactverif.isolation.messages import (
     SharePairing,
     Unloaded,
     Wraps,
-    decode_request,
+    decode_requests,
     encode,
     pack_array,
     travels,
@@ -50,28 +51,35 @@ from contactverif.isolation.messages import (
 from contactverif.isolation.parent_death import die_with_parent
 
 
-def main(end: int, memory: int) -> None:
+def main(end: int, progress: int, memory: int) -> None:
     """Answer the judge at the other end of a socket until it is closed.
 
     Parameters
     ----------
     end : int
         The file descriptor of the socket.
+    progress : int
+        The file descriptor of one byte that the judge sees: the number of the question that is being answered.
     memory : int
         The megabytes of address space that this process may take beyond what it has now.
     """
     die_with_parent()
     faulthandler.enable()
     _limit_memory(memory)
-    channel, desk = Channel(socket.socket(fileno=end)), Desk()
+    channel, desk, byte = Channel(socket.socket(fileno=end)), Desk(), mmap.mmap(progress, 1)
     while True:
         try:
             data = channel.receive()
         except ClosedError:
             os._exit(0)  # What a plugin wants to do at the end of its process is not waited for.
-        reply = desk.reply(decode_request(data))
-        if reply is not None:
-            channel.send(encode(reply))  # At once, so that the judge knows which call has ended this process.
+        replies: list[Reply] = []
+        for request in decode_requests(data):
+            byte[0] = len(replies)  # So the judge knows which call has ended this process.
+            reply = desk.reply(request)
+            if reply is not None:
+                replies.append(reply)
+        if replies:
+            channel.send(encode(replies))
 
 
 def _limit_memory(megabytes: int) -> None:
@@ -122,7 +130,7 @@ class Desk:
                     return self._make(penalty)
                 case Share(_, nodes, slave, master):
                     surfaces = (Surface(unpack_array(segments)) for segments in (slave, master))
-                    return Interface(unpack_array(nodes), *surfaces)
+                    return Interface.of_parts(unpack_array(nodes), *surfaces)
                 case SharePairing(_, arrays):
                     return Pairing({name: unpack_array(array) for name, array in arrays.items()})
         except BaseException as error:
@@ -151,7 +159,7 @@ class Desk:
         """Return the formulation with a penalty."""
         assert self._subject is not None
         formulation = self._subject.with_penalty(penalty)
-        formulation.plugin = Stopwatch(formulation.plugin)
+        formulation.plugin, formulation.passes_on = Stopwatch(formulation.plugin), True
         return formulation
 
     def _ask(self, ask: Ask) -> Reply:
@@ -200,6 +208,8 @@ def _pack_residual(forces: np.ndarray[Any, Any]) -> dict[str, PackedArray]:
 def _pack_tangent(tangent: Any) -> dict[str, PackedArray]:
     if isinstance(tangent, np.ndarray):
         return {"dense": pack_array(tangent)}
+    if parts := compressed_parts(tangent):
+        return {f"{tangent.format} {name}": pack_array(part) for name, part in parts.items()}
     return {name: pack_array(getattr(tangent, name)) for name in ("row", "col", "data")}
 
 

@@ -71,7 +71,7 @@ def measure_continuity(case: Case, subject: Subject) -> Measurement:
         The largest jump of a force over Σ|R| of a side, and of a slope over the largest slope; both dimensionless.
     """
     forces, slope = _functions(subject.for_case(case), case)
-    samples = np.array([forces(t) for t in _places()])
+    samples = forces(_places())
     size = max(sum_larger_forces(case, sample) for sample in samples)
     rounding = segment_tolerance(
         case, samples[int(np.abs(samples).sum(axis=1).argmax())], rounding_distance(case, subject.traits)
@@ -179,13 +179,15 @@ class Bracket:
         return bracket
 
 
-def _functions(formulation: CheckedFormulation, case: Case) -> tuple[Function, Function]:
-    """Return the forces (n_unknowns,) as a function of the place on the way, and their slope."""
+def _functions(
+    formulation: CheckedFormulation, case: Case
+) -> tuple[Callable[[float | FloatArray], FloatArray], Function]:
+    """Return the forces (n_unknowns,) as a function of the place on the way, or of several places, and their slope."""
     interface, way = case.interface, case.parameters["path"]
 
-    def forces(place: float) -> FloatArray:
-        z = case.z + place * way
-        return formulation.residual(interface, formulation.pair(interface, z), z)
+    def forces(places: float | FloatArray) -> FloatArray:
+        # Without a pairing the formulation takes one of each state, all in one question.
+        return formulation.residual(interface, None, case.z + np.multiply.outer(places, way))
 
     def slope(place: float) -> FloatArray:
         z = case.z + place * way

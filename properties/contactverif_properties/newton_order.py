@@ -155,9 +155,9 @@ def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing
             u = solution + distance * length * direction * units
             if not _pairs_alike(system, case, pairing, u, distance * length):
                 continue
-            _, tangent = system.forces_and_tangent(u, pairing)
+            forces, tangent = system.forces_and_tangent(u, pairing)
             matrix = system.stiffness + system.contact_stiffness(u, pairing, tangent)
-            step = system.step(matrix, -system.residual(u, pairing)).change
+            step = system.step(matrix, -system.balance(u, forces)).change
             count += 1
             before.append(distance * length)
             after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))

@@ -9,6 +9,7 @@ import sys
 import time
 
 import numpy as np
+from scipy import sparse
 
 from contactverif import Handle, Subject
 from contactverif.run.registry import subject_of
@@ -94,6 +95,83 @@ class RaisesInPair(Springs):
 class Hangs(Springs):
     def residual(self, interface, pairing, z):
         time.sleep(1000)
+
+
+class HangsInPair(Springs):
+    def pair(self, interface, z):
+        time.sleep(1000)
+
+
+class Cuts(Springs):
+    """It cuts and fills every open file of its process, so also the one that tells how far it is."""
+
+    def residual(self, interface, pairing, z):
+        for number in range(3, 50):
+            with contextlib.suppress(OSError):
+                os.pwrite(number, b"\xff" * 100, 0)
+                os.ftruncate(number, 0)
+        time.sleep(1000)
+
+
+class Counts(Springs):
+    """It has multipliers, and promises none."""
+
+    def n_multipliers(self, interface):
+        return 3
+
+
+class Matrix(Springs):
+    """Its tangent is a sparse matrix of a format of scipy."""
+
+    kind = "csr"
+
+    def tangent(self, interface, pairing, z):
+        depths = np.arange(1, 2 * interface.n_slave_nodes, 2)
+        entries = sparse.coo_array((self.penalty * pairing["active"], (depths, depths)), shape=(z.size, z.size))
+        return self.change(entries.asformat(self.kind))
+
+    def change(self, matrix):
+        return matrix
+
+
+class MatrixByColumns(Matrix):
+    kind = "csc"
+
+
+class MatrixOfBlocks(Matrix):
+    kind = "bsr"
+
+
+class MatrixOfEntries(Matrix):
+    kind = "coo"
+
+
+class MatrixInTwelveBits(Matrix):
+    """Its indices have a type that nobody else uses."""
+
+    def change(self, matrix):
+        matrix.indices = matrix.indices.astype(np.int16)
+        return matrix
+
+
+class MatrixOutside(Matrix):
+    """It has an entry in a column that is not there."""
+
+    def change(self, matrix):
+        matrix.indices[0] = 10**6
+        return matrix
+
+
+class MatrixTooShort(Matrix):
+    def change(self, matrix):
+        matrix.indices = matrix.indices[:-1]
+        return matrix
+
+
+class MatrixWithNothing(Matrix):
+    def change(self, matrix):
+        matrix.data[0] = np.nan
+        return matrix
 
 
 class TakesAll(Springs):

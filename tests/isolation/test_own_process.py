@@ -66,6 +66,34 @@ def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
     assert np.array_equal(forces[1], formulation.residual(CASE.interface, pairing, 2 * CASE.z))
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("Matrix", "MatrixByColumns", "MatrixOfBlocks", "MatrixOfEntries", "MatrixInTwelveBits"),
+        *("MatrixOutside", "MatrixTooShort", "MatrixWithNothing"),
+    ],
+)
+def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes(name: str) -> None:
+    far = load_remote(LOADER, name, QUICK).for_case(CASE)
+    near = Subject(name, getattr(hostile_few, name)).for_case(CASE)
+    answers = []
+    for formulation in (near, far):
+        pairing = formulation.pair(CASE.interface, CASE.z)
+        try:
+            tangent = formulation.tangent(CASE.interface, pairing, CASE.z)
+            answers.append([part.tolist() for part in (tangent.data, tangent.row, tangent.col)])
+        except ContractError as error:
+            answers.append(f"{type(error).__name__}: {error}")
+    assert answers[0] == answers[1]
+    assert isinstance(answers[0], str) is (name in ("MatrixOutside", "MatrixTooShort", "MatrixWithNothing"))
+
+
+def test_multipliers_that_nobody_promised_are_found_at_the_first_question() -> None:
+    for subject in (load_remote(LOADER, "Counts", QUICK), Subject("Counts", hostile_few.Counts)):
+        with pytest.raises(ContractError, match="n_multipliers: 3 of them, with the trait enforcement 'penalty'"):
+            ask(subject)
+
+
 def test_a_handle_stays_in_its_process() -> None:
     handled, plain = (load_remote(LOADER, name, QUICK).for_case(CASE) for name in ("HandledSprings", "Springs"))
     interface = CASE.interface
@@ -98,6 +126,8 @@ def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
         ("RaisesInPair", "exception", "pair: RuntimeError: no pairing today"),
         ("RaisesInMake", "exception", "make: ValueError: no other penalty"),
         ("Hangs", "hang", "residual: no answer within 0.5 s"),
+        ("HangsInPair", "hang", "pair: no answer within 0.5 s"),
+        ("Cuts", "hang", ": no answer within 0.5 s"),
         ("TakesAll", "memory", "residual: .*MemoryError"),
         ("Forges", "channel", "residual: a message that cannot be read"),
         ("TooLong", "memory", "residual: an answer of"),
@@ -107,7 +137,7 @@ def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
 )
 def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words: str) -> None:
     subject = load_remote(LOADER, name, QUICK)
-    if name in ("Hangs", "TooLong"):  # The import takes longer than such a limit.
+    if name in ("Hangs", "HangsInPair", "Cuts", "TooLong"):  # The import takes longer than such a limit.
         subject._make.host._process._limits = Limits(seconds=0.1)
     with pytest.raises(PluginError, match=words) as caught:
         ask(subject)
