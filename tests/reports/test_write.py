@@ -16,10 +16,12 @@ import pytest
 import xarray as xr
 from handmade_report import ERROR, flat, outcome, question, small_run
 
+from contactverif import load_formulation, load_properties, verify
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Row, Run
+from contactverif_reports.netcdf import property_group
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.schema import VERDICTS, group_names
 from contactverif_reports.netcdf.write import check_writable, write
@@ -123,6 +125,16 @@ def test_same_run_same_data(tmp_path: Path) -> None:
     write(run, tmp_path / "a.nc")
     write(dataclasses.replace(run, rows=tuple(slower), provenance={**run.provenance, **other}), tmp_path / "b.nc")
     assert same_data(tmp_path / "a.nc", tmp_path / "b.nc") == []
+
+
+def test_a_report_is_the_same_however_many_cases_are_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    subjects = [load_formulation(name) for name in ("nts", "vts-me-lm")]
+    questions = load_properties(["patch.flat.transmission", "hard.deep", "newton.order", "swap"])
+    result = verify(subjects, questions, examples=12, seed=3)
+    for name, size in (("whole.nc", 10_000), ("pieces.nc", 5)):
+        monkeypatch.setattr(property_group, "CASES_OF_A_BLOCK", size)
+        write(result, tmp_path / name)
+    assert same_data(tmp_path / "whole.nc", tmp_path / "pieces.nc") == []
 
 
 def test_differences_are_told(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ Rule for the next editor: `stored_outcomes` reads all that is written here, and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,17 +44,18 @@ class SharedNames:
     kinds: tuple[str, ...] = ()
 
     @classmethod
-    def from_outcomes(cls, info: PropertyInfo, outcomes: Sequence[Outcome]) -> SharedNames:
-        """Collect the names."""
-        kinds = (outcome.case_or_summary.kind for outcome in outcomes)
-        measurements = [outcome.measurement for outcome in outcomes if outcome.measurement is not None]
-        series = [values for measurement in measurements for values in measurement.series.values()]
-        return cls(
-            details=tuple(dict.fromkeys(name for measurement in measurements for name in measurement.details)),
-            parameters=tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.summary.parameters)),
-            n_iterates=max(map(len, series), default=0),
-            kinds=tuple(dict.fromkeys([*info.kinds, *sorted({kind for kind in kinds if kind})])),
-        )
+    def from_outcomes(cls, info: PropertyInfo, outcomes: Iterable[Outcome]) -> SharedNames:
+        """Collect the names, one outcome at a time."""
+        details, parameters = dict[str, None](), dict[str, None]()
+        kinds, n_iterates = set[str](), 0
+        for outcome in outcomes:
+            kinds.add(outcome.case_or_summary.kind)
+            parameters |= dict.fromkeys(outcome.summary.parameters)
+            if outcome.measurement is not None:
+                details |= dict.fromkeys(outcome.measurement.details)
+                n_iterates = max([n_iterates, *map(len, outcome.measurement.series.values())])
+        every_kind = dict.fromkeys([*info.kinds, *sorted(kinds - {""})])
+        return cls(tuple(details), tuple(parameters), n_iterates, tuple(every_kind))
 
 
 class OutcomeVariables:

@@ -12,7 +12,9 @@ from contactverif.contract.property import Outcome, PropertyInfo
 from contactverif.contract.result import Row
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates
-from contactverif_reports.netcdf.variables import numbers, words
+from contactverif_reports.netcdf.variables import join, numbers, words
+
+CASES_OF_A_BLOCK = 10_000
 
 
 def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Sequence[str]) -> xr.Dataset:
@@ -35,18 +37,14 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
     outcomes = [rows[name].outcomes if name in rows else () for name in formulations]
     witnesses = [rows[name].witness if name in rows else None for name in formulations]
     n_cases = max(map(len, outcomes))
-    padded: list[Outcome | None] = []
-    for row in outcomes:
-        padded += [*row, *[None] * (n_cases - len(row))]
-    everything = [outcome for outcome in chain(padded, witnesses) if outcome is not None]
-    names = SharedNames.from_outcomes(info, everything)
+    names = SharedNames.from_outcomes(info, (item for item in chain(*outcomes, witnesses) if item is not None))
     table = {
         "formulation": words(["formulation"], formulations, "formulation, as typed on the command line"),
         "case": numbers(["case"], np.arange(n_cases, dtype=np.int32), "number of the case, in order of judging", "1"),
         **coordinates(info, names),
     }
     axes = {"formulation": len(formulations)}
-    table |= OutcomeVariables(info, padded, {**axes, "case": n_cases}, names).table()
+    table |= _cases(info, outcomes, n_cases, names)
     if any(witness is not None for witness in witnesses):
         table |= OutcomeVariables(info, witnesses, axes, names, "witness_").table()
     if names.kinds:
@@ -62,6 +60,22 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
         "named case with which a formulation proves that it fails",
     }
     return xr.Dataset(table, attrs=attributes)
+
+
+def _cases(
+    info: PropertyInfo, rows: Sequence[Sequence[Outcome]], n_cases: int, names: SharedNames
+) -> dict[str, xr.Variable]:
+    """Return the variables along `formulation` and `case`. The outcomes of a block of cases are in memory at a time."""
+    tables = []
+    for first in range(0, max(n_cases, 1), CASES_OF_A_BLOCK):
+        end = min(first + CASES_OF_A_BLOCK, n_cases)
+        padded: list[Outcome | None] = []
+        for row in rows:
+            block = row[first:end]
+            padded += [*block, *[None] * (end - first - len(block))]
+        axes = {"formulation": len(rows), "case": end - first}
+        tables.append(OutcomeVariables(info, padded, axes, names).table())
+    return tables[0] if len(tables) == 1 else join(tables, "case")
 
 
 def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> dict[str, xr.Variable]:

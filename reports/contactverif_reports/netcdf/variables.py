@@ -77,9 +77,35 @@ def _variable(
         encoding["_FillValue"] = None
     else:  # As an attribute: as an encoding xarray would write it in place of every NaN.
         attributes["_FillValue"] = values.dtype.type(fill)
-    if values.ndim and not (is_words and values.nbytes < _WORTH_COMPRESSING):
-        encoding |= {"zlib": True, "complevel": 4}
-    return xr.Variable(dims, values, attributes, encoding)
+    return xr.Variable(dims, values, attributes, encoding | _compression(values))
+
+
+def _compression(values: NDArray[Any]) -> dict[str, Any]:
+    is_small = values.dtype.kind == "S" and values.nbytes < _WORTH_COMPRESSING
+    return {} if is_small or not values.ndim else {"zlib": True, "complevel": 4}
+
+
+def join(tables: Sequence[Mapping[str, xr.Variable]], dim: str) -> dict[str, xr.Variable]:
+    """Return the variables of several tables, one behind the other along a dimension that all of them have.
+
+    Words may be left out of a table where all of them are empty.
+    """
+    samples = {name: variable for table in tables for name, variable in table.items()}
+    lengths = [next(iter(table.values())).sizes[dim] for table in tables]
+    joined = {}
+    for name, sample in samples.items():
+        axis = sample.dims.index(dim)
+        parts = [
+            table[name].values if name in table else np.zeros(_with_length(sample.shape, axis, length), "S8")
+            for table, length in zip(tables, lengths, strict=True)
+        ]
+        values = np.concatenate(parts, axis=axis)
+        joined[name] = xr.Variable(sample.dims, values, sample.attrs, sample.encoding | _compression(values))
+    return joined
+
+
+def _with_length(shape: tuple[int, ...], axis: int, length: int) -> tuple[int, ...]:
+    return (*shape[:axis], length, *shape[axis + 1 :])
 
 
 def _clean_text(values: Any) -> Any:
