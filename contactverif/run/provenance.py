@@ -9,7 +9,7 @@ import subprocess
 import sys
 from datetime import UTC, datetime
 from importlib import metadata
-from urllib.parse import unquote, urlparse
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -81,17 +81,17 @@ def _cpu_features() -> str:
 
 
 def _commit() -> str:
-    """Return the installed commit: the one that pip recorded, or that of the working copy of an editable install."""
+    """Return the commit of the code that runs: the one that pip recorded, or that of the working copy it stands in."""
     try:
         record = json.loads(metadata.distribution("contactverif").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):
-        return "unknown"
+        record = {}
     if commit := record.get("vcs_info", {}).get("commit_id"):
         return str(commit)
-    url = urlparse(record.get("url", ""))
-    if url.scheme != "file" or not record.get("dir_info", {}).get("editable"):
+    folder = Path(__file__).parents[2]
+    if not (folder / "pyproject.toml").exists():  # That of installed packages, which may stand in any working copy.
         return "unknown"
-    describe = ["git", "-C", unquote(url.path), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
+    describe = ["git", "-C", str(folder), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
     try:
         answer = subprocess.run(describe, capture_output=True, text=True, timeout=10, check=False)
     except (OSError, subprocess.TimeoutExpired):

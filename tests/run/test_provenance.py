@@ -1,0 +1,34 @@
+"""The origin of a run: the commit is that of the code that runs, or nobody says one."""
+
+from __future__ import annotations
+
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from contactverif.run import provenance
+
+
+@pytest.mark.parametrize("is_working_copy", [True, False])
+def test_the_commit_is_that_of_the_working_copy_of_the_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_working_copy: bool
+) -> None:
+    def git(*words: str) -> str:
+        names = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        return subprocess.run(
+            ["git", "-C", str(tmp_path), *names, *words], check=True, capture_output=True, text=True
+        ).stdout.strip()
+
+    def fail(name: str) -> metadata.Distribution:
+        raise metadata.PackageNotFoundError(name)
+
+    git("init", "--quiet")
+    (tmp_path / ("pyproject.toml" if is_working_copy else "another.toml")).touch()
+    git("add", "--all")
+    git("commit", "--quiet", "--message", "Begin")
+    monkeypatch.setattr(provenance, "__file__", str(tmp_path / "contactverif" / "run" / "provenance.py"))
+    monkeypatch.setattr(metadata, "distribution", fail)
+    commit = provenance.collect_provenance(profile="dev", examples=1, seed=1)["commit"]
+    assert commit == (git("rev-parse", "HEAD") if is_working_copy else "unknown")
