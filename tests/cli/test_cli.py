@@ -19,6 +19,7 @@ from typing import Any
 import meshio
 import pytest
 from asking import Answer, Ask, asking
+from fresh_process import MAIN
 from rich.cells import cell_len
 
 from contactverif.cli import app as cli
@@ -44,7 +45,7 @@ def environment(**more: str) -> dict[str, str]:
 
 
 def command(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-c", "from contactverif.cli import main; main()", *map(str, arguments)]
+    return [*MAIN, *map(str, arguments)]
 
 
 def rows(out: str) -> dict[tuple[str, str], list[str]]:

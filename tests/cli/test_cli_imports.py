@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 
 import pytest
+from fresh_process import PYTHON
 
 from contactverif import __version__
 from contactverif.cli.app import COMMANDS
@@ -41,7 +41,7 @@ def run_python(*arguments: str, **variables: str) -> str:
     """Return what a Python process prints."""
     unchanged = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "FORCE_COLOR")}
     environment = {**unchanged, "NO_COLOR": "1", "PYTHONWARNINGS": "error", **variables}
-    finished = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=True)
+    finished = subprocess.run([*PYTHON, *arguments], env=environment, capture_output=True, text=True, check=True)
     return finished.stdout
 
 

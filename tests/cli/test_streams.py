@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from fresh_process import MAIN
 
 from contactverif.cli.progress import Bar
-
-MAIN = [sys.executable, "-c", "from contactverif.cli import main; main()"]
 
 
 def run_command(*arguments: str, **settings: object) -> subprocess.CompletedProcess[str]:

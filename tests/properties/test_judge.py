@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from fresh_process import PYTHON
 from handmade import Handmade, case, subject
 
 from contactverif.contract.property import Property, Verdict
@@ -36,7 +36,7 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
         "print(sorted(name for name in sys.modules if name.startswith(('contactverif_nts', 'contactverif.geometry',\n"
         "    'numba'))))\n"
     )
-    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    process = subprocess.run([*PYTHON, "-c", script], capture_output=True, text=True, check=True)
     assert process.stdout == "[]\n"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from expected_verdicts import FAILS
+from fresh_process import PYTHON
 from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, single_precision_at_first_node, springs_of
 from subjects import load_subject
 
@@ -155,7 +155,7 @@ print(len(result.rows), "formulations")
 def test_every_built_in_formulation_is_judged_where_nothing_is_compiled() -> None:
     here = str(Path(__file__).parents[1])
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": here}
-    command = [sys.executable, "-W", "error", "-c", UNCOMPILED]
+    command = [*PYTHON, "-W", "error", "-c", UNCOMPILED]
     process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert not process.returncode, process.stderr
     assert process.stdout.split()[0] == str(len(FAILS))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fresh_process import PYTHON
 from handmade_report import awkward, flat
 
 from contactverif.contract.case import Case
@@ -181,11 +182,10 @@ def test_figures_that_cannot_be(tmp_path: Path) -> None:
 def test_matplotlib_and_xarray_are_imported_late() -> None:
     """Only reading a report needs xarray at once: it is what the reader is made of."""
     import subprocess
-    import sys
 
     code = (
         "import sys, contactverif_reports.draw, contactverif_reports.netcdf.write;"
         "print({'matplotlib', 'xarray', 'netCDF4'} & {*sys.modules})"
     )
-    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    modules = subprocess.run([*PYTHON, "-c", code], capture_output=True, text=True, check=True).stdout
     assert modules == "set()\n"

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from fresh_process import MAIN
 from subjects import Changed, load_subject
 
 from contactverif.contract.errors import MisuseError
@@ -29,7 +29,6 @@ from contactverif.studies.bench.journal import Journal, journal_of
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
 
 WAVY = Cell("wavy", 1, 30.0)
-COMMAND = [sys.executable, "-c", "from contactverif.cli import main; main()"]
 ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "wavy", "--scene", "kinked", "--repeats", "2"]
 
 
@@ -163,7 +162,7 @@ def test_a_plan_of_nothing_is_refused(options: dict[str, Any], message: str) -> 
 
 def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_seconds(tmp_path: Path) -> None:
     environment = {**os.environ, "NO_COLOR": "1"}
-    arguments = [*COMMAND, *ARGUMENTS, "--quick", "--out"]
+    arguments = [*MAIN, *ARGUMENTS, "--quick", "--out"]
     killed, unbroken = tmp_path / "killed.nc", tmp_path / "unbroken.nc"
     process = subprocess.Popen([*arguments, str(killed)], env=environment, stdout=subprocess.DEVNULL)
     journal, deadline = journal_of(killed), time.monotonic() + 120

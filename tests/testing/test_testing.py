@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from importlib.metadata import entry_points
 
 import pytest
+from fresh_process import PYTHON
 
 from contactverif.run import registry  # Imports numpy before pytester notes which modules to forget again.
 
@@ -240,5 +240,5 @@ def test_the_plugin_is_cheap_to_import() -> None:
         "contactverif.testing.parametrize",
     ]
     script = f"import sys, contactverif.testing.pytest_plugin; print([name for name in {heavy} if name in sys.modules])"
-    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    answer = subprocess.run([*PYTHON, "-c", script], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
