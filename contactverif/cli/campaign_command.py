@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.cli.run_endings import show_what_plugins_printed
 from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, complete_formulation
-from contactverif.cli.verify_command import select_names, show_what_plugins_printed
+from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, make_plan, new_job
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import PAGE, REPORT, OutputFiles
 from contactverif.cli.shared_options import (
     IsolationOptions,
     PlaceOptions,
@@ -17,6 +17,7 @@ from contactverif.cli.shared_options import (
     WorkerOptions,
     complete_formulation,
 )
+from contactverif.cli.verify_job import COMPARE, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
 
 
@@ -46,8 +47,15 @@ def compare(
     place: PlaceOptions,
     workers: WorkerOptions,
     isolation: IsolationOptions,
+    resume: Annotated[
+        Path | None,
+        typer.Option(help="Go on with the comparison that was to write FILE and was stopped.", metavar="FILE"),
+    ] = None,
 ) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
+
+    With --out, every outcome goes to the folder FILE.journal as soon as it is
+    there, and --resume FILE goes on with a comparison that was stopped.
 
     A name that ends in .nc is a report. So is the name of any other file,
     unless an installed formulation has the same name.
@@ -64,30 +72,45 @@ def compare(
          cases are undecided, or do not converge, than roundoff explains.
          Smaller changes are printed and do not count
     \bFor both
-      2  the command line is wrong; one line says what is needed
+      2  the command line is wrong, or a file cannot be written; one line
+         says what is needed
+      130  stopped by Ctrl-C, after the table of what was judged
 
     \bExamples
       contactverif compare mine --against vts-ppt
       contactverif compare mine nts-ar --against vts-ppt --seed 7 --out mine.html
+      contactverif compare --resume mine.nc
       contactverif compare old.nc new.nc
     """
     reference = _only_one("--against", against or [])
-    globs = properties or []
     reports = _reports_among(names or [])
     if reports:
-        _check_no_run_options(reference, sampling, place, workers, pictures)
-        nothing_worse = _compare_reports(reports, globs, out)
+        _check_no_run_options(reference, sampling, place, workers, pictures, resume)
+        nothing_worse = _compare_reports(reports, properties or [], out)
         raise typer.Exit(0 if nothing_worse else 1)
-    scene, interface = place.make_scene(), place.read_interface()
-    if reference is None:
+    options = VerifyOptions(
+        tuple([reference or "", *(names or ())] if reference or names else ()),
+        tuple(properties or ()),
+        sampling,
+        tuple(out or ()),
+        pictures,
+        place=place,
+        workers=workers,
+        isolation=isolation,
+    )
+    raise typer.Exit(_compare_formulations(options, resume))
+
+
+def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
+    """Compare formulations, the reference being the first name; return the exit status."""
+    if resume is None and not any(typed.names[:1]):
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
-    files = OutputFiles.check(out, (REPORT, PAGE))
-    folder = PictureFolder.make(pictures)
+    job = new_job(typed, command=COMPARE) if resume is None else resumed_job(resume, typed, COMPARE)
     from contactverif.cli.formulation_comparison import compare_formulations, load_contest
 
-    contest = load_contest(names or [], reference, globs or ["*"], isolation.limits())
-    promises_kept = compare_formulations(contest, sampling, workers, interface, scene, files, folder)
-    raise typer.Exit(0 if promises_kept else 1)
+    reference, *candidates = job.options.names
+    contest = load_contest(candidates, reference, job.options.properties, job.options.isolation.limits())
+    return compare_formulations(contest, job)
 
 
 def _compare_reports(reports: Sequence[Path], globs: Sequence[str], out: Sequence[Path] | None) -> bool:
@@ -137,6 +160,7 @@ def _check_no_run_options(
     place: PlaceOptions,
     workers: WorkerOptions,
     pictures: Path | None,
+    resume: Path | None,
 ) -> None:
     """Refuse the options of a run beside two reports, which have been judged already."""
     values: dict[str, Any] = {
@@ -151,6 +175,7 @@ def _check_no_run_options(
         "scene": place.scene,
         "jobs": workers.jobs,
         "pictures": pictures,
+        "resume": resume,
     }
     for option, value in values.items():
         if value is not None:

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 from contactverif.cli.case_pictures import draw_outcome
 from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
 from contactverif.cli.console import say, show, show_as_it_is
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.progress import Bar
-from contactverif.cli.shared_options import SamplingOptions, WorkerOptions
-from contactverif.contract.case import Case
+from contactverif.cli.run_endings import (
+    end_journal,
+    exit_status,
+    say_how_to_go_on,
+    show_what_plugins_printed,
+    watch_for_stops,
+    write_files,
+)
+from contactverif.cli.verify_job import VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
+from contactverif.run.completeness import find_gap
 from contactverif.run.one_case import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
 from contactverif.run.workers import worker_pool
@@ -83,48 +93,47 @@ def load_contest(
     return Contest(reference, [load_formulation(name, limits) for name in names], properties)
 
 
-def compare_formulations(
-    contest: Contest,
-    sampling: SamplingOptions,
-    workers: WorkerOptions,
-    interface: Interface | None,
-    scene: Case | None,
-    files: OutputFiles,
-    folder: PictureFolder | None,
-) -> bool:
-    """Run all properties, show the tables and write the files.
-
-    Returns
-    -------
-    bool
-        Whether every candidate keeps its promises.
-    """
-    n_formulations = 1 + len(contest.candidates)
-    jobs = workers.number(n_formulations, len(contest.properties), sampling.planned_examples())
-    with worker_pool(jobs) as executor, Bar() as bar:
-        study = run_comparison(
-            contest.reference,
-            contest.candidates,
-            contest.properties,
-            profile=sampling.profile or "dev",
-            examples=sampling.examples,
-            seed=sampling.seed,
-            interface=interface,
-            scene=scene,
-            progress=bar.show_progress,
-            executor=executor,
-        )
-    if REPORT in files.paths:  # before anything is shown, so that nothing that was judged is lost
-        write(study.run, files.paths[REPORT])
-    if PAGE in files.paths:
-        drawings = [_page_drawing(differing, contest) for differing in study.differing]
-        page = comparison_page(study.comparison, study.differing, drawings, study.costs)
-        write_page(files.paths[PAGE], page, "--out")
+def compare_formulations(contest: Contest, job: VerifyJob) -> int:
+    """Run all properties, show the tables and write the files; return the exit status."""
+    with watch_for_stops(job), ExitStack() as stack:
+        with worker_pool(job.jobs) as executor, Bar() as bar:
+            journal = stack.enter_context(job.journal())
+            study = run_comparison(
+                contest.reference,
+                contest.candidates,
+                contest.properties,
+                profile=job.profile,
+                interface=job.interface,
+                scene=job.scene,
+                progress=bar.show_progress,
+                executor=executor,
+                journal=journal,
+            )
+        promises_kept = study.comparison.promises_kept
+        subjects = [contest.reference, *contest.candidates]
+        gap = find_gap(study.run, subjects, contest.properties, job.sampling) if promises_kept else ""
+        # The files are written before anything is shown, so that nothing that was judged is lost.
+        written = _write_results(study, contest, job.files)
+        complete = written.paths == job.files.paths and not gap
+        end_journal(journal, complete=complete)
     show(SideBySide(study))
-    _show_meshes(study, contest, folder, on_a_page=PAGE in files.paths)
-    files.announce()
-    show(last_line(study.comparison))
-    return study.comparison.promises_kept
+    _show_meshes(study, contest, job.pictures, on_a_page=PAGE in written.paths)
+    show_what_plugins_printed()
+    written.announce()
+    show(f"Not complete: {gap}." if gap else last_line(study.comparison))
+    if not complete:
+        say_how_to_go_on(job)
+    return exit_status(gap, whole=complete and not journal.trouble, promises_kept=promises_kept)
+
+
+def _write_results(study: Study, contest: Contest, files: OutputFiles) -> OutputFiles:
+    """Write the report and the page that the user wants; return those that are there."""
+
+    def write_html(path: Path) -> None:
+        drawings = [_page_drawing(differing, contest) for differing in study.differing]
+        write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
+
+    return write_files(files, {REPORT: partial(write, study.run), PAGE: write_html})
 
 
 def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *, on_a_page: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.run_endings import (
+    end_journal,
+    exit_status,
+    say_how_to_go_on,
+    show_what_plugins_printed,
+    watch_for_stops,
+    write_files,
+)
 from contactverif.cli.shared_options import (
     IsolationOptions,
     PlaceOptions,
@@ -28,11 +36,6 @@ if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded, Run
     from contactverif.contract.subject import Subject
     from contactverif.isolation.limits import Limits
-    from contactverif.run.run_journal import Journal
-
-LINES_OF_A_PLUGIN = 5
-STOPPED = 130  # The exit status after Ctrl-C.
-NOT_WRITTEN = 2  # The exit status if a file could not be written.
 
 
 def verify(
@@ -113,60 +116,35 @@ def run_job(job: VerifyJob) -> int:
     from contactverif.cli.progress import Bar
     from contactverif.run.completeness import find_gap
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import RunStopped, run
-    from contactverif.run.workers import WorkerError, worker_pool
+    from contactverif.run.runner import run
+    from contactverif.run.workers import worker_pool
 
     limits = job.options.isolation.limits()
-    with ExitStack() as stack:
-        try:
-            with worker_pool(job.jobs) as executor, Bar() as bar:
-                questions = load_properties(job.options.properties)
-                subjects = [load_formulation(name, limits) for name in job.options.names]
-                journal = stack.enter_context(job.journal())
-                result = run(
-                    subjects,
-                    questions,
-                    profile=job.profile,
-                    interface=job.interface,
-                    scene=job.scene,
-                    known=job.known,
-                    progress=bar.show_progress,
-                    executor=executor,
-                    journal=journal,
-                )
-        except RunStopped as stop:
-            return _show_stopped(stop.run, job)
-        except WorkerError:
-            _say_how_to_go_on(job)
-            raise
+    with watch_for_stops(job), ExitStack() as stack:
+        with worker_pool(job.jobs) as executor, Bar() as bar:
+            questions = load_properties(job.options.properties)
+            subjects = [load_formulation(name, limits) for name in job.options.names]
+            journal = stack.enter_context(job.journal())
+            result = run(
+                subjects,
+                questions,
+                profile=job.profile,
+                interface=job.interface,
+                scene=job.scene,
+                known=job.known,
+                progress=bar.show_progress,
+                executor=executor,
+                journal=journal,
+            )
         gap = find_gap(result, subjects, questions, job.sampling) if result.promises_kept else ""
         # The files are written before anything is shown, so that nothing that was judged is lost.
         written = write_results(result, job.files)
         complete = written.paths == job.files.paths and not gap
-        _end_journal(journal, complete)
+        end_journal(journal, complete=complete)
     _show_results(result, subjects, questions, written, job.pictures, gap)
     if not complete:
-        _say_how_to_go_on(job)
-    return _exit_status(result, gap, whole=complete and not journal.trouble)
-
-
-def _end_journal(journal: Journal, complete: bool) -> None:
-    """Remove the journal once the files are complete."""
-    from contactverif.run.journal_folder import remove_journal
-
-    if journal.trouble:
-        _warn(f"the journal could not be written to its end: {journal.trouble}")
-    if complete and journal.folder is not None:
-        remove_journal(journal.folder)
-
-
-def _exit_status(result: Run, gap: str, *, whole: bool) -> int:
-    """Return the exit status; 0 only if nothing is missing in the run or in its files."""
-    if gap:
-        return 1
-    if not whole:
-        return NOT_WRITTEN
-    return 0 if result.promises_kept else 1
+        say_how_to_go_on(job)
+    return exit_status(gap, whole=complete and not journal.trouble, promises_kept=result.promises_kept)
 
 
 def _show_results(
@@ -191,41 +169,6 @@ def _show_results(
     show(f"Not complete: {gap}." if gap else summary(result))
 
 
-def show_what_plugins_printed() -> None:
-    """End the processes of the plugins, and show the last lines that each of them printed."""
-    from rich.text import Text
-
-    from contactverif.cli.console import show_as_it_is
-    from contactverif.isolation.host import end_all
-
-    for name, printed in end_all().items():
-        lines = printed.decode(errors="replace").splitlines()[-LINES_OF_A_PLUGIN:]
-        show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
-
-
-def _show_stopped(result: Run, job: VerifyJob) -> int:
-    """Show what was judged before Ctrl-C, and how to go on; return the exit status."""
-    from contactverif.cli.console import show
-    from contactverif.cli.run_tables import RunTable
-
-    show(RunTable(result))
-    _say_how_to_go_on(job)
-    return STOPPED
-
-
-def _say_how_to_go_on(job: VerifyJob) -> None:
-    """Print the line that goes on with a run."""
-    if job.resume_line:
-        typer.echo(f"what was judged is kept; to go on: {job.resume_line}")
-    else:
-        typer.echo("with --out FILE.nc a run can go on where it was stopped")
-
-
-def _warn(words: str) -> None:
-    """Print a line about a file that could not be written."""
-    typer.echo(f"contactverif: {' '.join(words.split())}", err=True)
-
-
 def write_results(result: Run, files: OutputFiles) -> OutputFiles:
     """Write the report and the page that the user wants; return those that are there. A line says why one is not."""
 
@@ -240,25 +183,7 @@ def write_results(result: Run, files: OutputFiles) -> OutputFiles:
 
         write_page(path, report_page(result, files.names.get(REPORT, Path("FILE.nc"))), "--out")
 
-    writers = {REPORT: write_report, PAGE: write_html}
-    return files.only(
-        [suffix for suffix, path in files.paths.items() if _write(writers[suffix], path, files.names[suffix])]
-    )
-
-
-def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
-    """Write a file; return whether it is there."""
-    try:
-        write(path)
-    except MisuseError as error:
-        _warn(f"{name} is not written: {error.found.removeprefix(f'{path}: ')}")
-    except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
-        from contactverif_reports.files import reason_not_to_grow
-
-        _warn(f"{name} is not written: {reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}")
-    else:
-        return True
-    return False
+    return write_files(files, {REPORT: write_report, PAGE: write_html})
 
 
 def _show_counterexamples(

@@ -1,4 +1,4 @@
-"""The job of a run of `verify`: its options, checked and with everything settled that a journal must know.
+"""The job of a run of `verify` or `compare`: its options, checked and with everything settled that a journal must know.
 
 Rule for the next editor: an option that changes an outcome is a field of `VerifyOptions`, so that the journal has it.
 """
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from contactverif.run.run_journal import Journal, Plan
     from contactverif.run.sampling import Sampling
 
-COMMAND = "verify"
+VERIFY, COMPARE = "verify", "compare"
 
 
 @dataclass(frozen=True, slots=True)
 class VerifyOptions:
-    """The options of `verify`, as they are typed or as a journal has them."""
+    """The options of `verify`, as they are typed or as a journal has them. `compare` names its reference first."""
 
     names: tuple[str, ...] = ()
     properties: tuple[str, ...] = ()
@@ -69,7 +69,9 @@ class VerifyJob:
     resumes : bool
         The run goes on with its own journal.
     again : str
-        The command that goes on with the run, if it is not `verify --resume`.
+        The command line that goes on with the run, if it is not that command with `--resume`.
+    command : str
+        The command that judges.
     """
 
     options: VerifyOptions
@@ -82,6 +84,7 @@ class VerifyJob:
     sources: tuple[Path, ...] = ()
     resumes: bool = False
     again: str = ""
+    command: str = VERIFY
 
     @property
     def jobs(self) -> int:
@@ -108,16 +111,24 @@ class VerifyJob:
         """The command that goes on with this run; empty if it has no journal."""
         if self.again:
             return self.again
-        return f"contactverif verify --resume {shlex.quote(str(self.output))}" if self.output is not None else ""
+        return (
+            f"contactverif {self.command} --resume {shlex.quote(str(self.output))}" if self.output is not None else ""
+        )
 
     def plan(self) -> Plan:
         """Return the plan for the header of a journal."""
-        return make_plan(COMMAND, self.options, self.profile)
+        return make_plan(self.command, self.options, self.profile)
 
     @contextmanager
     def journal(self) -> Iterator[Journal]:
         """Open a block with the journal of the run. In it no other process goes on with the same journal."""
-        from contactverif.run.journal_folder import begin_journal, hold_journal, journal_folder, keep_earlier
+        from contactverif.run.journal_folder import (
+            begin_journal,
+            hold_journal,
+            journal_folder,
+            keep_earlier,
+            withdraw_journal,
+        )
         from contactverif.run.run_journal import Journal
 
         plan = self.plan()
@@ -130,10 +141,15 @@ class VerifyJob:
             typer.echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", err=True)
         with hold_journal(folder, "--resume" if self.resumes else "--out"):
             keep_earlier(folder, self.files.paths.values())
-            yield Journal(plan, folder, self.sources)
+            try:
+                yield Journal(plan, folder, self.sources)
+            except MisuseError:
+                if not self.resumes:
+                    withdraw_journal(folder, self.files.paths.values())
+                raise
 
 
-def new_job(options: VerifyOptions, *, fresh_seed: int | None = None) -> VerifyJob:
+def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:
     """Return the job of options as they were typed.
 
     Parameters
@@ -142,6 +158,8 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None) -> VerifyJ
         The options; the names are those of formulations.
     fresh_seed : int | None
         The seed if neither the options nor the profile have one; None draws a new one.
+    command : str
+        The command that judges.
 
     Raises
     ------
@@ -164,10 +182,10 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None) -> VerifyJ
     )
     scene = options.place.make_scene()
     interface = options.place.read_interface()
-    return VerifyJob(settled, profile, files, folder, scene, interface, _known_failures(options.known))
+    return VerifyJob(settled, profile, files, folder, scene, interface, _known_failures(options.known), command=command)
 
 
-def resumed_job(output: Path, typed: VerifyOptions) -> VerifyJob:
+def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> VerifyJob:
     """Return the job that goes on with a run that was stopped.
 
     Parameters
@@ -176,6 +194,8 @@ def resumed_job(output: Path, typed: VerifyOptions) -> VerifyJob:
         The report that the run was to write, or its page.
     typed : VerifyOptions
         The options beside `--resume`. Only a number of processes may be among them.
+    command : str
+        The command that judges.
 
     Raises
     ------
@@ -189,10 +209,10 @@ def resumed_job(output: Path, typed: VerifyOptions) -> VerifyJob:
         raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")
     plan = read_plan(folder, "--resume")
     _check_alone(typed)
-    options = options_of(plan, COMMAND, "--resume")
+    options = options_of(plan, command, "--resume")
     others = [path for path in options.out if path.suffix.lower() != output.suffix.lower()]
     workers = typed.workers if typed.workers.jobs is not None else options.workers
-    job = new_job(replace(options, out=(output, *others), workers=workers))
+    job = new_job(replace(options, out=(output, *others), workers=workers), command=command)
     return replace(job, sources=(folder,), resumes=True)
 
 

@@ -20,6 +20,7 @@ import msgspec
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run.journal_records import FORMAT
+from contactverif.run.journal_records import SUFFIX as OUTCOMES
 from contactverif.run.run_journal import Plan
 
 SUFFIX = ".journal"
@@ -86,6 +87,20 @@ def keep_earlier(folder: Path, outputs: Iterable[Path]) -> None:
         target = output.resolve()
         if target.exists():
             os.replace(target, folder / f"{_EARLIER}{target.suffix}")
+
+
+def withdraw_journal(folder: Path, outputs: Iterable[Path]) -> None:
+    """Take back what `begin_journal` did, if nothing was judged: the command line was wrong, as it turned out."""
+    if any(path.stat().st_size for path in folder.glob(f"*{OUTCOMES}")):
+        return
+    for output in outputs:
+        target = output.resolve()
+        earlier = folder / f"{_EARLIER}{target.suffix}"
+        if earlier.exists() and not target.exists():
+            os.replace(earlier, target)
+    shutil.rmtree(folder, ignore_errors=True)
+    if _aside(folder).exists():
+        os.replace(_aside(folder), folder)
 
 
 def remove_journal(folder: Path) -> None:

@@ -18,6 +18,7 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.conductor import with_case
 from contactverif.run.profiles import Profile
+from contactverif.run.run_journal import Journal
 from contactverif.run.runner import Progress, run
 from contactverif.run.sampling import Sampling
 from contactverif.studies.evaluation_cost import measure_costs
@@ -58,6 +59,7 @@ def run_comparison(
     scene: Case | None = None,
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
+    journal: Journal | None = None,
 ) -> Study:
     """Check every property of the reference and of the candidates, on the same cases.
 
@@ -81,6 +83,8 @@ def run_comparison(
         A function that is called as the run advances, as in `run`.
     executor : Executor | None
         Worker processes, as in `run`.
+    journal : Journal | None
+        The journal, as in `run`.
 
     Returns
     -------
@@ -106,6 +110,7 @@ def run_comparison(
         scene=scene,
         progress=progress,
         executor=executor,
+        journal=journal,
     )
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import resource
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import psutil
 import pytest
 from asking import Ask, asking
+from fresh_process import MAIN, PYTHON
+from lossy_store import lose_one_outcome
 
 from contactverif.run.journal_folder import begin_journal, journal_folder
 from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.outcome_store import OutcomeStore
 from contactverif.run.run_journal import NO_PLAN
 from contactverif_reports.netcdf.differences import same_data
 
-MAIN = [sys.executable, "-c", "from contactverif.cli import main; main()"]
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
 RUN = ("verify", "nts", "vts-ppt", *(word for id_ in IDS for word in ("-p", id_)), "--examples", "60", "--seed", "1")
 N_ROWS = 6
@@ -75,6 +74,31 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_report_of_an_unbroke
     assert list(tmp_path.iterdir()) == [report]
 
 
+def test_a_comparison_that_is_killed_goes_on(ask: Ask, tmp_path: Path) -> None:
+    words = [
+        "compare",
+        "nts",
+        "--against",
+        "vts-ppt",
+        "-p",
+        "patch.flat.transmission",
+        "--examples",
+        "60",
+        "--seed",
+        "1",
+    ]
+    report, journal, whole = tmp_path / "r.nc", tmp_path / "r.nc.journal", tmp_path / "whole.nc"
+    kill_at(1, [*words, "--out", str(report), "--out", str(tmp_path / "r.html")], journal)
+    assert not report.exists()
+    assert "a journal of compare; needed one of verify" in ask("verify", "--resume", report).err
+    answer = ask("compare", "--resume", report)
+    assert (answer.status, answer.err) == (0, "")
+    assert f"report: {report}" in answer.out
+    assert ask(*words, "--out", whole).status == 0
+    assert same_data(whole, report) == []
+    assert {path.name for path in tmp_path.iterdir()} == {"r.nc", "r.html", "whole.nc"}
+
+
 def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
     answer = ask("verify", "--resume", tmp_path / "none.nc")
     assert (
@@ -88,6 +112,23 @@ def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_pa
     answer = ask("verify", "nts", "--resume", tmp_path / "r.nc")
     assert answer.status == 2
     assert "names beside it; needed --jobs at most" in answer.err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["verify", "nts", "nts", "-p", "hard.deep"],
+        ["compare", "nts", "--against", "nts", "-p", "hard.deep"],
+        ["verify", "nts", "-p", "hard.deep", "--known", "patch.flat.solve=an old one"],
+    ],
+)
+def test_a_mistake_leaves_the_report_of_an_earlier_run_where_it_was(ask: Ask, tmp_path: Path, words: list[str]) -> None:
+    report = tmp_path / "r.nc"
+    report.write_text("an earlier one")
+    for _ in range(2):
+        assert ask(*words, "--out", report).status == 2
+        assert [path.name for path in tmp_path.iterdir()] == ["r.nc"]
+    assert report.read_text() == "an earlier one"
 
 
 def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +147,7 @@ def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbrok
     # Python would cut the modules, too, that it compiles and stores at such a limit.
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); "
     command = [
-        sys.executable,
+        *PYTHON,
         "-B",
         "-c",
         limit + MAIN[-1],
@@ -133,16 +174,7 @@ def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbrok
 
 
 def test_a_run_that_lost_an_outcome_is_not_green(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    append = OutcomeStore.append
-    losses: list[object] = []
-
-    def lose_one(store: OutcomeStore, *arguments: object) -> None:
-        if len(store) == 3 and not losses:
-            losses.extend(arguments)
-        else:
-            append(store, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(OutcomeStore, "append", lose_one)
+    lose_one_outcome(monkeypatch)
     answer = ask("verify", "vts-ppt", "-p", "patch.flat.resultant", "--examples", "20", "--out", tmp_path / "r.nc")
     assert answer.status == 1
     assert "Not complete: vts-ppt patch.flat.resultant: outcomes of 19 of 20 cases." in answer.out

@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from lossy_store import lose_one_outcome
 from test_workers import facts
 
 from contactverif.contract.errors import MisuseError
@@ -28,7 +29,6 @@ from contactverif.run.journal_folder import (
 )
 from contactverif.run.journal_records import BlockRecord, RecordWriter, read_records
 from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.outcome_store import OutcomeStore
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run_journal import NO_PLAN, Journal
 from contactverif.run.runner import Progress, RunStopped, run
@@ -291,16 +291,7 @@ def test_a_run_that_lacks_an_outcome_a_row_or_a_witness_has_a_gap() -> None:
 
 def test_a_lost_outcome_makes_no_run_green(monkeypatch: pytest.MonkeyPatch) -> None:
     """The store loses one on the way, and the rows do not notice."""
-    append = OutcomeStore.append
-    losses: list[object] = []
-
-    def lose_one(store: OutcomeStore, *arguments: object) -> None:
-        if len(store) == 3 and not losses:
-            losses.extend(arguments)
-        else:
-            append(store, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(OutcomeStore, "append", lose_one)
+    lose_one_outcome(monkeypatch)
     subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
     result = run(subjects, questions, examples=20, seed=1)
     assert result.promises_kept

@@ -44,8 +44,8 @@ def sleep_in_pair() -> None:
 
 @before("residual")
 def sleep_sometimes() -> None:
-    """Sleep at every 40th call."""
-    if next(_calls) % 40 == 0:
+    """Sleep at every fifth call."""
+    if next(_calls) % 5 == 0:
         time.sleep(LONG)
 
 

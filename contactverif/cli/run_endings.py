@@ -1,0 +1,140 @@
+"""The ends of a run that has a journal: what could not be written, what was stopped, and how to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from contactverif.cli.output_files import OutputFiles
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.cli.verify_job import VerifyJob
+    from contactverif.run.run_journal import Journal
+
+STOPPED = 130  # The exit status after Ctrl-C.
+NOT_WRITTEN = 2  # The exit status if a file could not be written.
+_LINES_OF_A_PLUGIN = 5
+
+
+def write_files(files: OutputFiles, writers: Mapping[str, Callable[[Path], None]]) -> OutputFiles:
+    """Write the files that the user wants; return those that are there. A line says why one is not.
+
+    Parameters
+    ----------
+    files : OutputFiles
+        The files.
+    writers : Mapping[str, Callable[[Path], None]]
+        {suffix: function that writes a file}.
+
+    Returns
+    -------
+    OutputFiles
+        The files that were written.
+    """
+    return files.only(
+        [suffix for suffix, path in files.paths.items() if _write(writers[suffix], path, files.names[suffix])]
+    )
+
+
+def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
+    """Write a file; return whether it is there."""
+    try:
+        write(path)
+    except MisuseError as error:
+        _warn(f"{name} is not written: {error.found.removeprefix(f'{path}: ')}")
+    except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
+        from contactverif_reports.files import reason_not_to_grow
+
+        _warn(f"{name} is not written: {reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}")
+    else:
+        return True
+    return False
+
+
+def end_journal(journal: Journal, *, complete: bool) -> None:
+    """Remove the journal once the files are complete."""
+    from contactverif.run.journal_folder import remove_journal
+
+    if journal.trouble:
+        _warn(f"the journal could not be written to its end: {journal.trouble}")
+    if complete and journal.folder is not None:
+        remove_journal(journal.folder)
+
+
+def exit_status(gap: str, *, whole: bool, promises_kept: bool) -> int:
+    """Return the exit status; 0 only if nothing is missing in the run or in its files.
+
+    Parameters
+    ----------
+    gap : str
+        What was not judged; empty if nothing is missing.
+    whole : bool
+        All files are complete, and so was the journal.
+    promises_kept : bool
+        Every promise is kept, and every property was judged.
+
+    Returns
+    -------
+    int
+        0 to 2.
+    """
+    if gap:
+        return 1
+    if not whole:
+        return NOT_WRITTEN
+    return 0 if promises_kept else 1
+
+
+@contextmanager
+def watch_for_stops(job: VerifyJob) -> Iterator[None]:
+    """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on.
+
+    Raises
+    ------
+    typer.Exit
+        With the status 130, after Ctrl-C.
+    """
+    from contactverif.cli.console import show
+    from contactverif.cli.run_tables import RunTable
+    from contactverif.run.runner import RunStopped
+    from contactverif.run.workers import WorkerError
+
+    try:
+        yield
+    except RunStopped as stop:
+        show(RunTable(stop.run))
+        say_how_to_go_on(job)
+        raise typer.Exit(STOPPED) from None
+    except WorkerError:
+        say_how_to_go_on(job)
+        raise
+
+
+def say_how_to_go_on(job: VerifyJob) -> None:
+    """Print the line that goes on with a run."""
+    if job.resume_line:
+        typer.echo(f"what was judged is kept; to go on: {job.resume_line}")
+    else:
+        typer.echo("with --out FILE.nc a run can go on where it was stopped")
+
+
+def show_what_plugins_printed() -> None:
+    """End the processes of the plugins, and show the last lines that each of them printed."""
+    from rich.text import Text
+
+    from contactverif.cli.console import show_as_it_is
+    from contactverif.isolation.host import end_all
+
+    for name, printed in end_all().items():
+        lines = printed.decode(errors="replace").splitlines()[-_LINES_OF_A_PLUGIN:]
+        show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
+
+
+def _warn(words: str) -> None:
+    """Print a line about a file that could not be written."""
+    typer.echo(f"contactverif: {' '.join(words.split())}", err=True)
