@@ -8,7 +8,7 @@ properties.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time.
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
+Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 _ENTRIES = (np.float64, np.int32, np.int64)
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
 
@@ -295,6 +296,18 @@ class CheckedFormulation:
                 first = outliers[0]
                 raise ContractError(f"contact_points: {name} {numbers[first]}; needed −1 to {limits[first] - 1}")
         return points
+
+    def answers(self, calls: Sequence[Call]) -> list[Any]:
+        """Return the answers of methods that are called one after another; `pair` is none of them.
+
+        A plugin in a process of its own gets all calls in one message. So whoever knows its questions asks them here.
+        """
+        if not self._remote:
+            return [getattr(self, verb)(*arguments) for verb, *arguments in calls]
+        for _, interface, _, z in calls:
+            self._check_size(interface, z)
+        with self.plugin.foresee(calls):
+            return [getattr(self, verb)(*arguments) for verb, *arguments in calls]
 
     def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
         """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb.

@@ -7,7 +7,9 @@ process that dies or hangs. Whoever holds a formulation of a process that ended 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from scipy import sparse
@@ -16,7 +18,7 @@ from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.subject import COMPRESSED
+from contactverif.contract.subject import COMPRESSED, Call
 from contactverif.isolation.host import Host, Question, host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer, MessageError, unpack_array
@@ -78,6 +80,7 @@ class RemoteFormulation:
     def __init__(self, host: Host, penalty: float) -> None:
         self._host, self._penalty = host, penalty
         self._last: Question | None = None
+        self._foreseen: deque[tuple[Call, Question]] = deque()
         self._make()
 
     def _make(self) -> None:
@@ -93,11 +96,34 @@ class RemoteFormulation:
     def _answer(
         self, verb: str, interface: Interface, pairing: Pairing | None = None, z: Array | None = None
     ) -> Answer:
-        question, _ = self._ask(verb, interface, pairing, z)
-        self._host.flush()
+        question = self._take_foreseen(verb, interface, pairing) or self._ask(verb, interface, pairing, z)[0]
+        if question.answer is None:
+            self._host.flush()
         if isinstance(pairing, RemotePairing):
             pairing.check()
         return question.result()
+
+    @contextmanager
+    def foresee(self, calls: Sequence[Call]) -> Iterator[None]:
+        """Open a block in which these methods are called, in this order: they go to the process in one message."""
+        try:
+            for verb, interface, pairing, z in calls:
+                if verb in self._host.methods or verb == "residual":
+                    self._foreseen.append(((verb, interface, pairing, z), self._ask(verb, interface, pairing, z)[0]))
+            yield
+        finally:
+            self._foreseen.clear()
+
+    def _take_foreseen(self, verb: str, interface: Interface, pairing: Pairing | None) -> Question | None:
+        """Return the question that was asked ahead, if this is the next one of those."""
+        if not self._foreseen:
+            return None
+        (foreseen, of_interface, of_pairing, _), question = self._foreseen[0]
+        if foreseen != verb or of_interface is not interface or of_pairing is not pairing:
+            return None
+        self._foreseen.popleft()
+        self._last = question
+        return question
 
     @property
     def seconds(self) -> float:

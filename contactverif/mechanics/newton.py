@@ -1,7 +1,8 @@
 """Newton's method on the unknowns of a scene.
 
 The method is plain Newton, without line search, as a finite element code would run it with this formulation's tangent.
-The active set is decided anew at each iterate, by the pairing.
+The active set is decided anew at each iterate, by the pairing. Only where a tie leaves a singular matrix beside the
+solution, the matrix before is taken once more.
 
 Rule for the next editor: a solution that does not converge is data, not an error. Every iterate is recorded, `End` says
 how the iteration ended, and only a plugin that breaks the contract raises an exception.
@@ -115,6 +116,7 @@ def _load_step(
     """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
     first, before, n_free = len(record.u), None, system.scene.n_free
     contact: Any = None
+    last: Any = None
     floor = np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
@@ -142,6 +144,11 @@ def _load_step(
         if iteration == iterations:
             return End.EXHAUSTED, u
         step = system.step(matrix, -residual, floor)
+        if step.change is None and last is not None and record.roundings[-1] <= NEAR_CONVERGENCE:
+            # So near the solution of a tie, roundoff decides who faces whom, and the matrix before is as right.
+            matrix = last
+            step = system.step(matrix, -residual, floor)
+        last = matrix
         record.conditions[-1], record.deficiencies[-1] = step.condition, step.deficiency
         if step.change is None:
             return End.SINGULAR, u

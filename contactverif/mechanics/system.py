@@ -7,6 +7,7 @@ an iteration goes on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import process_time
 from typing import Any
@@ -120,10 +121,16 @@ class System:
         """
         if later:
             return self.forces(u, pairing), None
+        return self.forces_and_tangents([u], pairing)[0]
+
+    def forces_and_tangents(
+        self, states: Sequence[FloatArray], pairing: Pairing | None
+    ) -> list[tuple[FloatArray, Any]]:
+        """Return `forces` and `tangent` at each of some unknowns u (n,), all asked for together."""
         if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
-            return self.forces(u, pairing), self.tangent(u, pairing)
-        start = process_time()
-        both = self.formulation.residual_and_tangent(self.scene.interface, pairing, self.state(u))
+            return [(self.forces(u, pairing), self.tangent(u, pairing)) for u in states]
+        start, interface = process_time(), self.scene.interface
+        both = self.formulation.answers([("residual_and_tangent", interface, pairing, self.state(u)) for u in states])
         self.seconds["tangent"] += process_time() - start
         return both
 

@@ -19,7 +19,7 @@ derivative. The details say where the largest jump is (0 to 1), and how many wer
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.shared.applicability import refuse_barrier
@@ -52,7 +52,7 @@ SLOPE = Quantity(
     "After 16 halvings, a continuous slope changes by 2^-16 of its change Δ over a step; differences raise roundoff.",
 )
 
-Function = Callable[[float], FloatArray]
+Function = Callable[[FloatArray], FloatArray]
 
 
 def measure_continuity(case: Case, subject: Subject) -> Measurement:
@@ -80,7 +80,7 @@ def measure_continuity(case: Case, subject: Subject) -> Measurement:
     values = {FORCE.name: ratio(jumps[0][1], size)}
     tolerances = {FORCE.name: ALLOWED * ratio(_largest_step(samples), size) + rounding}
     if subject.traits.continuity == "C1":
-        samples = np.array([slope(t) for t in _places()])
+        samples = slope(_places())
         steepest = float(np.abs(samples).max())
         values[SLOPE.name] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)
         tolerances[SLOPE.name] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
@@ -95,7 +95,7 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
     Parameters
     ----------
     function : Function
-        The function of the place.
+        The function of some places (k,), with the values (k, n).
     samples : FloatArray, shape (N_STEPS + 1, n)
         Its values at `N_STEPS` + 1 equal distances.
     halvings : int
@@ -116,12 +116,10 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
         for step in range(N_STEPS)
     ]
     # A few halvings tell a jump from a bend of the way, which differs from its neighbours too.
-    worst = sorted(
-        (bracket.halve(function, FIRST) for bracket in _select_worst(steps)), key=lambda bracket: -bracket.excess
-    )
+    worst = sorted(halve(_select_worst(steps), function, FIRST), key=lambda bracket: -bracket.excess)
     jumps: list[tuple[float, float]] = []
     for bracket in worst:
-        last = bracket.halve(function, halvings - FIRST)
+        (last,) = halve([bracket], function, halvings - FIRST)
         jumps.append((last.left, last.change))
         if last.change <= allowed * float(np.abs(changes).max()):
             break
@@ -167,33 +165,60 @@ class Bracket:
         """The largest change that the trend does not explain."""
         return float(np.abs(self.behind - self.before - self.trend).max())
 
-    def halve(self, function: Function, times: int) -> Bracket:
-        """Return the part to which halving leads, always towards the larger excess."""
-        bracket = self
-        for _ in range(times):
-            middle, trend = (bracket.left + bracket.right) / 2, bracket.trend / 2
-            value = function(middle)
-            first = Bracket(bracket.left, middle, bracket.before, value, trend)
-            second = Bracket(middle, bracket.right, value, bracket.behind, trend)
-            bracket = first if first.excess >= second.excess else second
-        return bracket
+    @property
+    def middle(self) -> float:
+        """The place half-way."""
+        return (self.left + self.right) / 2
+
+    def half(self, value: FloatArray) -> Bracket:
+        """Return the half with the larger excess, where the function has a value (n,) half-way."""
+        trend = self.trend / 2
+        first = Bracket(self.left, self.middle, self.before, value, trend)
+        second = Bracket(self.middle, self.right, value, self.behind, trend)
+        return first if first.excess >= second.excess else second
 
 
-def _functions(
-    formulation: CheckedFormulation, case: Case
-) -> tuple[Callable[[float | FloatArray], FloatArray], Function]:
-    """Return the forces (n_unknowns,) as a function of the place on the way, or of several places, and their slope."""
+def halve(brackets: Sequence[Bracket], function: Function, times: int) -> list[Bracket]:
+    """Return the parts to which halving leads, always towards the larger excess.
+
+    The function is asked for three places of each bracket at once, so that two halvings take one question.
+    """
+    while times > 1:
+        middles = [bracket.middle for bracket in brackets]
+        beside = [(bracket.left + bracket.middle) / 2 for bracket in brackets]
+        behind = [(bracket.middle + bracket.right) / 2 for bracket in brackets]
+        values = function(np.array([middles, beside, behind]).reshape(-1)).reshape(3, len(brackets), -1)
+        brackets = [_quarter(bracket, *values[:, number]) for number, bracket in enumerate(brackets)]
+        times -= 2
+    if times:
+        values = function(np.array([bracket.middle for bracket in brackets]))
+        brackets = [bracket.half(value) for bracket, value in zip(brackets, values, strict=True)]
+    return list(brackets)
+
+
+def _quarter(bracket: Bracket, middle: FloatArray, first: FloatArray, second: FloatArray) -> Bracket:
+    """Return what two halvings leave of a bracket, with the values (n,) in the middle and in those of its halves."""
+    half = bracket.half(middle)
+    return half.half(first if half.left == bracket.left else second)
+
+
+def _functions(formulation: CheckedFormulation, case: Case) -> tuple[Function, Function]:
+    """Return the forces (k, n_unknowns) as a function of k places on the way, and their slope."""
     interface, way = case.interface, case.parameters["path"]
 
-    def forces(places: float | FloatArray) -> FloatArray:
+    def forces(places: FloatArray) -> FloatArray:
         # Without a pairing the formulation takes one of each state, all in one question.
         return formulation.residual(interface, None, case.z + np.multiply.outer(places, way))
 
-    def slope(place: float) -> FloatArray:
-        z = case.z + place * way
-        around = np.array([z - DIFFERENCE * way, z + DIFFERENCE * way])
-        behind, ahead = formulation.residual(interface, formulation.pair(interface, z), around)
-        slope: FloatArray = (ahead - behind) / (2 * DIFFERENCE)
+    def slope(places: FloatArray) -> FloatArray:
+        states = [case.z + place * way for place in places]
+        pairings = [formulation.pair(interface, z) for z in states]
+        around = [np.array([z - DIFFERENCE * way, z + DIFFERENCE * way]) for z in states]
+        calls: list[Call] = [
+            ("residual", interface, pairing, pair) for pairing, pair in zip(pairings, around, strict=True)
+        ]
+        both = np.array(formulation.answers(calls))  # (k, 2, n_unknowns)
+        slope: FloatArray = (both[:, 1] - both[:, 0]) / (2 * DIFFERENCE)
         return slope
 
     return forces, slope

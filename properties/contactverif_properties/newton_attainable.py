@@ -23,8 +23,10 @@ inverse there, and where the solution is so near a kink that roundoff of the sto
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from math import frexp, ldexp
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -33,7 +35,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import move, snap
 from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.scene import Scene, scene_of
@@ -167,7 +169,7 @@ def measure_attainable(case: Case, subject: Subject) -> Measurement:
     solution = examine(system, case, trace.u[-1])
     if solution is None:
         return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
-    places = {power: settle(solution, case, segment * 2.0**power) for power in OFFSETS}
+    places = dict(zip(OFFSETS, settle(solution, case, [segment * 2.0**power for power in OFFSETS]), strict=True))
     for power, attained in places.items():
         details |= {
             f"{ADDED.name} at 2^{power}": attained.added,
@@ -235,8 +237,45 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
     )
 
 
-def settle(solution: Solution, case: Case, way: float) -> Attained:
-    """Let Newton's method come to rest in another place, from the solution near the origin.
+@dataclass(slots=True, eq=False)
+class Place:
+    """The scene in another place, and how far Newton's method has come there.
+
+    Attributes
+    ----------
+    system : System
+        The moved scene.
+    way : float
+        The move along both axes, a length.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns.
+    residual : FloatArray, shape (n_free + n_multipliers,)
+        The residual there.
+    added : float
+        The largest ω of all steps.
+    rests : list[Rest]
+        The state after each step.
+    """
+
+    system: System
+    way: float
+    u: FloatArray
+    residual: FloatArray = field(init=False)
+    added: float = 0.0
+    rests: list[Rest] = field(default_factory=list)
+
+
+class Rest(NamedTuple):
+    """A state: its residual over its roundoff, its unknowns, its largest coordinate, its pairing."""
+
+    residual: float
+    u: FloatArray
+    largest: float
+    pairing: Pairing | None
+
+
+def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attained]:
+    """Let Newton's method come to rest in other places, from the solution near the origin.
 
     Parameters
     ----------
@@ -244,34 +283,54 @@ def settle(solution: Solution, case: Case, way: float) -> Attained:
         The solution near the origin.
     case : Case
         The case of the scene, for its seed.
-    way : float
-        The move along both axes, a length.
+    ways : Sequence[float]
+        The moves along both axes, lengths.
     """
-    near, n = solution.system, solution.system.scene.interface.n_unknowns
-    far = replace(near, scene=move(near.scene, way, way))
-    u, residual, added, settled = solution.u, solution.u, 0.0, []
-    for number in range(1 + N_STEPS):
-        if number:
-            change = near.step(solution.matrix, -residual).change
+    near = solution.system
+    places = [Place(replace(near, scene=move(near.scene, way, way)), way, solution.u) for way in ways]
+    take_forces(solution, places)
+    for _ in range(N_STEPS):
+        for place in places:
+            change = near.step(solution.matrix, -place.residual).change
             assert change is not None  # The matrix has an inverse.
-            u = u + change
-        pairing, z = far.pair(u), far.state(u)
-        back = np.concatenate([z[:n] - way, z[n:]])
-        forces = far.formulation.residual(far.scene.interface, pairing, z)
-        same = near.formulation.residual(near.scene.interface, pairing, back)
-        added = max(added, solution.conditioning.count_roundings(forces - same))
-        residual = far.balance(u, forces)
+            place.u = place.u + change
+        take_forces(solution, places)
+    return [_attain(solution, case, place) for place in places]
+
+
+def take_forces(solution: Solution, places: Sequence[Place]) -> None:
+    """Ask for the forces in all places, and for those of the same stored positions moved back."""
+    near, n = solution.system, solution.system.scene.interface.n_unknowns
+    pairings = [place.system.pair(place.u) for place in places]
+    states = [place.system.state(place.u) for place in places]
+    calls: list[Call] = []
+    for place, pairing, z in zip(places, pairings, states, strict=True):
+        back = np.concatenate([z[:n] - place.way, z[n:]])
+        calls += [
+            ("residual", place.system.scene.interface, pairing, z),
+            ("residual", near.scene.interface, pairing, back),
+        ]
+    answers = near.formulation.answers(calls)
+    for place, pairing, z, forces, same in zip(places, pairings, states, answers[::2], answers[1::2], strict=True):
+        place.added = max(place.added, solution.conditioning.count_roundings(forces - same))
+        place.residual = place.system.balance(place.u, forces)
         largest = float(np.abs(z[:n]).max())
-        settled.append((over(np.abs(residual), solution.roundoff(largest)), u, largest, pairing))
-    attained, u, largest, pairing = min(settled[1:], key=lambda rest: rest[0])
-    allowed = float((solution.inverse @ solution.roundoff(largest) / solution.units).max())
-    length = float(np.abs((u - solution.u) / solution.units).max())
+        place.rests.append(Rest(over(np.abs(place.residual), solution.roundoff(largest)), place.u, largest, pairing))
+
+
+def _attain(solution: Solution, case: Case, place: Place) -> Attained:
+    """Return what the best of the states after the first step has attained."""
+    near = solution.system
+    rest = min(place.rests[1:], key=lambda rest: rest.residual)
+    allowed = float((solution.inverse @ solution.roundoff(rest.largest) / solution.units).max())
+    length = float(np.abs((rest.u - solution.u) / solution.units).max())
     undecided = ""
-    if pairing != solution.pairing or pairing is None:
-        state = replace(case, interface=near.scene.interface, z=near.state(u), n_multipliers=near.n_multipliers)
+    if rest.pairing != solution.pairing or rest.pairing is None:
+        state = replace(case, interface=near.scene.interface, z=near.state(rest.u), n_multipliers=near.n_multipliers)
         (direction,) = random_directions(case.seed, 1, state.z.size)
-        undecided = find_kink(state, near.formulation, near.pair(u), COORDINATE_ROUNDING * largest, direction)
-    return Attained(added, attained, ratio(length, allowed), length, undecided)
+        reach = COORDINATE_ROUNDING * rest.largest
+        undecided = find_kink(state, near.formulation, near.pair(rest.u), reach, direction)
+    return Attained(place.added, rest.residual, ratio(length, allowed), length, undecided)
 
 
 def over(sizes: FloatArray, floor: FloatArray) -> float:

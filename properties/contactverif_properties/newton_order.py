@@ -21,6 +21,7 @@ solution pair like it, and where the derivative by differences gives no better o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -151,15 +152,16 @@ def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing
     fits, count = [], 0
     for direction in random_directions(case.seed, N_DIRECTIONS, system.size):
         before, after = [], []
-        for distance in DISTANCES:
-            u = solution + distance * length * direction * units
-            if not _pairs_alike(system, case, pairing, u, distance * length):
-                continue
-            forces, tangent = system.forces_and_tangent(u, pairing)
+        distances = [distance * length for distance in DISTANCES]
+        states = [solution + distance * direction * units for distance in distances]
+        alike = _pair_alike(system, case, pairing, states, distances)
+        near = [place for place, is_alike in zip(zip(distances, states, strict=True), alike, strict=True) if is_alike]
+        both = system.forces_and_tangents([u for _, u in near], pairing)
+        for (distance, u), (forces, tangent) in zip(near, both, strict=True):
             matrix = system.stiffness + system.contact_stiffness(u, pairing, tangent)
             step = system.step(matrix, -system.balance(u, forces)).change
             count += 1
-            before.append(distance * length)
+            before.append(distance)
             after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
         fits.append(fit_order(np.array(before), np.array(after), floor))
     decisive = [(order, rate) for order, rate in fits if not np.isnan(order)] or [(np.nan, np.nan)]
@@ -227,14 +229,20 @@ def spectral_radius(system: System, u: FloatArray, pairing: Pairing | None) -> f
     return float(np.abs(linalg.eigvals(np.eye(len(u)) - linalg.solve(dense(matrix), dense(exact)))).max())
 
 
-def _pairs_alike(system: System, case: Case, pairing: Pairing | None, u: FloatArray, reach: float) -> bool:
-    """Return whether the state pairs as the solution does, or without a pairing, whether differences see no kink."""
+def _pair_alike(
+    system: System, case: Case, pairing: Pairing | None, states: Sequence[FloatArray], reaches: Sequence[float]
+) -> list[bool]:
+    """Return which states pair as the solution does, or without a pairing, around which differences see no kink."""
     if pairing is not None:
-        return system.pair(u) == pairing
-    z = system.state(u)
-    (direction,) = random_directions(case.seed, 1, z.size)
-    state = replace(case, z=z, n_multipliers=system.n_multipliers)
-    return not find_kink(state, system.formulation, None, reach, direction)
+        pairings = [system.pair(u) for u in states]  # All are asked for before one is looked at.
+        return [other == pairing for other in pairings]
+    z = [system.state(u) for u in states]
+    (direction,) = random_directions(case.seed, 1, z[0].size)
+    around = (replace(case, z=state, n_multipliers=system.n_multipliers) for state in z)
+    return [
+        not find_kink(state, system.formulation, None, reach, direction)
+        for state, reach in zip(around, reaches, strict=True)
+    ]
 
 
 NEWTON_ORDER = Property(

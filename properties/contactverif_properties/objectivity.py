@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg
 
-from contactverif.contract.arrays import FloatArray, dense
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity
@@ -31,6 +31,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
@@ -90,8 +91,8 @@ def measure_objectivity(case: Case, subject: Subject) -> Measurement:
     there, rotation = turn_state(case)
     pairing, pairing_there = (formulation.pair(interface, state.z) for state in (case, there))
     turn = linalg.block_diag(np.kron(np.eye(interface.n_nodes), rotation), np.eye(case.n_multipliers))
-    forces = formulation.residual(interface, pairing, case.z)
-    forces_there = formulation.residual(interface, pairing_there, there.z)
+    states = (interface, pairing, case.z), (interface, pairing_there, there.z)
+    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
 
     largest = max(case.largest_coordinate, there.largest_coordinate)
     one_pass = forces / _count_passes(case, subject, formulation, pairing)
@@ -99,9 +100,8 @@ def measure_objectivity(case: Case, subject: Subject) -> Measurement:
     errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
     size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
     values = {FORCES.name: ratio(errors["forces"], size)}
-    if "tangent" in formulation.provides:
-        tangent = dense(formulation.tangent(interface, pairing, case.z))
-        tangent_there = dense(formulation.tangent(interface, pairing_there, there.z))
+    if tangents:
+        tangent, tangent_there = tangents
         errors["tangent"] = float(np.abs(tangent_there - turn @ tangent @ turn.T).max())
         values[TANGENT.name] = ratio(errors["tangent"], float(np.abs(tangent).max()))
     failures = select_failures(errors, values, tolerance)

@@ -135,7 +135,7 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         POINTS.name: changes.contact_points,
     }
     tolerances = dict.fromkeys(values, 0.0)
-    forces = np.array([formulation.residual(interface, pairing, u) for u in (z, near)])
+    forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
     if subject.traits.enforcement == "penalty":
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
     if subject.traits.batched:
@@ -147,13 +147,15 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
-        forces_there = np.array([far.residual(interface, pairing, u) for u in (z, near)])
+        forces_there = np.array(far.answers([("residual", interface, pairing, u) for u in (z, near)]))
         values[SECOND_PROCESS.name] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
         tolerances[SECOND_PROCESS.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
     if "residual_and_tangent" in formulation.provides:
         values[IN_ONE_CALL.name], tolerances[IN_ONE_CALL.name] = changes.residual_and_tangent, 0.0
-        tangents = np.array([dense(formulation.tangent(interface, pairing, u)) for u in (z, near)])
-        pairs = [formulation.residual_and_tangent(interface, pairing, u) for u in (z, near)]
+        answers = formulation.answers(
+            [(verb, interface, pairing, u) for verb in ("tangent", "residual_and_tangent") for u in (z, near)]
+        )
+        tangents, pairs = np.array([dense(tangent) for tangent in answers[:2]]), answers[2:]
         one_call = np.array([residual for residual, _ in pairs])
         values[ONE_RESIDUAL.name] = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
         values[ONE_TANGENT.name] = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))

@@ -22,12 +22,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
@@ -68,13 +68,13 @@ def measure_scaling(case: Case, subject: Subject) -> Measurement:
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
     rescaled = subject.with_penalty(penalty / (factor if distributed else 1.0))
     pairing, pairing_there = formulation.pair(interface, case.z), rescaled.pair(there.interface, there.z)
-    forces = formulation.residual(interface, pairing, case.z)[:n]
-    forces_there = rescaled.residual(there.interface, pairing_there, there.z)[:n]
+    (forces,), tangents = ask_forces_and_tangents(formulation, (interface, pairing, case.z))
+    (forces_there,), tangents_there = ask_forces_and_tangents(rescaled, (there.interface, pairing_there, there.z))
+    forces, forces_there = forces[:n], forces_there[:n]
     errors = {"forces": float(np.abs(forces_there / factor - forces).max())}
     values = {FORCES.name: ratio(errors["forces"], float(np.abs(forces).max()))}
-    if "tangent" in formulation.provides:
-        tangent = dense(formulation.tangent(interface, pairing, case.z))[:n, :n]
-        tangent_there = dense(rescaled.tangent(there.interface, pairing_there, there.z))[:n, :n]
+    if tangents:
+        tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
         errors["tangent"] = float(np.abs(tangent_there - tangent).max())
         values[TANGENT.name] = ratio(errors["tangent"], float(np.abs(tangent).max()))
     tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))

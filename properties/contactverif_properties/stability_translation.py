@@ -22,7 +22,6 @@ where a decision hangs on less than 64 u D: there a right search may decide othe
 
 from __future__ import annotations
 
-from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
@@ -37,6 +36,7 @@ from contactverif_properties.shared.conditioning import (
     measure_tangent_slope,
     tangent_quantity,
 )
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_rounded_decision
 
 FORCES = forces_quantity("change of the forces in roundings")
@@ -63,12 +63,13 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
     formulation, near = prepare_state(case, subject)
     far = move_state(near, case.parameters["shift"])
     pairing = formulation.pair(near.interface, near.z)
-    forces = formulation.residual(near.interface, pairing, near.z)
-    change = formulation.residual(far.interface, pairing, far.z) - forces
+    states = (near.interface, pairing, near.z), (far.interface, pairing, far.z)
+    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
+    change = forces_there - forces
     conditioning = measure_conditioning(near, formulation, pairing, forces)
     values = {FORCES.name: conditioning.count_roundings(change)}
-    if "tangent" in formulation.provides:
-        there, here = (dense(formulation.tangent(at.interface, pairing, at.z)) for at in (far, near))
+    if tangents:
+        here, there = tangents
         slope = measure_tangent_slope(near, formulation, pairing, here)
         values[TANGENT.name] = count_tangent_roundings(near, here, there, slope)
     excusable = pairing is None  # A plugin without a pairing decides anew in each residual.

@@ -31,6 +31,13 @@ class Springs:
         return forces
 
 
+class NoNumberTangent(Springs):
+    """Its tangent holds no number."""
+
+    def tangent(self, interface, pairing, z):
+        return np.full((z.size, z.size), np.nan)
+
+
 class HandledSprings(Springs):
     """Springs again; who is active is in an object that cannot leave the process."""
 

@@ -18,7 +18,7 @@ from contactverif.contract.errors import MisuseError, PluginError
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics import bulk
+from contactverif.mechanics import bulk, linear
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
@@ -176,6 +176,24 @@ def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
         assert trace.n_iterations == 0
         assert trace.conditions[-1] <= scene.n_free * UNIT_ROUNDOFF
     assert "contact" in trace.end.advice
+
+
+def test_roundoff_of_the_solver_does_not_decide_whether_a_tie_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes face nodes here, so roundoff decides who is paired with whom, and some of these matrices are singular."""
+    shortest, random = linear._shortest, np.random.default_rng(1)
+
+    def rounded(matrix: FloatArray, *arguments: Any) -> Any:
+        return shortest(matrix * (1 + UNIT_ROUNDOFF * random.uniform(-1, 1, matrix.shape)), *arguments)
+
+    monkeypatch.setattr(linear, "_shortest", rounded)
+    scene = catalogue.make_scene("c", refine=2)
+    iterations = []
+    for _ in range(6):
+        trace = solve_named("vts-ppt-lm", scene)
+        assert trace.converged
+        assert trace.roundings[-1] <= 1
+        iterations.append(trace.n_iterations)
+    assert max(iterations) > 1
 
 
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])

@@ -81,11 +81,11 @@ def test_the_size_and_the_place_of_a_jump_are_found() -> None:
 
 
 def test_jumps_of_a_function_are_told_from_its_slope() -> None:
-    def function(place: float) -> FloatArray:
-        steep = np.sin(2 * place) / 2 + abs(place - 0.61) / 4
-        return np.array([steep + 2e-2 * (place > 0.3) - 4e-2 * (place > 0.77), place])
+    def function(places: FloatArray) -> FloatArray:
+        steep = np.sin(2 * places) / 2 + abs(places - 0.61) / 4
+        return np.stack([steep + 2e-2 * (places > 0.3) - 4e-2 * (places > 0.77), places], axis=-1)
 
-    samples = np.array([function(place) for place in np.linspace(0, 1, N_STEPS + 1)])
+    samples = function(np.linspace(0, 1, N_STEPS + 1))
     jumps = find_jumps(function, samples, 20, 2.0**-12)
     sizes = {round(place, 4): size for place, size in jumps if size > 1e-3}
     assert sizes == {0.77: pytest.approx(4e-2, rel=1e-2), 0.3: pytest.approx(2e-2, rel=1e-2)}

@@ -231,8 +231,8 @@ def measure_tangent_slope(
     """
     step = TANGENT_STEP * case.shortest_segment
     moves = step * random_directions(case.seed, N_TANGENT_DIRECTIONS, case.z.size)
-    tangents = (dense(formulation.tangent(case.interface, pairing, case.z + move)) for move in moves)
-    return max(float(np.abs(moved - tangent).max()) for moved in tangents) / step
+    moved = formulation.answers([("tangent", case.interface, pairing, case.z + move) for move in moves])
+    return max(float(np.abs(dense(there) - tangent).max()) for there in moved) / step
 
 
 def _distances(case: Case) -> FloatArray:

@@ -74,9 +74,11 @@ class Reported:
         """Ask a formulation about a case without multipliers."""
         formulation, state = prepare_state(case, subject)
         pairing = formulation.pair(state.interface, state.z)
-        forces = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
-        points = formulation.contact_points(state.interface, pairing, state.z)
-        return cls(formulation, state, forces.reshape(-1, 2), points, subject.traits)
+        forces, points = formulation.answers(
+            [(method, state.interface, pairing, state.z) for method in ("residual", "contact_points")]
+        )
+        positions = forces[: state.interface.n_unknowns].reshape(-1, 2)
+        return cls(formulation, state, positions, points, subject.traits)
 
     @property
     def passes(self) -> Iterator[Pass]:

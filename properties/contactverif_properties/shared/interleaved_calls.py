@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -92,12 +93,11 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     )
     answers: dict[tuple[str, int], Array] = {}
     repeated = 0.0
-    for call in calls:
-        answer = _ask(first, call[0], questions[call[1]])
+    for call, answer in _ask(first, calls, questions):
         repeated += _count_different(answer, answers.setdefault(call, answer))
     changed = {"residual": 0.0, "tangent": 0.0, "contact_points": 0.0, BOTH: 0.0}
-    for call in others:
-        changed[call[0]] += _count_different(_ask(second, call[0], questions[call[1]]), answers[call])
+    for call, answer in _ask(second, others, questions):
+        changed[call[0]] += _count_different(answer, answers[call])
     return Changes(repeated, **changed)
 
 
@@ -105,16 +105,25 @@ def _provides(formulation: CheckedFormulation, method: str) -> bool:
     return method == "residual" or method in formulation.provides
 
 
-def _ask(formulation: CheckedFormulation, method: str, question: Question) -> Array:
+def _ask(
+    formulation: CheckedFormulation, calls: Sequence[tuple[str, int]], questions: Sequence[Question]
+) -> list[tuple[tuple[str, int], Array]]:
+    """Return some calls, each with its answer in one array."""
+    states = [questions[number] for _, number in calls]
+    answers = formulation.answers(
+        [(method, each.interface, each.pairing, each.z) for (method, _), each in zip(calls, states, strict=True)]
+    )
+    return [(call, _in_one_array(call[0], answer)) for call, answer in zip(calls, answers, strict=True)]
+
+
+def _in_one_array(method: str, answer: Any) -> Array:
     """Return the residual (n,), the tangent (n, n), both (1 + n, n), or all arrays of the contact points in one."""
-    arguments = question.interface, question.pairing, question.z
     if method == "contact_points":
-        points = formulation.contact_points(*arguments)
-        return np.concatenate([np.ravel(getattr(points, entry.name)).astype(np.float64) for entry in fields(points)])
+        return np.concatenate([np.ravel(getattr(answer, entry.name)).astype(np.float64) for entry in fields(answer)])
     if method == BOTH:
-        residual, tangent = formulation.residual_and_tangent(*arguments)
+        residual, tangent = answer
         return np.vstack([residual, dense(tangent)])
-    return dense(getattr(formulation, method)(*arguments))
+    return dense(answer)
 
 
 def _count_different(answer: Array, other: Array) -> float:

@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray, dense
+from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import default_points, nearest_segments
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
@@ -99,10 +100,9 @@ def answer_alike(first: Case, second: Case, subject: Subject) -> tuple[Answer, A
 
 def _answer(state: Case, formulation: CheckedFormulation) -> Answer:
     n, pairing = state.interface.n_unknowns, formulation.pair(state.interface, state.z)
-    forces = formulation.residual(state.interface, pairing, state.z)[:n].reshape(-1, 2)
-    tangent = None
-    if "tangent" in formulation.provides:
-        tangent = dense(formulation.tangent(state.interface, pairing, state.z))[:n, :n]
+    (forces,), tangents = ask_forces_and_tangents(formulation, (state.interface, pairing, state.z))
+    forces = forces[:n].reshape(-1, 2)
+    tangent = tangents[0][:n, :n] if tangents else None
     return Answer(state, formulation, pairing, forces, tangent)
 
 
