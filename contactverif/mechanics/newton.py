@@ -18,6 +18,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
+from contactverif.mechanics.linear import Step
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Record, Trace, largest_rounding
@@ -143,18 +144,27 @@ def _load_step(
             return end, u
         if iteration == iterations:
             return End.EXHAUSTED, u
-        step = system.step(matrix, -residual, floor)
-        if step.change is None and last is not None and record.roundings[-1] <= NEAR_CONVERGENCE:
-            # So near the solution of a tie, roundoff decides who faces whom, and the matrix before is as right.
-            matrix = last
-            step = system.step(matrix, -residual, floor)
-        last = matrix
+        step, last = _solve_for_step(system, matrix, last, -residual, floor, record.roundings[-1])
         record.conditions[-1], record.deficiencies[-1] = step.condition, step.deficiency
         if step.change is None:
             return End.SINGULAR, u
         record.energies[-1] = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
     raise AssertionError("the loop returns")
+
+
+def _solve_for_step(
+    system: System, matrix: Any, last: Any, right: FloatArray, floor: FloatArray, rounding: float
+) -> tuple[Step, Any]:
+    """Return the step of a matrix (n, n), and that matrix.
+
+    Near the solution of a tie, where the residual is some `rounding` of its floor, roundoff decides who faces whom. If
+    that leaves a singular matrix, the one before, `last`, is as right.
+    """
+    step = system.step(matrix, right, floor)
+    if step.change is None and last is not None and rounding <= NEAR_CONVERGENCE:
+        return system.step(last, right, floor), last
+    return step, matrix
 
 
 def _is_near(q: FloatArray, u: FloatArray, size: float) -> bool:

@@ -29,15 +29,15 @@ def nothing_is_left_behind():
 @pytest.fixture
 def messages(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     """Return the methods that each message to a process asks."""
-    sent: list[tuple[str, ...]] = []
+    verbs_of_messages: list[tuple[str, ...]] = []
     ask = process.PluginProcess.ask
 
     def note(self: process.PluginProcess, frame: bytes, verbs: Sequence[str]) -> Any:
-        sent.append(tuple(verbs))
+        verbs_of_messages.append(tuple(verbs))
         return ask(self, frame, verbs)
 
     monkeypatch.setattr(process.PluginProcess, "ask", note)
-    return sent
+    return verbs_of_messages
 
 
 def calls_of(formulation: CheckedFormulation, z: np.ndarray, *methods: str) -> list[Call]:

@@ -182,10 +182,10 @@ def test_roundoff_of_the_solver_does_not_decide_whether_a_tie_is_solved(monkeypa
     """Nodes face nodes here, so roundoff decides who is paired with whom, and some of these matrices are singular."""
     shortest, random = linear._shortest, np.random.default_rng(1)
 
-    def rounded(matrix: FloatArray, *arguments: Any) -> Any:
+    def add_roundoff(matrix: FloatArray, *arguments: Any) -> Any:
         return shortest(matrix * (1 + UNIT_ROUNDOFF * random.uniform(-1, 1, matrix.shape)), *arguments)
 
-    monkeypatch.setattr(linear, "_shortest", rounded)
+    monkeypatch.setattr(linear, "_shortest", add_roundoff)
     scene = catalogue.make_scene("c", refine=2)
     iterations = []
     for _ in range(6):
