@@ -22,6 +22,7 @@ from hypothesis.statistics import collector
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
+from contactverif.run.one_thread import one_thread
 
 Fails = Callable[[Case], bool]
 
@@ -160,7 +161,7 @@ def _settings(examples: int, *phases: Phase, database: ExampleDatabase | None = 
 
 @contextmanager
 def reproducible() -> Iterator[None]:
-    """Keep hypothesis from drawing constants that stand in the source of imported modules.
+    """Compute on one thread, and keep hypothesis from drawing constants of the source of imported modules.
 
     Otherwise one integer in twenty is a literal of some imported module outside site-packages. Then the same seed would
     mean other cases in pytest than on the command line, and other cases once a user edits a file; and hypothesis would
@@ -171,13 +172,15 @@ def reproducible() -> Iterator[None]:
     name = "_get_local_constants"
     original = getattr(providers, name, None)
     if original is None:
-        yield
+        with one_thread():
+            yield
         return
     none = Constants()
     setattr(providers, name, lambda: none)
     providers.CONSTANTS_CACHE.cache.clear()
     try:
-        yield
+        with one_thread():
+            yield
     finally:
         setattr(providers, name, original)
         providers.CONSTANTS_CACHE.cache.clear()

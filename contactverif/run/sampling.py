@@ -15,6 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.run.driver import CaseSource
+from contactverif.run.one_thread import one_thread
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +41,10 @@ class Sampling:
 
     def source(self, question: Property) -> CaseSource | None:
         """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
-        if not question.bodies:
-            return cast("CaseSource | None", question.cases(self.interface))
-        if self.interface is not None and self.scene is None:
+        if question.bodies and self.interface is not None and self.scene is None:
             return None
-        return cast("CaseSource | None", question.cases(self.scene))
+        with one_thread():
+            return cast("CaseSource | None", question.cases(self.scene if question.bodies else self.interface))
 
     def key(self, question: Property) -> str:
         """Return the seed of the cases of a property, which properties with the same strategy have in common."""
