@@ -92,4 +92,5 @@ FLAT_RESULTANT = Property(
     measure=measure_resultant,
     promise=lambda traits: None if refuse_unknown_total(traits) else True,
     applicable=refuse_unknown_total,
+    usual_undecided=0.004,  # Eleven of 3330 cases of right formulations, all of one that takes the last of ties.
 )
