@@ -204,6 +204,8 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
     """
     from contactverif.run.journal_folder import journal_folder, read_plan
 
+    if output.is_dir():
+        raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
     folder = journal_folder(output)
     if output.exists() and not folder.exists():
         raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")

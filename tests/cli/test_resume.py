@@ -99,6 +99,14 @@ def test_a_comparison_that_is_killed_goes_on(ask: Ask, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"r.nc", "r.html", "whole.nc"}
 
 
+@pytest.mark.parametrize("command", ["verify", "compare"])
+@pytest.mark.parametrize("folder", ["/", "."])
+def test_a_folder_is_no_report_of_a_run(ask: Ask, command: str, folder: str) -> None:
+    answer = ask(command, "--resume", folder)
+    needed = "needed the report of a run that was stopped"
+    assert (answer.status, answer.err) == (2, f"contactverif: --resume: found {folder}, a folder; {needed}\n")
+
+
 def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
     answer = ask("verify", "--resume", tmp_path / "none.nc")
     assert (
