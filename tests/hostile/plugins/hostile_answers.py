@@ -106,7 +106,7 @@ class _LyingArray(np.ndarray):
     """An array that exits when it is copied into another one."""
 
     def __array_finalize__(self, parent: Any) -> None:
-        if next(_calls) > 20:
+        if next(_calls) > 2:
             os._exit(0)
 
 
@@ -134,7 +134,9 @@ class _AlwaysEqual(np.ndarray):
 @answers("residual")
 def equals_everything(answer: Any) -> Any:
     """Answer wrong forces in a subclass of an array that says that it equals everything."""
-    return (1.5 * answer).view(_AlwaysEqual)
+    wrong = np.array(answer)
+    wrong[..., 0] += 1.0
+    return wrong.view(_AlwaysEqual)
 
 
 class _LyingShape(np.ndarray):

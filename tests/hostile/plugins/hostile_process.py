@@ -133,7 +133,7 @@ def vandal(right: Any, *arguments: Any) -> Any:
     return right()
 
 
-@before("residual", ends=LIKE_NTS)
+@before("residual", ends=EITHER)
 def trace() -> None:
     """Set a trace function that raises in every function of somebody else."""
 
@@ -236,7 +236,7 @@ def other_folder() -> None:
     os.rmdir(folder)
 
 
-@before("residual", ends=LIKE_NTS)
+@before("residual", ends=EITHER)
 def other_root() -> None:
     """Make an empty folder the root of all files, which only the root user may do."""
     with suppress(OSError):
