@@ -26,14 +26,14 @@ MEANINGS = {
     "force": "force on top of the disk, per unit of thickness",
 }
 _MARGIN = 4
-_WIDEST = 96  # The largest number of columns of running text.
+_NARROWEST, _WIDEST = 40, 96  # Columns of running text, whatever the terminal has.
 
 
 class Gallery:
     """All scenes, then the meaning of their options."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        width = min(options.max_width, _WIDEST)
+        width = max(_NARROWEST, min(options.max_width, _WIDEST))
         for name in SCENES:
             yield from _scene(name, width)
         yield from _options(width)

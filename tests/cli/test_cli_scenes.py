@@ -56,6 +56,13 @@ CASE = "vts-me.patch.flat.transmission"
 # scenes
 
 
+@pytest.mark.parametrize("columns", [1, 10])
+def test_a_terminal_that_is_too_narrow_cuts_what_it_shows(ask: Ask, columns: int) -> None:
+    answer = ask("scenes", columns=columns)
+    assert (answer.status, answer.err) == (0, "")
+    assert answer.out.startswith("a")
+
+
 @pytest.mark.parametrize("columns", [60, 80, 140])
 def test_scenes_lists_all_with_drawings_and_fits(ask: Ask, columns: int) -> None:
     answer = ask("scenes", columns=columns)
