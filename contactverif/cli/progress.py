@@ -41,11 +41,13 @@ class Bar:
     def __enter__(self) -> Bar:
         if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
             self._previous_handler = signal.signal(signal.SIGINT, self._interrupt)
-        self._progress.start()
+        if not self._progress.disable:
+            self._progress.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self._progress.stop()
+        if not self._progress.disable:  # Old versions of rich end one that never started with an empty line.
+            self._progress.stop()
         if self._previous_handler is not None:
             signal.signal(signal.SIGINT, self._previous_handler)
 
