@@ -65,6 +65,7 @@ _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlie
 _STOPPED = 130  # The exit status after Ctrl-C, of typer and of shells.
 _CLOSED_PIPE = 128 + signal.SIGPIPE
 _MISUSE = 2
+_MOST_COLUMNS = 10_000
 
 
 def _print_version(wanted: bool) -> None:
@@ -88,6 +89,7 @@ def _options_of_all_commands(
 def main() -> None:
     """Run the command `contactverif`; a user's mistake is one line and exit status 2, never a traceback."""
     _open_closed_streams()
+    _limit_columns()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # A terminal that has no ≤ shows a question mark.
             stream.reconfigure(errors="replace")
@@ -110,6 +112,13 @@ def _open_closed_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115, since it stays open to the end
+
+
+def _limit_columns() -> None:
+    """Take a terminal that says it is wider than any for a wide one, since the lines of a help page fill it."""
+    columns = os.environ.get("COLUMNS", "")
+    if columns.isdecimal() and (len(columns) > len(str(_MOST_COLUMNS)) or int(columns) > _MOST_COLUMNS):
+        os.environ["COLUMNS"] = str(_MOST_COLUMNS)
 
 
 def _exit_status(error: Exception) -> int:

@@ -206,7 +206,7 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
 
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
-    folder = journal_folder(output)
+    folder = journal_folder(output, "--resume")
     if output.exists() and not folder.exists():
         raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")
     plan = read_plan(folder, "--resume")

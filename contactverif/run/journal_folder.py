@@ -7,6 +7,7 @@ folder is there with its whole header, or it is not there.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import struct
@@ -30,8 +31,19 @@ _FRAME = struct.Struct("<II")
 _Kind = TypeVar("_Kind", bound=msgspec.Struct)
 
 
-def journal_folder(output: Path) -> Path:
-    """Return the folder of the journal of an output file; of a link, that beside the file itself."""
+def journal_folder(output: Path, argument: str = "--out") -> Path:
+    """Return the folder of the journal of an output file; of a link, that beside the file itself.
+
+    Raises
+    ------
+    MisuseError
+        If the file is a link that leads to itself.
+    """
+    try:
+        output.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise MisuseError(argument, f"{output.name}, a link that leads to itself", "another name") from None
     target = output.resolve()
     return target.with_name(target.name + SUFFIX)
 

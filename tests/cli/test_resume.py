@@ -107,6 +107,14 @@ def test_a_folder_is_no_report_of_a_run(ask: Ask, command: str, folder: str) -> 
     assert (answer.status, answer.err) == (2, f"contactverif: --resume: found {folder}, a folder; {needed}\n")
 
 
+@pytest.mark.parametrize("option", ["--out", "--resume"])
+def test_a_link_that_leads_to_itself_is_one_line(ask: Ask, option: str, tmp_path: Path) -> None:
+    (tmp_path / "loop.nc").symlink_to("loop.nc")
+    answer = ask("verify", *(["nts"] if option == "--out" else []), option, tmp_path / "loop.nc")
+    words = "found loop.nc, a link that leads to itself; needed another name"
+    assert (answer.status, answer.err) == (2, f"contactverif: {option}: {words}\n")
+
+
 def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_path: Path) -> None:
     answer = ask("verify", "--resume", tmp_path / "none.nc")
     assert (

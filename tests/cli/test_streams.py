@@ -25,6 +25,13 @@ def test_a_terminal_without_greek_is_shown_question_marks() -> None:
     assert answer.stdout.isascii()
 
 
+@pytest.mark.parametrize("columns", ["99999999", "9" * 5000])
+def test_no_terminal_is_so_wide(columns: str) -> None:
+    answer = run_command("score", "--help", env={**os.environ, "COLUMNS": columns})
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert max(map(len, answer.stdout.splitlines())) <= 10_000
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
 def test_a_full_disk_is_one_line() -> None:
     with open("/dev/full", "w") as full:
