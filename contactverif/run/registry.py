@@ -34,6 +34,7 @@ _SHORT_NAME = f"at most {LONGEST_NAME} characters"
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
+_MARKS = ":/"  # They stand before options, and before the formulation that is wrapped.
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
 _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
@@ -112,12 +113,13 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
     Raises
     ------
     MisuseError
-        If the factory raises one, as it does for a wrong value of an option.
+        If the factory raises one about a name with options or with an inner formulation. In a mere name there is
+        nothing that a user could have done wrong, so the others are judged.
     """
     try:
         return Subject(name, make)
     except ContractError as error:
-        if isinstance(error.__cause__, MisuseError):
+        if isinstance(error.__cause__, MisuseError) and any(mark in name for mark in _MARKS):
             raise error.__cause__ from None
         return NotLoaded(name, str(error))
 

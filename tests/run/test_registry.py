@@ -296,6 +296,18 @@ def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "AttributeError" in formulation.reason
 
 
+def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> None:
+    def refusing(*, penalty: float) -> Any:
+        raise MisuseError("option", "nothing", "another plugin")
+
+    formulation = subject_of("refusing", refusing)
+    assert isinstance(formulation, NotLoaded)
+    assert "found nothing; needed another plugin" in formulation.reason
+    for name in ("refusing:n=0", "refusing/other"):
+        with pytest.raises(MisuseError, match="needed another plugin"):
+            subject_of(name, refusing)
+
+
 @pytest.mark.parametrize(
     ("traits", "message"),
     [
