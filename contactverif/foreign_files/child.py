@@ -31,6 +31,9 @@ import psutil
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"
 _READ, _FAILED = b"+", b"-"  # The first byte of an answer.
 _LONGEST_REASON = 300  # Characters of a message from a library.
+# meshio reads a million nodes of a text format in 10 s, and the arrays of so many are 0.1 GB. A report with a million
+# cases takes half a minute and 1 GB. Both files have tens of megabytes.
+_LEAST_SECONDS, _BYTES_A_SECOND, _MEGABYTES = 20.0, 1e6, 4096
 _CHUNK = 1 << 20  # Bytes that are received at once.
 
 
@@ -52,6 +55,11 @@ class Limits:
 
     seconds: float
     megabytes: int
+
+
+def limits_for(size: int) -> Limits:
+    """Return the limits for a file of so many bytes; a whole one needs a small part of them, also on a slow machine."""
+    return Limits(_LEAST_SECONDS + size / _BYTES_A_SECOND, _MEGABYTES)
 
 
 def read_in_child(reader: str, path: str, limits: Limits) -> bytes:

@@ -18,12 +18,10 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.child import Limits, ReadError, read_in_child
+from contactverif.foreign_files.child import ReadError, limits_for, read_in_child
 from contactverif.foreign_files.ordinary import check_ordinary
 from contactverif.foreign_files.packed import PackedArray
 
-# meshio reads a million nodes of a text format in 10 s, and the arrays of so many are 0.1 GB.
-LIMITS = Limits(seconds=120.0, megabytes=4096)
 # The cell data in which formats that number their groups store the numbers.
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "ugrid:ref", "su2:tag", "nastran:ref", "avsucd:material")
 _LONGEST_WARNING = 2000  # Characters of what meshio prints.
@@ -93,9 +91,9 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
         If it cannot be read within the limits, or is no mesh.
     """
     name = os.fspath(path)
-    check_ordinary(path, "--mesh", "a mesh file")
+    size = check_ordinary(path, "--mesh", "a mesh file").st_size
     try:
-        packed = read_in_child(f"{__name__}:pack_mesh", os.path.abspath(name), LIMITS)
+        packed = read_in_child(f"{__name__}:pack_mesh", os.path.abspath(name), limits_for(size))
         stored = msgspec.msgpack.decode(packed, type=_PackedMesh)
         mesh = _unpack(stored)
     except ReadError as error:

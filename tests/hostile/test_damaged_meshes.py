@@ -13,6 +13,7 @@ import pytest
 from damaged_meshes import FORMATS, KINDS, NAMES, strange_files, write_meshes
 
 from contactverif.contract.errors import MisuseError
+from contactverif.foreign_files.child import Limits
 from contactverif.meshes import plain_mesh
 from contactverif.meshes.mesh_file import read_interface
 from contactverif.meshes.plain_mesh import read_mesh
@@ -91,7 +92,7 @@ def test_a_format_that_needs_a_package_names_it(tmp_path: Path, monkeypatch: pyt
 
 def test_a_reader_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_text(tmp_path / "a.msh", "1 1 2 1 1 1 2\n")
-    monkeypatch.setattr(plain_mesh, "LIMITS", plain_mesh.Limits(0.0, 500))
+    monkeypatch.setattr(plain_mesh, "limits_for", lambda size: Limits(0.0, 500))
     with pytest.raises(MisuseError, match=r"cannot read \(reading it takes longer than 0 s\)"):
         read_mesh(path)
 

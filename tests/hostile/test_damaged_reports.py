@@ -15,6 +15,7 @@ from damaged_reports import TREES, Campaign, lie_about_sizes, write_report
 
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
+from contactverif.foreign_files.child import Limits
 from contactverif.scenes.catalogue import load_scene
 from contactverif_reports.netcdf import bench_file, stored_groups
 from contactverif_reports.netcdf.bench_file import read_bench
@@ -66,7 +67,7 @@ def test_a_size_that_lies_takes_no_memory(campaign: Campaign) -> None:
 
 
 def test_the_limits_of_the_child_hold_for_reports(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stored_groups, "LIMITS", stored_groups.Limits(0.0, 500))
+    monkeypatch.setattr(stored_groups, "limits_for", lambda size: Limits(0.0, 500))
     with pytest.raises(MisuseError, match="takes longer than 0 s"):
         read_run(campaign.good)
 

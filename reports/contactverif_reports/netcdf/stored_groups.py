@@ -23,12 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.child import Limits, ReadError, read_in_child
+from contactverif.foreign_files.child import ReadError, limits_for, read_in_child
 from contactverif.foreign_files.ordinary import check_ordinary
 from contactverif.foreign_files.packed import PackedArray
 
-# The file with the most cases that we keep is read in 1 s. One with a million cases takes half a minute and 1 GB.
-LIMITS = Limits(seconds=120.0, megabytes=4096)
 # zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20
 LONGEST_TEXT = 1 << 20  # Characters of an attribute. The longest that we write say what each formulation provides.
@@ -119,7 +117,7 @@ def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, dec
             reason = "is empty" if not size else "is no netCDF file, or one that is damaged at its beginning"
             raise MisuseError(argument, f"{name}, which {reason}", needed)
     try:
-        packed = read_in_child(f"{__name__}:pack_groups", os.path.abspath(name), LIMITS)
+        packed = read_in_child(f"{__name__}:pack_groups", os.path.abspath(name), limits_for(size))
         groups = msgspec.msgpack.decode(packed, type=dict[str, _PackedGroup])
         return {path: group.unpack(decode=decode) for path, group in groups.items()}
     except (ReadError, msgspec.DecodeError, ValueError) as error:
