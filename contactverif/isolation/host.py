@@ -8,7 +8,7 @@ started anew at the next question.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from time import monotonic
 from typing import Any
 
@@ -98,8 +98,6 @@ class Host:
         The number of times that it was started.
     opaque : bool | None
         Pairings have a handle, which stays in the process; None until the first one is known.
-    last_words : bytes
-        The end of what the process printed.
     last_question : float
         The time of the last question, by the clock of `time.monotonic`.
     """
@@ -116,7 +114,7 @@ class Host:
         self.methods: frozenset[str] = frozenset()
         self.opaque: bool | None = None
         self.n_ended = self.n_hangs = self.n_started = 0
-        self.last_words = b""
+        self._last_words = b""
         self.last_question = 0.0
 
     def load(self) -> Reply:
@@ -232,7 +230,7 @@ class Host:
                 question.answer = error if question.answer is None else question.answer
             self.n_ended += 1
             self.n_hangs += error.cause == "hang"
-            self._note_output()
+            self.read_last_words()
             self._process = None
 
     def _exchange(self, requests: Sequence[Request], questions: Sequence[Question]) -> None:
@@ -252,15 +250,17 @@ class Host:
         for question, reply in zip(questions, replies, strict=True):
             question.answer = reply
 
-    def _note_output(self) -> None:
+    def read_last_words(self) -> bytes:
+        """Return the end of what the process has printed, or the one before it."""
         if self._process is not None:
-            self.last_words = self._process.output.last or self.last_words
+            self._last_words = self._process.output.last or self._last_words
+        return self._last_words
 
     def end(self) -> None:
         """End the process."""
         if self._process is not None:
             self._process.end()
-            self._note_output()
+            self.read_last_words()
             self._process = None
 
 
@@ -277,6 +277,7 @@ def raise_failure(failure: Failure, *, loading: bool = False) -> None:
 
 
 _HOSTS: dict[tuple[str, str, Limits, bool], Host] = {}
+_foreign_words: dict[str, bytes] = {}
 
 
 def host_of(loader: str, name: str, limits: Limits, *, second: bool = False) -> Host:
@@ -300,6 +301,17 @@ def _make_room(name: str) -> None:
         host.end()
 
 
+def last_words() -> dict[str, bytes]:
+    """Return the end of what the processes of this process's hosts have printed, by the name of the formulation."""
+    words = {name: host.read_last_words() for (_, name, _, _), host in _HOSTS.items()}
+    return {name: printed for name, printed in words.items() if printed}
+
+
+def note_last_words(words: Mapping[str, bytes]) -> None:
+    """Keep what plugins have printed whose processes belong to another process of the judge."""
+    _foreign_words.update(words)
+
+
 def end_all() -> dict[str, bytes]:
     """End the processes of all plugins, and return the last words that those of each name printed."""
     for host in _HOSTS.values():
@@ -307,6 +319,7 @@ def end_all() -> dict[str, bytes]:
     JUDGE.let_go()
     if _HOSTS:
         end_marked()
-    printed = {name: host.last_words for (_, name, _, _), host in _HOSTS.items() if host.last_words}
+    printed = last_words() | _foreign_words  # Where there are workers, this process has hardly asked anything.
     _HOSTS.clear()
+    _foreign_words.clear()
     return printed

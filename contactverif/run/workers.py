@@ -20,6 +20,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from contactverif.contract.errors import ContactverifError, MisuseError
+from contactverif.isolation.host import last_words, note_last_words
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.packing import pack, unpack
 
@@ -187,7 +188,11 @@ class Team:
             raise _make_error() from error
         if isinstance(answer, _Here):
             return answer.result
-        return function(*arguments, **here) if answer == _NOT_HERE else unpack(answer)
+        if answer == _NOT_HERE:
+            return function(*arguments, **here)
+        result, words = unpack(answer)
+        note_last_words(words)
+        return result
 
 
 class _Here:
@@ -198,12 +203,12 @@ class _Here:
 
 
 def _do(packed: bytes) -> bytes:
-    """Do a piece in a worker."""
+    """Do a piece in a worker, and return its result with what plugins have printed there."""
     try:
         function, arguments = unpack(packed)
     except Exception:  # A module, or a class in a notebook, that is not here.
         return _NOT_HERE
-    return pack(function(*arguments))
+    return pack((function(*arguments), last_words()))
 
 
 def _make_error() -> WorkerError:

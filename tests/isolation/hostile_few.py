@@ -221,6 +221,13 @@ class Shouts(Springs):
         raise ValueError("x" * 20_000_000)
 
 
+class Prints(Springs):
+    def residual(self, interface, pairing, z):
+        print("printed", flush=True)
+        os.write(2, b"and written\n")
+        return super().residual(interface, pairing, z)
+
+
 class LeavesChildren(Springs):
     """It starts a daemon in a session of its own."""
 

@@ -213,6 +213,13 @@ def test_a_formulation_that_cannot_be_imported_is_not_loaded() -> None:
     assert isinstance(load_remote("isolation.hostile_few:load", "no_such_class", QUICK), NotLoaded)
 
 
+def test_what_it_prints_is_kept_wherever_its_process_is() -> None:
+    ask(load_remote(LOADER, "Prints", QUICK))
+    host.note_last_words({"Other": b"in a worker"})
+    assert host.end_all() == {"Prints": b"printed\nand written\n", "Other": b"in a worker"}
+    assert host.end_all() == {}
+
+
 def test_nothing_it_started_is_left_behind() -> None:
     ask(load_remote(LOADER, "LeavesChildren", QUICK))
     for _ in range(500):

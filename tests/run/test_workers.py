@@ -159,3 +159,11 @@ def test_an_interrupt_in_the_parent_ends_workers_that_hear_none_themselves(pool:
     for worker in started:
         worker.join()
         assert worker.exitcode != 0
+
+
+def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "last_words", lambda: {"loud": b"words"})
+    result, words = unpack(workers._do(pack((abs, (-1,)))))
+    assert (result, words) == (1, {"loud": b"words"})
+    team = workers.Team(pool)
+    assert team.result(team.submit(abs, (-2,)), abs, (-2,)) == 2
