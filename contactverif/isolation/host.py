@@ -319,7 +319,7 @@ def end_all() -> dict[str, bytes]:
     JUDGE.let_go()
     if _HOSTS:
         end_marked()
-    printed = last_words() | _foreign_words  # Where there are workers, this process has hardly asked anything.
+    printed = last_words() | _foreign_words
     _HOSTS.clear()
     _foreign_words.clear()
     return printed
