@@ -16,9 +16,8 @@ import numpy as np
 
 from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
-from contactverif.run.registry import load_properties
+from contactverif.run.registry import installed_properties, load_property
 
 
 class CaseChunk:
@@ -100,8 +99,8 @@ def _read_only(data: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray[An
 @cache
 def _find_registered(property_id: str) -> Any:
     """Return the installed property of that id, or None."""
-    try:
-        (question,) = load_properties([property_id])
-    except MisuseError:
-        return None
-    return question
+    installed = _read_installed()
+    return load_property(property_id, installed) if property_id in installed else None
+
+
+_read_installed = cache(installed_properties)

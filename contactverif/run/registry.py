@@ -12,7 +12,7 @@ from __future__ import annotations
 import difflib
 import inspect
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -58,7 +58,8 @@ def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
         The limits of the process that loads them; None to load them in this one.
     """
     if limits is None:
-        return tuple(name for name in formulation_names() if _load_wrapper(name) is None)
+        installed = _entries_by_name(FORMULATIONS)
+        return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
     names = formulation_names()
     items = survey(_SURVEYOR, names, limits)
     return tuple(name for name, item in zip(names, items, strict=True) if not isinstance(item, Wrapper))
@@ -66,7 +67,7 @@ def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
 
 def property_ids() -> tuple[str, ...]:
     """Return the ids of the installed properties, sorted; nothing is loaded."""
-    return tuple(_entries_by_name(PROPERTIES))
+    return tuple(installed_properties())
 
 
 def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
@@ -155,7 +156,8 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     MisuseError
         If a pattern matches nothing.
     """
-    return tuple(_load_property(name) for name in matching_ids(globs))
+    installed = installed_properties()
+    return tuple(load_property(name, installed) for name in _matches(globs, installed))
 
 
 def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
@@ -166,11 +168,22 @@ def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
     MisuseError
         If a pattern matches nothing.
     """
-    names = property_ids()
+    return _matches(globs, property_ids())
+
+
+def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in names):
             raise unknown_name_error("property", glob, names)
     return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
+
+
+def installed_properties() -> Mapping[str, Sequence[EntryPoint]]:
+    """Return the entry points of the installed properties by id, sorted.
+
+    To read them takes longer than to load a property, so whoever loads many reads them once.
+    """
+    return _entries_by_name(PROPERTIES)
 
 
 def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
@@ -201,8 +214,9 @@ def _origin(entry: EntryPoint) -> str:
     return f"{entry.value} of {entry.dist.name}" if entry.dist is not None else entry.value
 
 
-def _load_property(name: str) -> Property | NotLoaded:
-    loaded = _load_entry(name, _entries_by_name(PROPERTIES)[name])
+def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> Property | NotLoaded:
+    """Load the property of that id, one of `installed_properties`."""
+    loaded = _load_entry(name, installed[name])
     if isinstance(loaded, NotLoaded | Property) and getattr(loaded, "id", name) == name:
         return loaded
     description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
@@ -212,7 +226,7 @@ def _load_property(name: str) -> Property | NotLoaded:
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
     """Load what is installed under a name, with the defaults of its options."""
-    wrapper = _load_wrapper(name)
+    wrapper = _load_wrapper(name, _entries_by_name(FORMULATIONS)[name])
     if wrapper is not None:
         return wrapper
     try:
@@ -221,9 +235,9 @@ def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
         return NotLoaded(name, str(error))
 
 
-def _load_wrapper(name: str) -> Wrapper | None:
+def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
     """Return the wrapper of that name; None if the name is that of a formulation or does not load."""
-    make = _load_entry(name, _entries_by_name(FORMULATIONS)[name])
+    make = _load_entry(name, entries)
     if not callable(make) or not _wraps(_parameters(make)):
         return None
     return Wrapper(name, (inspect.getdoc(make) or "").partition("\n")[0].rstrip("."))
