@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings
 
 import meshio
 import msgspec
@@ -188,7 +189,8 @@ def _read(path: Path) -> tuple[Any, str]:
     try:
         with path.open("rb") as stream:
             is_gmsh = stream.read(1) == b"$"  # Ansys uses the suffix .msh too, and meshio would try that first.
-        with redirect_stdout(output), redirect_stderr(warnings):
+        # What Python itself warns of tells of meshio's code and not of the file.
+        with redirect_stdout(output), redirect_stderr(warnings), catch_warnings(action="ignore"):
             return meshio.read(path, file_format="gmsh" if is_gmsh else None), warnings.getvalue()
     except SystemExit as error:  # meshio prints and exits if a reader gives up.
         raise ValueError(output.getvalue() + warnings.getvalue()) from error

@@ -77,6 +77,13 @@ def test_cells_name_points_that_are_there(tmp_path: Path) -> None:
             read_mesh(tmp_path / "a.vtu")
 
 
+def test_what_python_warns_of_in_a_library_is_not_shown(tmp_path: Path) -> None:
+    path = tmp_path / "a.mesh"
+    # numpy warns where the number of a point is not whole.
+    path.write_text("MeshVersionFormatted 2\nDimension 2\nVertices\n2\n0 0 1\n1 0 nan\nEdges\n1\n1 2 1\nEnd\n")
+    assert read_mesh(path).warnings == ""
+
+
 def test_points_are_numbers(tmp_path: Path) -> None:
     path = write_text(tmp_path / "a.msh", "1 1 2 1 1 1 2\n2 1 2 2 2 2 3\n", "1 0 0 0\n2 nan 0 0\n3 1 1 0\n")
     with pytest.raises(MisuseError, match="--mesh: found NaN or infinity among its coordinates"):

@@ -11,7 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 from damage import BYTES
-from damaged_reports import TREES, Campaign, lie_about_sizes, write_report
+from damaged_reports import TREES, Campaign, lie_about_sizes, write_report, write_tree
 
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
@@ -86,6 +86,16 @@ def test_counts_that_contradict_each_other_are_damage(campaign: Campaign) -> Non
                 file.setncattr(change, 99)
         with pytest.raises(MisuseError, match=words):
             read_run(path)
+
+
+def test_a_report_without_its_numbers_of_segments_is_damage(campaign: Campaign) -> None:
+    tree = dict(campaign.tree)
+    place = next(place for place, (variables, _) in tree.items() if "n_slave_segments" in variables)
+    variables, attributes = tree[place]
+    tree[place] = {name: entry for name, entry in variables.items() if name != "n_slave_segments"}, attributes
+    write_tree(tree, campaign.folder / "without.nc")
+    with pytest.raises(MisuseError, match="which cannot be read .'n_slave_segments' is missing."):
+        read_run(campaign.folder / "without.nc")
 
 
 @pytest.mark.parametrize("kind", BYTES)

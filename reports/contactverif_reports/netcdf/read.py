@@ -114,13 +114,22 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
     except _DAMAGE as error:
         if isinstance(error, MisuseError) and error.argument == _ARGUMENT:
             raise
-        cause = error.found if isinstance(error, MisuseError) else error
-        description = f"{name}, which cannot be read ({type(error).__name__}: {_one_line(cause)})"
+        description = f"{name}, which cannot be read ({_describe(error)})"
         raise MisuseError(_ARGUMENT, description, "an undamaged report") from error
 
 
-def _one_line(error: object) -> str:
-    return " ".join(str(error).split())[:_LONGEST_REASON]
+def _describe(error: Exception) -> str:
+    """Return in one line what is wrong with a report, which a part of the reader has said by an error."""
+    match error:
+        case KeyError():
+            words = f"{error} is missing"
+        case MisuseError():
+            words = error.found
+        case ValueError():
+            words = f"{error}"
+        case _:
+            words = f"{type(error).__name__}: {error}"
+    return " ".join(words.split())[:_LONGEST_REASON]
 
 
 def _check_schema(root: Group, path: str) -> None:

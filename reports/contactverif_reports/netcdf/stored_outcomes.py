@@ -93,7 +93,7 @@ class OutcomeArrays:
         lacks_tolerance = (self._values != schema.NOT_MEASURED) & (self._tolerances == schema.NOT_MEASURED)
         if lacks_tolerance[planned & measured].any():
             raise ValueError(f"a value {place} has no tolerance")
-        if self._has("n_slave_segments"):
+        if self._dims:
             kinds = self._case_kinds[planned]
             if ((kinds < -1) | (kinds >= len(self._kinds) - 1)).any():
                 raise ValueError(f"the kinds {place} hold a code without a meaning")
@@ -102,7 +102,7 @@ class OutcomeArrays:
 
     def _read_summaries(self) -> None:
         self._parameters = _labels(self._dataset, "parameter")
-        if not self._has("n_slave_segments"):  # Whole cases stand elsewhere.
+        if not self._dims:  # The whole case of a single outcome stands elsewhere.
             return
         self._counts = np.column_stack([self._read("n_slave_segments"), self._read("n_master_segments")])
         columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
