@@ -94,7 +94,7 @@ def test_a_report_without_its_numbers_of_segments_is_damage(campaign: Campaign) 
     variables, attributes = tree[place]
     tree[place] = {name: entry for name, entry in variables.items() if name != "n_slave_segments"}, attributes
     write_tree(tree, campaign.folder / "without.nc")
-    with pytest.raises(MisuseError, match="which cannot be read .'n_slave_segments' is missing."):
+    with pytest.raises(MisuseError, match=r"which cannot be read \('n_slave_segments' is missing\)"):
         read_run(campaign.folder / "without.nc")
 
 
