@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,18 +13,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.output_files import MARKDOWN, PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.shared_options import complete_formulation
+from contactverif.cli.run_endings import show_what_plugins_printed
+from contactverif.cli.shared_options import IsolationOptions, complete_formulation
 from contactverif.cli.verify_command import select_names
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
+    from contactverif.isolation.limits import Limits
+    from contactverif.studies.bench.bench_plan import BenchPlan
     from contactverif_reports.bench.results import BenchResults
     from contactverif_reports.bench.slowdown import Slowdown
 
+_CALLS_OF_A_SOLUTION = 10  # A solution takes many calls; so many times the limit of one is far beyond all of them.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def bench(
+    *,
     names: Annotated[
         list[str] | None,
         typer.Argument(
@@ -56,17 +62,21 @@ def bench(
     jobs: Annotated[
         int, typer.Option("--jobs", "-j", help="1: solutions side by side would disturb their times.", metavar="N")
     ] = 1,
+    isolation: IsolationOptions,
 ) -> None:
     """Measure speed against error, on scenes whose exact solution is known.
 
     All formulations solve the same scenes on meshes fine and coarse, at
     penalties soft to stiff, in turns, on one thread. Runs without a
-    solution count as infinitely slow. While it runs, FILE.nc.journal keeps
-    what is finished: the same command goes on where it was stopped.
+    solution count as infinitely slow. A plugin solves in a process of its
+    own, and may take ten times --time-limit for a solution. While it runs,
+    FILE.nc.journal keeps what is finished: the same command goes on where
+    it was stopped.
 
     \bExit status
       0  measured; with --against, nothing became slower
-      1  something became slower by its ratio, or a plugin does not load
+      1  something became slower by its ratio, or a plugin crashes or does
+         not load
       2  the command line is wrong; one line says what is needed
 
     \bExamples
@@ -80,6 +90,7 @@ def bench(
     pinned = pin_threads()
     files = OutputFiles.check(out, (REPORT, PAGE, MARKDOWN))
     folder = PictureFolder.make(pictures)
+    from contactverif.studies.bench.bench_plan import make_plan
     from contactverif_reports.bench.slowdown import slowdowns
     from contactverif_reports.netcdf.bench_file import read_bench
 
@@ -87,12 +98,22 @@ def bench(
     if file := _only_file(names or [], all_):
         results = read_bench(file)
     else:
-        results = _run(select_names(names or [], all_), scene or [], quick, repeats, files)
+        limits = isolation.limits()
+        plan = make_plan(scene or [], quick=quick, repeats=repeats)
+        results = _run(select_names(names or [], all_, limits), plan, limits, files)
         results = _with_facts(results, pinned)
     changes = () if old is None else slowdowns(results, old)
     _write(results, changes, files, folder, file)
     _show(results, changes, files, folder, compared=old is not None)
-    raise typer.Exit(int(any(change.slower for change in changes) or bool(results.not_loaded)))
+    raise typer.Exit(_exit_status(results, changes))
+
+
+def _exit_status(results: BenchResults, changes: Sequence[Slowdown]) -> int:
+    """Return 1 if something became slower, crashed or did not load."""
+    from contactverif_reports.bench.results import Outcome
+
+    crashed = bool((results.outcomes == Outcome.CRASHED).any())
+    return int(crashed or bool(results.not_loaded) or any(change.slower for change in changes))
 
 
 def _with_facts(results: BenchResults, pinned: bool) -> BenchResults:
@@ -118,17 +139,18 @@ def pin_threads() -> bool:
     return True
 
 
-def _run(names: list[str], scenes: list[str], quick: bool, repeats: int, files: OutputFiles) -> BenchResults:
+def _run(names: list[str], plan: BenchPlan, limits: Limits | None, files: OutputFiles) -> BenchResults:
     """Run the bench with a progress bar."""
     from contactverif.cli.progress import Bar
     from contactverif.run.registry import load_formulation
-    from contactverif.studies.bench.bench_plan import make_plan
     from contactverif.studies.bench.bench_study import run_bench
 
-    plan = make_plan(scenes, quick=quick, repeats=repeats)
-    subjects = [load_formulation(name) for name in names]
+    of_solution = None if limits is None else replace(limits, seconds=_CALLS_OF_A_SOLUTION * limits.seconds)
+    subjects = [load_formulation(name, of_solution) for name in names]
     with Bar() as bar:
-        return run_bench(subjects, plan, output=files.paths.get(REPORT), progress=bar.update)
+        results = run_bench(subjects, plan, output=files.paths.get(REPORT), progress=bar.update)
+    show_what_plugins_printed()
+    return results
 
 
 def _write(

@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.output_files import PICTURES, SOLVED_SCENE, OutputFiles
-from contactverif.cli.shared_options import CaseId, complete_formulation
+from contactverif.cli.run_endings import show_what_plugins_printed
+from contactverif.cli.shared_options import CaseId, IsolationOptions, complete_formulation
 
 
 def draw(
+    *,
     report: Annotated[
         Path | None, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")
     ] = None,
@@ -38,6 +40,7 @@ def draw(
             metavar="FILE",
         ),
     ] = None,
+    isolation: IsolationOptions,
 ) -> None:
     """Solve a scene and draw it: deformed bodies, contact pressure, residuals.
 
@@ -60,5 +63,6 @@ def draw(
     files = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE))
     from contactverif.cli.scene_drawing import draw_scene_or_case
 
-    complete = draw_scene_or_case(report, case, scene, formulation or [], files)
+    complete = draw_scene_or_case(report, case, scene, formulation or [], files, isolation.limits())
+    show_what_plugins_printed()
     raise typer.Exit(0 if complete else 1)

@@ -15,6 +15,7 @@ from contactverif.cli.stored_formulation import announce_stored
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
+from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
 from contactverif.run.registry import formulation_names, load_formulation
@@ -28,7 +29,12 @@ _WIDEST = 80  # The largest number of columns of a remark.
 
 
 def draw_scene_or_case(
-    report: Path | None, case_id: str | None, scene: str | None, names: Sequence[str], files: OutputFiles
+    report: Path | None,
+    case_id: str | None,
+    scene: str | None,
+    names: Sequence[str],
+    files: OutputFiles,
+    limits: Limits | None = None,
 ) -> bool:
     """Draw a named scene, or a counterexample of a report.
 
@@ -42,6 +48,8 @@ def draw_scene_or_case(
         The formulations. For a counterexample none means the one that failed.
     files : OutputFiles
         Pictures, and at most one .vtu file.
+    limits : Limits | None
+        The limits of the processes in which the plugins live; None to load them in this process.
 
     Returns
     -------
@@ -61,12 +69,12 @@ def draw_scene_or_case(
         case = load_scene(scene).case()
         if not names:
             raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
-        return _draw_solved(case, names, scene, files)
+        return _draw_solved(case, names, scene, files, limits)
     stored = _read_stored(report, case_id)
     if has_bodies(stored.case):
         names = names or [announce_stored(stored.formulation)]
-        return _draw_solved(stored.case, names, f"{case_id}: {stored.reason}", files)
-    _draw_stored(stored, names, files)
+        return _draw_solved(stored.case, names, f"{case_id}: {stored.reason}", files, limits)
+    _draw_stored(stored, names, files, limits)
     return True
 
 
@@ -103,14 +111,14 @@ def solutions_table(scene: SolvedScene) -> Table:
     return table
 
 
-def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFiles) -> None:
+def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFiles, limits: Limits | None) -> None:
     """Draw a case without bodies, as `replay --out` draws it."""
     if SOLVED_SCENE in files.names:
         raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
     if len(names) > 1:
         raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
     name = names[0] if names else announce_stored(stored.formulation)
-    subject, question = the_formulation(name), the_property(stored.property_id)
+    subject, question = the_formulation(name, limits), the_property(stored.property_id)
     outcome = judge_if_applicable(question, stored.case, subject)
     if not files.paths:
         say(as_text(stored.case))
@@ -119,12 +127,12 @@ def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFile
     files.announce()
 
 
-def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles) -> bool:
+def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles, limits: Limits | None) -> bool:
     """Solve a scene with each formulation and write the files; return whether all could be used."""
     if SOLVED_SCENE in files.names and len(names) > 1:
         file_for_many = f"{files.names[SOLVED_SCENE]} for {len(names)} formulations"
         raise MisuseError("--out", file_for_many, "one --formulation: a .vtu file holds one solution")
-    scene = solve_scene(case, [load_formulation(name) for name in names])
+    scene = solve_scene(case, [load_formulation(name, limits) for name in names])
     if scene.solutions:
         _write_files(scene, title, files)
     if not (scene.solutions and files.paths):

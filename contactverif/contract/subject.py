@@ -110,6 +110,31 @@ class Subject:
         make = getattr(self._make, "second_factory", None)
         return None if make is None else Subject.of_parts(self.name, make, self.traits, self._parts)
 
+    def run_there(self, verb: str, function: str, words: bytes) -> bytes | None:
+        """Call a function of the harness in this formulation's process; return None if it has none of its own.
+
+        Parameters
+        ----------
+        verb : str
+            The word for the call in messages.
+        function : str
+            The function, ``"module:function"``. It gets the formulation as it is there, and the words.
+        words : bytes
+            What it has to know.
+
+        Returns
+        -------
+        bytes | None
+            What it returned. The plugin may have changed it, as it likes.
+
+        Raises
+        ------
+        ContractError
+            If the plugin made an error, or its process ended.
+        """
+        run = getattr(self._make, "run", None)
+        return None if run is None else run(verb, function, words)
+
     @property
     def _parts(self) -> frozenset[str]:
         return self.provides | ({"n_multipliers"} if self.counts_multipliers else frozenset())

@@ -30,8 +30,10 @@ from contactverif.isolation.messages import (
     Make,
     Reply,
     Request,
+    Run,
     Share,
     SharePairing,
+    Words,
     encode,
     pack_array,
 )
@@ -148,11 +150,15 @@ class Host:
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
-        if self._process is None and not isinstance(self._start(), Loaded):
-            raise PluginError("import: it loaded before, and does not any more", "channel")
+        if self._process is None:
+            self._start_again()
         self._number += 1
         self._queue.append(Make(self._number, penalty))
         return self._number, self.n_started
+
+    def _start_again(self) -> None:
+        if not isinstance(self._start(), Loaded):
+            raise PluginError("import: it loaded before, and does not any more", "channel")
 
     @property
     def has_process(self) -> bool:
@@ -185,6 +191,28 @@ class Host:
         self._queue.append(Ask(verb, formulation, of_interface, of_pairing, packed, self._number))
         self._questions.append(question)
         return question, self._number
+
+    def run(self, verb: str, function: str, words: bytes) -> bytes:
+        """Call a function of the harness (``"module:function"``) there, and return its words.
+
+        The function gets the formulation and `words`. The call has the time limit of one call, and `verb` names it.
+
+        Raises
+        ------
+        ContractError
+            If the plugin made an error, or its process ended.
+        """
+        if self._process is None:
+            self._start_again()
+        self.flush()
+        question = Question(verb)
+        self._queue.append(Run(function, words))
+        self._questions.append(question)
+        self.flush()
+        if isinstance(question.answer, Words):
+            return question.answer.words
+        question.result()
+        raise PluginError(f"{verb}: an answer to another question", "channel")
 
     def keep(self, item: Interface | Pairing, number: int) -> None:
         """Note that the process keeps something under a number."""
@@ -242,7 +270,7 @@ class Host:
             return
         unanswered = iter(questions)
         for request in requests:
-            waiting = [next(unanswered)] if isinstance(request, Ask | Load) else []
+            waiting = [next(unanswered)] if isinstance(request, Ask | Load | Run) else []
             self._answer(waiting, self._process.ask(encode([request]), [question.verb for question in waiting]))
 
     @staticmethod

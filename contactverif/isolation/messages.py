@@ -84,6 +84,13 @@ class Ask(msgspec.Struct, array_like=True, tag=6):
     keep: int
 
 
+class Run(msgspec.Struct, array_like=True, tag=7):
+    """Call a function of the harness (``"module:function"``) with the formulation. The answer is `Words`."""
+
+    function: str
+    words: bytes
+
+
 class Answer(msgspec.Struct, array_like=True, tag=0):
     """The arrays of an answer by name, and the seconds that the call took."""
 
@@ -120,8 +127,14 @@ class Wraps(msgspec.Struct, array_like=True, tag=4):
     summary: str
 
 
-Request = Load | Survey | Make | Share | SharePairing | Forget | Ask
-Reply = Answer | Failure | Loaded | Unloaded | Wraps
+class Words(msgspec.Struct, array_like=True, tag=5):
+    """The words that a function of the harness has returned there."""
+
+    words: bytes
+
+
+Request = Load | Survey | Make | Share | SharePairing | Forget | Ask | Run
+Reply = Answer | Failure | Loaded | Unloaded | Wraps | Words
 
 _encoder = msgspec.msgpack.Encoder()
 _request_decoder: msgspec.msgpack.Decoder[list[Request]] = msgspec.msgpack.Decoder(list[Request])

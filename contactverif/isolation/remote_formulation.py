@@ -54,6 +54,10 @@ class RemoteFactory:
         """The factory of the same formulation in a second process."""
         return None if self._second else RemoteFactory(*self._key, second=True)
 
+    def run(self, verb: str, function: str, words: bytes) -> bytes:
+        """Call a function of the harness in the formulation's process, see `Host.run`."""
+        return self.host.run(verb, function, words)
+
     def __call__(self, *, penalty: float) -> RemoteFormulation:
         """Return the formulation with a penalty."""
         return RemoteFormulation(self.host, penalty)

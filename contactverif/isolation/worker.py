@@ -38,9 +38,11 @@ from contactverif.isolation.messages import (
     PackedArray,
     Reply,
     Request,
+    Run,
     Share,
     SharePairing,
     Unloaded,
+    Words,
     Wraps,
     decode_requests,
     encode,
@@ -115,7 +117,13 @@ class Desk:
                     self._store.pop(number, None)
                 return None
         try:
-            return self._ask(request) if isinstance(request, Ask) else self._load(request.loader, request.name)
+            match request:
+                case Ask():
+                    return self._ask(request)
+                case Run(function, words):
+                    return Words(_find(function)(self._subject, words))
+                case _:
+                    return self._load(request.loader, request.name)
         except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
             return _failure(error)
 
@@ -144,9 +152,7 @@ class Desk:
         return item
 
     def _load(self, loader: str, name: str) -> Reply:
-        module, _, function = loader.partition(":")
-        load: Callable[[str], Any] = getattr(import_module(module), function)
-        item = load(name)
+        item = _find(loader)(name)
         if isinstance(item, NotLoaded):
             return Unloaded(item.reason)
         if not isinstance(item, Subject):
@@ -178,6 +184,13 @@ class Desk:
         pairing = None if ask.pairing is None else self._get(ask.pairing)
         answer = getattr(formulation, ask.verb)(interface, pairing, z)
         return Answer(_PACKERS[ask.verb](answer), formulation.plugin.seconds)
+
+
+def _find(path: str) -> Callable[..., Any]:
+    """Return a function of the harness, ``"module:function"``."""
+    module, _, name = path.partition(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
 
 
 class Stopwatch:

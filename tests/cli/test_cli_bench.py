@@ -13,7 +13,7 @@ from subjects import Changed, load_subject
 
 from contactverif.contract.subject import Subject
 from contactverif.run import registry
-from contactverif.studies.bench import cell_runs, meter
+from contactverif.studies.bench import cell_runs, meter, timed_solution
 from contactverif_reports.bench.results import Cell
 from contactverif_reports.bench.slowdown import slowdowns
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
@@ -92,7 +92,8 @@ def counter(monkeypatch: pytest.MonkeyPatch) -> Counter:
     clock = Counter()
     monkeypatch.setattr(meter, "process_time", clock)
     monkeypatch.setattr(cell_runs, "process_time", clock)
-    monkeypatch.setattr(cell_runs, "perf_counter", clock)
+    monkeypatch.setattr(timed_solution, "process_time", clock)
+    monkeypatch.setattr(timed_solution, "perf_counter", clock)
     return clock
 
 
@@ -120,7 +121,7 @@ def test_a_formulation_that_does_more_work_is_found_end_to_end(
     ask: Ask, counter: Counter, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, factor: float, status: int
 ) -> None:
     works = {"vts-ppt": 1e-3, "nts-ar": 1e-3}
-    monkeypatch.setattr(registry, "load_formulation", lambda name: count_work(name, counter, works[name]))
+    monkeypatch.setattr(registry, "load_formulation", lambda name, limits: count_work(name, counter, works[name]))
     assert ask(*QUICK, "--out", tmp_path / "old.nc").status == 0
     works["vts-ppt"] *= factor
     answer = ask(*QUICK, "--out", tmp_path / "new.nc", "--against", tmp_path / "old.nc")

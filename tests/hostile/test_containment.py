@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import pytest
 from catalogue import KINDS, PLUGINS
-from containment import CHECKS, HEADS, judge
+from containment import CHECKS, HEADS, judge, run_command, scratch
+
+from contactverif_reports.bench.results import Outcome
+from contactverif_reports.netcdf.bench_file import read_bench
 
 LEAST_PLUGINS = 80
 # Plugins that run together: those that must be caught or are nobody's fault, and those that must be judged as NTS is.
@@ -34,3 +37,29 @@ def test_hostile_plugins_are_contained(names: tuple[str, ...]) -> None:
     for name, line in lines.items():
         cells = dict(zip(HEADS[1:], line, strict=True))
         assert all(cells[check] == "yes" for check in CHECKS), f"{name}: {cells}"
+
+
+@pytest.mark.parametrize("name", ["dies-exit-0", "process-patched-numpy"])
+def test_a_bench_goes_on_beside_a_hostile_plugin(name: str) -> None:
+    """Every cell has an outcome, and the errors of others are those of a bench without it."""
+    options = ["--quick", "--scene", "wavy", "--repeats", "1", "--isolation", "process", "--out", "report.nc"]
+    results = []
+    for names in (["vts-ppt"], ["vts-ppt", name]):
+        with scratch() as folder:
+            finish = run_command(folder, "bench", *names, *options)
+            assert not finish.left
+            results.append(read_bench(finish.report))
+    assert finish.status == 1
+    alone, beside = results
+    assert beside.errors[0].tolist() == alone.errors[0].tolist()
+    assert (beside.outcomes == Outcome.CRASHED).all(axis=1).tolist() == [False, True]
+    assert "its process ended with status 0" in beside.remarks[name, 0] or name != "dies-exit-0"
+
+
+def test_a_scene_is_drawn_without_a_hostile_plugin() -> None:
+    with scratch() as folder:
+        options = ["--out", "report.nc.png", "--isolation", "process"]
+        finish = run_command(folder, "draw", "--scene", "c", "-f", "dies-exit-0", "-f", "vts-ppt", *options)
+    assert finish.status == 1
+    assert finish.left == ("file report.nc.png",)
+    assert b"its process ended with status 0" in finish.output

@@ -19,7 +19,9 @@ from subjects import Changed, load_subject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.isolation.limits import Limits
 from contactverif.mechanics.accuracy import solve_in_tries
+from contactverif.run.registry import load_formulation
 from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
 from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
 from contactverif.studies.bench.bench_scenes import make_task
@@ -112,6 +114,34 @@ def test_a_failure_is_kept_and_stops_no_one() -> None:
     assert np.isinf(results.errors_of("pulling")).all()
     assert np.isfinite(results.seconds[1:]).all()
     assert results.not_loaded == {"absent": "no such module"}
+
+
+def test_a_plugin_in_a_process_of_its_own_has_the_same_outcome_errors_and_counts() -> None:
+    far = load_formulation("vts-ppt", Limits())
+    assert isinstance(far, Subject)
+    runs = [run_cell(WAVY, [subject], 2, 0).runs["vts-ppt"] for subject in (load_subject("vts-ppt"), far)]
+    assert runs[0].errors == runs[1].errors
+    assert runs[0].counts == runs[1].counts
+    assert [run.outcome for run in runs] == [Outcome.SOLVED, Outcome.SOLVED]
+    assert all(len(seconds) == 2 for seconds in runs[1].seconds.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "remark"),
+    [
+        (b"\xff", "cannot be read"),
+        (b"[" * 100_000, "cannot be read"),
+        (b"[1]", "cannot be read"),
+        (b'{"wall": 1, "seconds": {}, "counts": {}}', "cannot be read"),
+        (json.dumps({"wall": 1, "seconds": dict.fromkeys(PARTS, -1), "counts": dict.fromkeys(COUNTS, 0)}), "cannot be"),
+        (json.dumps({"wall": 1, "seconds": dict.fromkeys(PARTS, 1), "counts": dict.fromkeys(COUNTS, "")}), "cannot be"),
+    ],
+)
+def test_times_that_cannot_be_are_a_crash(words: bytes | str, remark: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Subject, "run_there", lambda *_: words)
+    run = run_cell(WAVY, [load_subject("vts-ppt")], 1, 0).runs["vts-ppt"]
+    assert run.outcome == Outcome.CRASHED
+    assert remark in run.remark
 
 
 def test_random_scenes_are_the_same_for_the_same_seed() -> None:

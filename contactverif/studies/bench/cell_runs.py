@@ -11,11 +11,9 @@ clock is kept beside them.
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -24,9 +22,9 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solution_of, solve_in_tries
 from contactverif.mechanics.trace import Trace
-from contactverif.studies.bench.bench_scenes import Task, is_solved, make_task
-from contactverif.studies.bench.meter import Meter, add_meter
-from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
+from contactverif.studies.bench.bench_scenes import is_solved, make_task
+from contactverif.studies.bench.timed_solution import solve_there, solve_with_clock, without_collector
+from contactverif_reports.bench.results import PARTS, Cell, Outcome
 
 
 @dataclass(slots=True)
@@ -101,12 +99,12 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -
     seed : int
         The seed of the random scenes.
     """
-    runners = [_Runner(subject, make_task(cell, subject, seed)) for subject in subjects]
+    runners = [_Runner(subject, cell, seed) for subject in subjects]
     scene = runners[0].task.scene
     for runner in runners:
         runner.warm_up()
     yardstick = []
-    with _without_collector():
+    with without_collector():
         for turn in range(repeats):
             yardstick.append(time_yardstick())
             for place in range(len(runners)):
@@ -128,13 +126,18 @@ def time_yardstick() -> float:
 class _Runner:
     """One formulation in one cell, with its record so far."""
 
-    def __init__(self, subject: Subject, task: Task) -> None:
-        self.subject, self.task, self.record = subject, task, RunRecord()
+    def __init__(self, subject: Subject, cell: Cell, seed: int) -> None:
+        self.subject, self.cell, self.seed = subject, cell, seed
+        self.task, self.record = make_task(cell, subject, seed), RunRecord()
 
     def warm_up(self) -> None:
         """Solve once without the clock, and record outcome, errors and counts."""
         try:
-            meter, tries, _, _ = self._solve()
+            timed = solve_there(self.subject, self.cell, self.seed)
+            if timed is None:
+                timed, tries = solve_with_clock(self.subject, self.task)
+            else:
+                tries = self._solve_by_questions()
             formulation = self.subject.for_case(self.task.case)
             solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
             solved = is_solved(solution)
@@ -142,9 +145,7 @@ class _Runner:
         except ContractError as error:
             self.record.remark = str(error)
             return
-        states = meter.states
-        counts = (sum(trace.n_iterations for trace in tries), *(states[name] for name in _COUNTED))
-        self.record.counts = dict(zip(COUNTS, counts, strict=True))
+        self.record.counts = timed.counts
         self.record.outcome = int(Outcome.SOLVED if solved else Outcome.NOT_SOLVED)
         self.record.remark = "" if solved else tries[-1].end.label
         self.record.seconds = {part: [] for part in PARTS}
@@ -154,36 +155,17 @@ class _Runner:
         if self.record.outcome == Outcome.CRASHED:
             return
         try:
-            meter, tries, total, wall = self._solve()
+            timed = solve_there(self.subject, self.cell, self.seed) or solve_with_clock(self.subject, self.task)[0]
         except ContractError as error:  # A plugin with a memory may fail later.
             self.record = RunRecord(remark=str(error))
             return
-        solve = sum(trace.seconds["solve"] for trace in tries)
-        for part, seconds in (meter.seconds | {"solve": solve, "total": total}).items():
+        for part, seconds in timed.seconds.items():
             self.record.seconds[part].append(seconds)
-        self.record.wall.append(wall)
+        self.record.wall.append(timed.wall)
 
-    def _solve(self) -> tuple[Meter, tuple[Trace, ...], float, float]:
-        """Return meter, tries, and the seconds of the processor and of the wall clock."""
-        meter, task = Meter(), self.task
-        formulation = add_meter(self.subject, task.case, meter)
-        wall, start = perf_counter(), process_time()
-        with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
-            tries = solve_in_tries(task.scene, formulation, task.start, task.step)
-        return meter, tries, process_time() - start, perf_counter() - wall
-
-
-_COUNTED = ("pair", "residual", "tangent", "differences")  # The states that a meter counts, in the order of `COUNTS`.
-
-
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """Keep Python's collector of garbage out of the times, as `timeit` does."""
-    was_enabled = gc.isenabled()
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
+    def _solve_by_questions(self) -> tuple[Trace, ...]:
+        """Solve here, with a formulation in another process."""
+        with np.errstate(all="ignore"):
+            return solve_in_tries(
+                self.task.scene, self.subject.for_case(self.task.case), self.task.start, self.task.step
+            )

@@ -1,0 +1,113 @@
+"""One timed solution of a cell by one formulation, here or in the plugin's own process.
+
+Where the plugin has a process of its own, all of Newton's method runs there, so that no way between two processes is
+timed. Such a process may say of its seconds and counts what it likes. Errors are measured elsewhere, on a solution that
+the judge finds by questions.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from math import inf
+from time import perf_counter, process_time
+
+import numpy as np
+
+from contactverif.contract.errors import PluginError
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.accuracy import solve_in_tries
+from contactverif.mechanics.trace import Trace
+from contactverif.studies.bench.bench_scenes import Task, make_task
+from contactverif.studies.bench.meter import Meter, add_meter
+from contactverif_reports.bench.results import COUNTS, PARTS, Cell
+
+_SHORT = (
+    0.05  # Seconds. A shorter solution is timed when it is repeated: other processes have used the caches meanwhile.
+)
+_COUNTED = ("pair", "residual", "tangent", "differences")  # The states that a meter counts, in the order of `COUNTS`.
+
+
+@dataclass(frozen=True, slots=True)
+class TimedSolution:
+    """The time and the counts of one solution.
+
+    Attributes
+    ----------
+    seconds : dict[str, float]
+        The seconds of the processor by part.
+    wall : float
+        The seconds of the wall clock.
+    counts : dict[str, int]
+        The counts by name.
+    """
+
+    seconds: dict[str, float]
+    wall: float
+    counts: dict[str, int]
+
+
+def solve_with_clock(subject: Subject, task: Task) -> tuple[TimedSolution, tuple[Trace, ...]]:
+    """Solve in this process; return times and counts, and the tries."""
+    meter = Meter()
+    formulation = add_meter(subject, task.case, meter)
+    wall, start = perf_counter(), process_time()
+    with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
+        tries = solve_in_tries(task.scene, formulation, task.start, task.step)
+    total, wall = process_time() - start, perf_counter() - wall
+    seconds = meter.seconds | {"solve": sum(trace.seconds["solve"] for trace in tries), "total": total}
+    counts = (sum(trace.n_iterations for trace in tries), *(meter.states[name] for name in _COUNTED))
+    return TimedSolution(seconds, wall, dict(zip(COUNTS, counts, strict=True))), tries
+
+
+def solve_there(subject: Subject, cell: Cell, seed: int) -> TimedSolution | None:
+    """Let the formulation's process solve a cell; return None if it has no process of its own.
+
+    Raises
+    ------
+    ContractError
+        If the plugin made an error, its process ended, or it says what cannot be.
+    """
+    answer = subject.run_there("solve", f"{__name__}:answer", json.dumps([asdict(cell), seed]).encode())
+    if answer is None:
+        return None
+    try:
+        timed = TimedSolution(**json.loads(answer))
+        numbers = [timed.wall, *(timed.seconds[part] for part in PARTS), *(timed.counts[name] for name in COUNTS)]
+        usual = len(numbers) == 1 + len(timed.seconds) + len(timed.counts) and all(0 <= n < inf for n in numbers)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise PluginError("solve: an answer that cannot be read", "channel") from error
+    if not usual:
+        raise PluginError("solve: times and counts that cannot be", "channel")
+    return timed
+
+
+def answer(subject: Subject, words: bytes) -> bytes:
+    """Solve a cell in the formulation's process, and return times and counts for `solve_there`."""
+    cell, seed = json.loads(words)
+    task = _make_task(Cell(**cell), subject, seed)
+    with without_collector():
+        timed, _ = solve_with_clock(subject, task)
+        if timed.seconds["total"] < _SHORT:
+            timed, _ = solve_with_clock(subject, task)
+    return json.dumps(asdict(timed)).encode()
+
+
+_make_task = lru_cache(maxsize=1)(make_task)  # The scene of a cell is made once, and its bodies are condensed once.
+
+
+@contextmanager
+def without_collector() -> Iterator[None]:
+    """Keep Python's collector of garbage out of the times, as `timeit` does."""
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
