@@ -182,8 +182,8 @@ def test_a_formulation_that_cannot_be_asked_is_a_line(
 ) -> None:
     real = scene_drawing.load_formulation
 
-    def load(name: str) -> Any:
-        return NotLoaded(name, "no licence") if name == "nts" else real(name)
+    def load(name: str, limits: Any) -> Any:
+        return NotLoaded(name, "no licence") if name == "nts" else real(name, limits)
 
     monkeypatch.setattr(scene_drawing, "load_formulation", load)
     answer = ask("draw", "--scene", "c", "-f", "nts", "-f", "vts-ppt", "--out", tmp_path / "c.png")
@@ -219,7 +219,7 @@ def test_draw_says_what_to_try_where_newtons_method_diverges(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     diverging = Subject("mine", lambda *, penalty: WrongTangent(penalty))
-    monkeypatch.setattr(scene_drawing, "load_formulation", lambda name: diverging)
+    monkeypatch.setattr(scene_drawing, "load_formulation", lambda name, limits: diverging)
     answer = ask("draw", "--scene", "c", "-f", "mine", "--out", tmp_path / "c.svg", columns=80)
     assert answer.status == 0
     assert "diverged" in answer.out
