@@ -158,7 +158,7 @@ def main(count: int, seed: int) -> int:
         files = write_meshes(folder)
         undamaged = {name: run_command([], main=lambda name=name: read(folder / name)) for name in files}
         for name, ending in undamaged.items():
-            print(f"{name}: {ending.output.strip() or ending.errors.strip()}")
+            print(f"{name}: {ending.output.strip() or ending.errors.strip()}", file=sys.stderr)
 
         def judge(kind: str, path: Path, expected: Ending, name: str) -> int:
             ending = run_command([], main=lambda: read(path))

@@ -44,7 +44,7 @@ SUMMARY = """{plugins} plugins{rest} in a process of their own: {whole} are cont
 {inline}
 """
 INLINE = """In the process of the harness (`--isolation inline`), {whole} of {plugins} are contained, {lost} lose the
-results of everybody, and {zero} end with exit status 0 though the plugin was not judged.
+results of everybody, and {zero} end with exit status 0 though the plugin was not judged.{rest}
 """
 KILLED = """## Kills
 
@@ -55,11 +55,7 @@ broken if it cannot be read after the kill, or if it differs from that of an unb
 """
 RUN = """## {title}
 
-What the campaign printed:
-
-```text
 {text}
-```
 
 """
 Row = dict[str, str]
@@ -109,6 +105,7 @@ def summary() -> str:
             plugins=len(inline),
             lost=sum(row["report complete"] == "no" for row in inline),
             zero=sum(row["status"] == "0" and row["exit status right"] == "no" for row in inline),
+            rest=f" {missing} more did not run there." if (missing := len(PLUGINS) - len(inline)) else "",
         )
     missing = len(PLUGINS) - len(process)
     rest = f" ({missing} more have not run yet)" if missing else ""
@@ -154,16 +151,23 @@ def campaigns() -> str:
     """Return what the other campaigns printed."""
     texts = {title: FOLDER / name for name, title in CAMPAIGNS.items()}
     return "".join(
-        RUN.format(title=title, text=file.read_text(encoding="utf-8").rstrip())
+        RUN.format(title=title, text=_as_markdown(file.read_text(encoding="utf-8").rstrip()))
         for title, file in texts.items()
         if file.exists()
     )
 
 
+def _as_markdown(printed: str) -> str:
+    """Return what a campaign printed; what is no table stands as it was printed."""
+    return printed if printed.startswith("|") else f"```text\n{printed}\n```"
+
+
 def page() -> str:
     """Return the whole page."""
     commits = ", ".join(
-        f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in (TABLE, KILLS)
+        f"`{row['table']}` at commit {row['commit']}"
+        for row in read(COMMITS)
+        if row["table"] in (TABLE, KILLS, *CAMPAIGNS)
     )
     parts = [
         INTRODUCTION.format(commits=commits) + summary() + "\n" + by_kind(),

@@ -10,6 +10,7 @@ import numpy as np
 from tables import COMMITS, FOLDER, SURVIVES, UNKNOWN, read
 
 PAGE, FIGURE = "README.md", "kills.svg"
+_TABLES = ("campaign.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv")
 COUNTS = ("cases", "accusations", "undecided", "idle")
 
 INTRODUCTION = """# Trust
@@ -191,7 +192,9 @@ def small_cases() -> str:
 
 def page() -> str:
     """Return the whole page."""
-    commits = ", ".join(f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS))
+    commits = ", ".join(
+        f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
+    )
     return INTRODUCTION.format(commits=commits) + "\n".join([campaign(), kills(), small_cases(), smallest()])
 
 

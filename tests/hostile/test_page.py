@@ -1,0 +1,14 @@
+"""The page of hostile plugins says what the tables say."""
+
+from __future__ import annotations
+
+from hostile_page import PAGE, is_whole, page, rows
+from tables import FOLDER
+
+
+def test_the_page_says_what_the_tables_say() -> None:
+    assert (FOLDER / PAGE).read_text(encoding="utf-8") == page()
+
+
+def test_all_hostile_plugins_are_contained_but_one_that_leaves_a_block_of_memory() -> None:
+    assert [row["mode/plugin"] for row in rows("process") if not is_whole(row)] == ["process/leaves-memory-file"]
