@@ -104,7 +104,6 @@ _make_task = lru_cache(maxsize=1)(make_task)  # The scene of a cell is made once
 def without_collector() -> Iterator[None]:
     """Keep Python's collector of garbage out of the times, as `timeit` does."""
     was_enabled = gc.isenabled()
-    gc.collect()
     gc.disable()
     try:
         yield
