@@ -135,6 +135,11 @@ def test_a_plugin_in_a_process_of_its_own_has_the_same_outcome_errors_and_counts
         (b'{"wall": 1, "seconds": {}, "counts": {}}', "cannot be read"),
         (json.dumps({"wall": 1, "seconds": dict.fromkeys(PARTS, -1), "counts": dict.fromkeys(COUNTS, 0)}), "cannot be"),
         (json.dumps({"wall": 1, "seconds": dict.fromkeys(PARTS, 1), "counts": dict.fromkeys(COUNTS, "")}), "cannot be"),
+        (
+            json.dumps({"wall": 1, "seconds": dict.fromkeys(PARTS, 1), "counts": dict.fromkeys(COUNTS, 10**30)}),
+            "cannot",
+        ),
+        (json.dumps({"wall": 1e999, "seconds": dict.fromkeys(PARTS, 1), "counts": dict.fromkeys(COUNTS, 1)}), "cannot"),
     ],
 )
 def test_times_that_cannot_be_are_a_crash(words: bytes | str, remark: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from math import inf
 from time import perf_counter, process_time
 
 import numpy as np
@@ -26,9 +25,9 @@ from contactverif.studies.bench.bench_scenes import Task, make_task
 from contactverif.studies.bench.meter import Meter, add_meter
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell
 
-_SHORT = (
-    0.05  # Seconds. A shorter solution is timed when it is repeated: other processes have used the caches meanwhile.
-)
+# Seconds. A shorter solution is timed when it is repeated: other processes have used the caches meanwhile.
+_SHORT = 0.05
+_LARGEST = 2**53  # No time and no count is larger.
 _COUNTED = ("pair", "residual", "tangent", "differences")  # The states that a meter counts, in the order of `COUNTS`.
 
 
@@ -72,13 +71,13 @@ def solve_there(subject: Subject, cell: Cell, seed: int) -> TimedSolution | None
     ContractError
         If the plugin made an error, its process ended, or it says what cannot be.
     """
-    answer = subject.run_there("solve", f"{__name__}:answer", json.dumps([asdict(cell), seed]).encode())
-    if answer is None:
+    words = subject.run_there("solve", f"{__name__}:answer", json.dumps([asdict(cell), seed]).encode())
+    if words is None:
         return None
     try:
-        timed = TimedSolution(**json.loads(answer))
+        timed = TimedSolution(**json.loads(words))
         numbers = [timed.wall, *(timed.seconds[part] for part in PARTS), *(timed.counts[name] for name in COUNTS)]
-        usual = len(numbers) == 1 + len(timed.seconds) + len(timed.counts) and all(0 <= n < inf for n in numbers)
+        usual = len(numbers) == 1 + len(timed.seconds) + len(timed.counts) and all(0 <= n < _LARGEST for n in numbers)
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise PluginError("solve: an answer that cannot be read", "channel") from error
     if not usual:
