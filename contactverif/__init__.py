@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
     from contactverif.mechanics.trace import End, Trace
     from contactverif.meshes.mesh_file import read_interface
+    from contactverif.problems.blocks import two_blocks
+    from contactverif.problems.catalogue import load_scene
+    from contactverif.problems.named_states import named_case
+    from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
     from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.runner import judge_case
     from contactverif.run.runner import run as verify
-    from contactverif.scenes.blocks import two_blocks
-    from contactverif.scenes.catalogue import load_scene
-    from contactverif.scenes.named_states import named_case
-    from contactverif.scenes.shrink_fit import ShrinkFit, shrink_fit
 
 __version__ = "0.1.0"
 

@@ -46,7 +46,7 @@ class Room:
 
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
-BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "scenes", "strategies")
+BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "problems", "strategies")
 REPORTS = (
     "reports",
     "reports.netcdf",
@@ -65,12 +65,13 @@ ROOMS = {
     "foreign_files": Room(("contract",), ("numpy", "msgspec", "psutil")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
     "meshes": Room(("contract", "foreign_files"), ("numpy", "meshio", "msgspec")),
-    "scenes": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
-    "strategies": Room(("contract", "oracle", "mechanics", "scenes"), ("numpy", "hypothesis"), QUIET),
+    "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
+    "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     # Its worker calls the registry by a name that the registry gives it, and imports nothing of `run`.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil")),
     "run": Room(
-        ("contract", "scenes", "strategies", "isolation"), ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec")
+        ("contract", "problems", "strategies", "isolation"),
+        ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec"),
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
@@ -87,10 +88,10 @@ ROOMS = {
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "properties.shared": Room(
-        ("contract", "oracle", "mechanics", "scenes", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
+        ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
     "properties": Room(
-        ("contract", "oracle", "mechanics", "scenes", "strategies", "properties.shared"),
+        ("contract", "oracle", "mechanics", "problems", "strategies", "properties.shared"),
         ("numpy", "scipy", "hypothesis"),
         QUIET,
     ),

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.scenes.catalogue import BLOCKS, SCENES, load_scene, options_of
+from contactverif.problems.catalogue import BLOCKS, SCENES, load_scene, options_of
 from contactverif_reports.draw.scene_text import blocks_as_text, silhouettes_as_text
 
 SOURCE = "Zavarise & De Lorenzis (2009)"

@@ -17,9 +17,9 @@ from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
+from contactverif.problems.catalogue import load_scene
 from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
 from contactverif.run.registry import formulation_names, load_formulation
-from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw import as_text
 from contactverif_reports.draw.solved_scene import SolvedScene

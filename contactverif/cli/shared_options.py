@@ -194,7 +194,7 @@ class PlaceOptions:
             return None
         if self.mesh is not None:
             raise MisuseError("--scene", f"{self.scene} and --mesh {self.mesh}", "one of the two")
-        from contactverif.scenes.catalogue import load_scene
+        from contactverif.problems.catalogue import load_scene
 
         return load_scene(self.scene).case()
 

@@ -205,7 +205,7 @@ class Property(PropertyInfo):
         return a mapping {kind of situation: strategy} instead: each kind gets the same share of the cases. It may
         return a tuple of cases instead, each with a name of its own: a finite list. All of them run, whatever the
         number of examples, and tables and reports call each by its name.
-        Properties whose `cases` is the same function of a module are judged on the same cases.
+        Properties whose `cases` is the same function with a stored name (`random_source`) are judged on the same cases.
     measure : Callable[[Case, Subject], Measurement]
         Measures one case; it raises what the plugin raises.
     promise : Callable[[Traits], bool | None]

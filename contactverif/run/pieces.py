@@ -16,12 +16,12 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
+from contactverif.problems.named_states import named_case
 from contactverif.run import driver, judging
 from contactverif.run.packing import CaseChunk
 from contactverif.run.run_journal import Notes
 from contactverif.run.sampling import Sampling
 from contactverif.run.sign_check import has_opposite_sign
-from contactverif.scenes.named_states import named_case
 
 CHUNK = 25  # The number of drawn cases that are judged in one piece.
 SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.

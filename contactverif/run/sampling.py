@@ -7,13 +7,13 @@ strategy share their cases.
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
+from contactverif.contract.random_source import name_of_source
 from contactverif.run.driver import CaseSource
 from contactverif.run.one_thread import one_thread
 
@@ -56,14 +56,5 @@ class Sampling:
 
 
 def strategy_name(question: Property) -> str:
-    """Return a name for the strategy of a property: that of the function `cases`, or else the id of the property.
-
-    A function has a name if its module has it under that name: ``contactverif.strategies.flat.flat_cases``. Two
-    functions never share such a name. A lambda, a partial, a method and a function within a function have none,
-    because two of them may look the same and make different cases. So their property shares its cases with no other.
-    """
-    cases: Any = question.cases
-    module, name = str(getattr(cases, "__module__", "")), str(getattr(cases, "__qualname__", ""))
-    if module != "__main__" and getattr(sys.modules.get(module), name, None) is cases:
-        return f"{module}.{name}"
-    return question.id
+    """Return the stored name of the strategy of a property (`random_source`), or else the id of the property."""
+    return name_of_source(question.cases) or question.id

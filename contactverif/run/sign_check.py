@@ -12,7 +12,7 @@ import numpy as np
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
-from contactverif.scenes.named_states import named_case
+from contactverif.problems.named_states import named_case
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 

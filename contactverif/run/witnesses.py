@@ -6,8 +6,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
+from contactverif.problems.named_states import named_case
 from contactverif.run.driver import CaseSource
-from contactverif.scenes.named_states import named_case
 
 
 def find_witness(subject: Subject, question: Property, source: CaseSource) -> Case:
@@ -25,6 +25,6 @@ def find_witness(subject: Subject, question: Property, source: CaseSource) -> Ca
     if not question.bodies:
         return named_case(name)
     # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
-    from contactverif.scenes.catalogue import load_scene_case
+    from contactverif.problems.catalogue import load_scene_case
 
     return load_scene_case(name)

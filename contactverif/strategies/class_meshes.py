@@ -16,6 +16,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.oracle.mesh_classes import is_of_class
 from contactverif.strategies.flat import Sides, uniform_penetrations
 from contactverif.strategies.given_interface import flat_cases, slave_direction
@@ -26,6 +27,7 @@ _CARRIES = st.lists(st.integers(0, 1), min_size=1, max_size=7)  # 1 where there 
 _MOST = 3  # The largest length by which the master goes beyond the slave, in halves of the slave's end segment.
 
 
+@random_source("contactverif.strategies.class_meshes.normal_cases")
 def normal_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration whose inner master nodes all lie on slave nodes.
 
@@ -34,6 +36,7 @@ def normal_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     return _cases(interface, midpoints=False)
 
 
+@random_source("contactverif.strategies.class_meshes.single_cases")
 def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration whose inner master nodes lie on slave nodes or in the middle of segments.
 
@@ -42,6 +45,7 @@ def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     return _cases(interface, midpoints=True)
 
 
+@random_source("contactverif.strategies.class_meshes.overhung_cases")
 def overhung_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases as `single_cases` does, on meshes whose master goes beyond the slave by half a segment or more.
 

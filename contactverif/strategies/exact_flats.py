@@ -18,7 +18,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.scenes.flat_states import Turn, flat_master, flat_state
+from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.strategies.parts import OFFSETS, penalties, repeat_cyclically, seeds
 from contactverif.strategies.translations import FINENESS, exact_shifts
 
@@ -39,7 +39,7 @@ def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case]
     Returns
     -------
     SearchStrategy[Case] | None
-        Cases with the parameters of `contactverif.scenes.flat_states.flat_state`, and "shift" (2,), a length each: a
+        Cases with the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
         translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point
         projects inside the master.
     """

@@ -18,6 +18,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
@@ -35,6 +36,7 @@ _REFINEMENTS = st.sampled_from([0] * 8 + [1, 2, 4, 6])  # The master lengths are
 def flat_cases(interface: None = None) -> SearchStrategy[Case]: ...
 @overload
 def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
+@random_source("contactverif.strategies.flat.flat_cases")
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration; every slave point projects inside the master.
 

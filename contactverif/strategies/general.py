@@ -20,6 +20,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies import given_interface
 from contactverif.strategies.contact import covered_start, extend_line, sink_below
 from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
@@ -54,6 +55,7 @@ def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     return _general_cases(smooth=False) if interface is None else given_interface.states(interface, smooth=False)
 
 
+@random_source("contactverif.strategies.general.smooth_cases")
 def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     """Return cases as `general_cases` does, always off the lattice: for derivatives, which mean nothing at a kink."""
     return _general_cases(smooth=True) if interface is None else given_interface.states(interface, smooth=True)

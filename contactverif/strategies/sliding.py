@@ -13,6 +13,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
 from contactverif.strategies.parts import motions, penalties, seeds, shuffles
 
@@ -24,6 +25,7 @@ _PLACES = st.integers(0, 12)
 _MARGIN = 3.0  # The length of master on both sides of what the slave passes.
 
 
+@random_source("contactverif.strategies.sliding.sliding_cases")
 def sliding_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return slaves that slide along a bent master by the length of a segment; None for a given mesh.
 

@@ -18,10 +18,11 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.random_source import random_source
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
-from contactverif.scenes.blocks import is_uniform, overhangs, two_blocks
-from contactverif.scenes.catalogue import MODERATE_PENALTY
+from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
+from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.strategies.parts import Motion, lengths, motions, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
@@ -48,6 +49,7 @@ def _widths() -> SearchStrategy[list[float]]:
     return st.one_of(plain, plain, plain, plain, wide)
 
 
+@random_source("contactverif.strategies.solids.block_cases")
 def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
 
@@ -56,6 +58,7 @@ def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return _two_blocks() if scene is None else _uniform(scene, overhang=False)
 
 
+@random_source("contactverif.strategies.solids.variant_cases")
 def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return the patch test's variants: each case has the parameter "variant", an index into VARIANTS.
 
@@ -64,6 +67,7 @@ def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return _variants() if scene is None else _uniform(scene, overhang=False)
 
 
+@random_source("contactverif.strategies.solids.dead_zone_cases")
 def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return a random block that overhangs its master inside a slave segment, on one side or both.
 
@@ -74,6 +78,7 @@ def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return _dead_zones() if scene is None else _uniform(scene, overhang=True)
 
 
+@random_source("contactverif.strategies.solids.solid_cases")
 def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return a tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink.
 
@@ -84,6 +89,7 @@ def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return st.just(scene) if has_bodies(scene) else None
 
 
+@random_source("contactverif.strategies.solids.closed_cases")
 def closed_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return scenes as `solid_cases` does, all of the interface in contact: for what has nothing to do with opening.
 

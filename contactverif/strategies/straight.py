@@ -20,6 +20,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, penalties, seeds, shuffles
 from contactverif.strategies.sketches import exact_turns
@@ -32,6 +33,7 @@ _BENDS = st.sampled_from([0.3, 0.9, 0.6, 0.1, -0.1, -0.3])  # Turns of an end of
 _DISTANCES = st.integers(1, 4)  # Distances of the body behind, in lengths that no depth reaches.
 
 
+@random_source("contactverif.strategies.straight.tilted_cases")
 def tilted_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return straight slaves, tilted by 0.06 to 0.6 rad, wholly in contact with a flat master; None for a given mesh.
 
@@ -40,6 +42,7 @@ def tilted_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     return _tilted_cases() if interface is None else None
 
 
+@random_source("contactverif.strategies.straight.bent_end_cases")
 def bent_end_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return slaves, straight and tilted or not, between the bent ends of a master; None for a given mesh.
 

@@ -20,6 +20,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies import given_interface
 from contactverif.strategies.parts import OFFSETS, Motion, penalties, repeat_cyclically, seeds, shifts
 
@@ -32,6 +33,7 @@ _RISES = st.lists(st.sampled_from([1, -1, 2, -2, 0]), min_size=1, max_size=4)  #
 _TILTS = st.sampled_from([0.25, -0.25, 0.0625, -0.0625])  # Slopes of a slave that deepens towards one end
 
 
+@random_source("contactverif.strategies.translations.translated_cases")
 def translated_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     """Return states near the origin that a translation by the parameter "shift" moves exactly.
 

@@ -35,7 +35,7 @@ from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import force_error, shape_integrals, traction_forces
-from contactverif.scenes.arcs import Arcs
+from contactverif.problems.arcs import Arcs
 from contactverif_properties.flat_resultant import refuse_unknown_total
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.passes import nearest_sum

@@ -43,8 +43,8 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate
 from contactverif.mechanics.scene import scene_of
-from contactverif.scenes.hertz_box import COARSEST, exact_forces, hertz_box
-from contactverif.scenes.hertz_errors import BOX, HertzErrors, HertzStudy, hertz_errors
+from contactverif.problems.hertz_box import COARSEST, exact_forces, hertz_box
+from contactverif.problems.hertz_errors import BOX, HertzErrors, HertzStudy, hertz_errors
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.finite_lists import Cases, unless_given
 

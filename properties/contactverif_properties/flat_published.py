@@ -28,7 +28,7 @@ from contactverif.contract.property import Measurement, Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.scenes.named_states import FLAT_NAMES, named_case
+from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import Cases, unless_given
 from contactverif_properties.shared.roundoff import gap_quantity, gap_tolerance

@@ -19,7 +19,7 @@ the paper, whose coordinates along the interface are exact.
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.class_scenes import single_scenes
+from contactverif.problems.class_scenes import single_scenes
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.patch_class import list_or_scene, promise_single
 from contactverif_properties.shared.solved_patch import forces_to_draw

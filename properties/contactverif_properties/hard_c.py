@@ -17,7 +17,7 @@ The promise is `passes_flat_patch`.
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_scenes import case_c
+from contactverif.problems.hard_scenes import case_c
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.hard_patch import PATCH_QUANTITIES, measure_patch, patch_forces, promise_patch

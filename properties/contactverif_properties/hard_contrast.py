@@ -15,7 +15,7 @@ pressures that vary lock is another question, which this one does not answer.
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_scenes import contrast_scenes
+from contactverif.problems.hard_scenes import contrast_scenes
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.hard_patch import PATCH_QUANTITIES, measure_patch, patch_forces, promise_patch

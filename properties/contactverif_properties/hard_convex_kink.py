@@ -20,7 +20,7 @@ look straight up at the vertex, and is allowed the gap d there. The tolerance is
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_corner_states import convex_kink_states
+from contactverif.problems.hard_corner_states import convex_kink_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.bounded_forces import BOUNDED_QUANTITIES, measure_bounded, promise_bounds
 from contactverif_properties.shared.finite_lists import unless_given

@@ -31,8 +31,8 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
-from contactverif.scenes.blocks import exact_unknowns, pressure_of
-from contactverif.scenes.hard_scenes import vanishing_overlap_scenes
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.hard_scenes import vanishing_overlap_scenes
 from contactverif_properties.dead_zone import DEAD_ZONE, measure_overhang
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.exact_multipliers import exact_multipliers

@@ -15,7 +15,7 @@ and the nodal forces as the traits promise them, with the tolerance u(8Z/|g| + 4
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_flat_states import deep_states
+from contactverif.problems.hard_flat_states import deep_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.flat_forces import (

@@ -20,7 +20,7 @@ formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N).
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_corner_states import free_end_states
+from contactverif.problems.hard_corner_states import free_end_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.bounded_forces import BOUNDED_QUANTITIES, measure_bounded, promise_bounds
 from contactverif_properties.shared.finite_lists import unless_given

@@ -15,7 +15,7 @@ forces are those of a uniform pressure. The tolerance is u(8Z/|g| + 4N).
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_flat_states import node_hit_states
+from contactverif.problems.hard_flat_states import node_hit_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.flat_forces import (

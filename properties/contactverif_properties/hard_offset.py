@@ -21,7 +21,7 @@ more than the force.
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_flat_states import offset_states
+from contactverif.problems.hard_flat_states import offset_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.flat_forces import (

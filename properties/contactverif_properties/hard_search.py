@@ -17,7 +17,7 @@ What is asked, and the tolerance u(8Z/|g| + 4N), are as in `hard.offset`.
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_flat_states import search_states
+from contactverif.problems.hard_flat_states import search_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.flat_forces import (

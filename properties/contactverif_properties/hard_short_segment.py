@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_flat_states import tiny_segment_states
-from contactverif.scenes.hard_scenes import tiny_segment_scenes
+from contactverif.problems.hard_flat_states import tiny_segment_states
+from contactverif.problems.hard_scenes import tiny_segment_scenes
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.hard_patch import PATCH_QUANTITIES, measure_patch, patch_forces, promise_patch

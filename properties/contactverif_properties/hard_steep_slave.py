@@ -17,7 +17,7 @@ master's normal); it is at most ε̂ D L, since no gap is longer than the interf
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.hard_corner_states import steep_slave_states
+from contactverif.problems.hard_corner_states import steep_slave_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.bounded_forces import BOUNDED_QUANTITIES, measure_bounded, promise_bounds
 from contactverif_properties.shared.finite_lists import unless_given

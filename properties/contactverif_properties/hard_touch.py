@@ -28,7 +28,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.scenes.touching_states import touching_states
+from contactverif.problems.touching_states import touching_states
 from contactverif_properties.shared.finite_lists import unless_given
 
 _DEPTH = 64.0  # The depth over u X. It is eight times what a gap is rounded to, so that each has its sign.
@@ -53,7 +53,7 @@ def measure_touch(case: Case, subject: Subject) -> Measurement:
     Parameters
     ----------
     case : Case
-        A state of `contactverif.scenes.touching_states`.
+        A state of `contactverif.problems.touching_states`.
     subject : Subject
         The formulation; its multipliers, if any, are 0.
 

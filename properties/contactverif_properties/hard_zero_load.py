@@ -27,8 +27,8 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
-from contactverif.scenes.hard_scenes import unloaded_scenes
-from contactverif.scenes.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif.problems.hard_scenes import unloaded_scenes
+from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details

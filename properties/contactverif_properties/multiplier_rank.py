@@ -25,7 +25,7 @@ from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
-from contactverif.scenes.blocks import exact_unknowns, pressure_of
+from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases
 from contactverif_properties.shared.applicability import refuse_without_multipliers
 from contactverif_properties.shared.exact_multipliers import exact_multipliers

@@ -14,7 +14,7 @@ mean is asked: the sum of radial forces over all nodes of one side. Straight seg
 that the combination (4 e_4 − e_2)/3 of both errors is judged, which is free of it. It is at most 4e-3. Where both sides
 get the same force, 1e-7 to 4e-4 is measured, and 2.4e-3 where each has the pressure on its own radius (half passes).
 Springs a quarter as stiff where the surface bends have 0.1 and more. The exact forces are Lamé's with contact measured
-after the fit (`contactverif.scenes.shrink_fit`), since his formula alone is wrong by δ/c. The sum of reported pressures
+after the fit (`contactverif.problems.shrink_fit`): his formula alone is wrong by δ/c. The sum of reported pressures
 over their weights is judged in the same way, and also beside the forces on the finer mesh, where 1e-4 is usual. Of two
 passes the slave's points count, or the points of both, whichever comes nearer to the forces. The formulation's tangent
 plays no part in the verdict: where Newton's method does not converge with it, it differentiates the residual. The error
@@ -43,8 +43,8 @@ from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
-from contactverif.scenes.ring_errors import ring_force_error
-from contactverif.scenes.shrink_fit import FiniteFit, Role, ShrinkFit, rings_of, shrink_fit
+from contactverif.problems.ring_errors import ring_force_error
+from contactverif.problems.shrink_fit import FiniteFit, Role, ShrinkFit, rings_of, shrink_fit
 from contactverif_properties.flat_resultant import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given

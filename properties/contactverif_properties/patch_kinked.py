@@ -42,7 +42,7 @@ from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import Trace
-from contactverif.scenes.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
+from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details

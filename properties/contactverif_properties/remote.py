@@ -26,6 +26,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Measurement, Property
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.straight import cases_over_a_body
@@ -37,6 +38,7 @@ DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
 QUANTITIES = same_answer_quantities("beside another body")
 
 
+@random_source("contactverif_properties.remote.remote_cases")
 def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case] | None:
     """Return states of any kind, and straight slaves over two bodies; states of a given interface."""
     if interface is not None:

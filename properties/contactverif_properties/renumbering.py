@@ -25,6 +25,7 @@ from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.closed import closed_cases
@@ -36,6 +37,7 @@ QUANTITIES = same_answer_quantities("in other numbers")
 ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 
 
+@random_source("contactverif_properties.renumbering.renumbering_cases")
 def renumbering_cases(
     interface: Interface | None = None,
 ) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case] | None:

@@ -34,7 +34,7 @@ from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.inf_sup import inf_sup_constant
-from contactverif.scenes.refined_blocks import refinement_cases, refinements
+from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif_properties.shared.applicability import refuse_unstated_penalty, refuse_without_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 

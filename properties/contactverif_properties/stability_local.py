@@ -39,6 +39,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact
@@ -182,6 +183,7 @@ def refuse_unknown_forces(traits: Traits) -> str:
     return "no exact force is known: the traits promise no patch test, no area and no long double"
 
 
+@random_source("contactverif_properties.stability_local.local_cases")
 def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return a strategy for each kind of penetration; None where an interface is given."""
     uniform, linear = exact_flat_cases(interface), linear_flat_cases(interface)

@@ -39,7 +39,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.scenes.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
+from contactverif.problems.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.wave_answer import answer_to_wave

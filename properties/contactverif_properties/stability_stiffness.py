@@ -29,12 +29,13 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
-from contactverif.scenes.blocks import exact_unknowns, pressure_of
-from contactverif.scenes.stability_states import stability_scenes
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.stability_states import stability_scenes
 from contactverif_properties.shared.conditioning import Conditioning, forces_quantity, measure_conditioning
 from contactverif_properties.shared.exact_motions import ExactMotion
 from contactverif_properties.shared.sweep_measurement import make_sweep_measurement
@@ -48,6 +49,7 @@ GROWTH = 100.0
 SETTLED_SHARE, SETTLED_ROUNDINGS = 1e-3, 1e3
 
 
+@random_source("contactverif_properties.stability_stiffness.stiffness_cases")
 def stiffness_cases(scene: Case | None = None) -> tuple[Case, ...] | None:
     """Return the named scenes; None for a given scene, which is none of them."""
     return stability_scenes() if scene is None else None

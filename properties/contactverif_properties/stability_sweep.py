@@ -28,8 +28,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
-from contactverif.scenes.stability_states import stability_states
+from contactverif.problems.stability_states import stability_states
 from contactverif_properties.shared.any_state import prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.conditioning import forces_quantity, measure_conditioning
@@ -39,6 +40,7 @@ from contactverif_properties.shared.sweep_measurement import make_sweep_measurem
 ROUNDINGS = forces_quantity("error of a force in roundings")
 
 
+@random_source("contactverif_properties.stability_sweep.sweep_cases")
 def sweep_cases(interface: Interface | None = None) -> tuple[Case, ...] | None:
     """Return the named states; None on a given interface, which has none of them."""
     return stability_states() if interface is None else None

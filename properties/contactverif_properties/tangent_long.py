@@ -17,7 +17,7 @@ that some 30 moves are enough. What looks wrong is measured again, one unknown a
 from __future__ import annotations
 
 from contactverif.contract.property import Property
-from contactverif.scenes.long_states import long_states
+from contactverif.problems.long_states import long_states
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.block_verdict import measure_blocks
 from contactverif_properties.shared.finite_lists import unless_given

@@ -16,7 +16,7 @@ import xarray as xr
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import End
-from contactverif.scenes import catalogue
+from contactverif.problems import catalogue
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.force_transmission import (
     ForceTable,

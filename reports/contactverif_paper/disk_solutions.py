@@ -3,7 +3,7 @@
 Each solution is computed once in a process.
 
 Source: Zavarise & De Lorenzis (2009), Section 7.2. What is given and what is chosen is said in
-`contactverif.scenes.disk`.
+`contactverif.problems.disk`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.disk import DiskProblem, disk_on_foundation
+from contactverif.problems.disk import DiskProblem, disk_on_foundation
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 
 PAPER = DiskProblem()

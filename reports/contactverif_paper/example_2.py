@@ -1,7 +1,7 @@
 """Example 2: an elastic disk on an elastic foundation: its meshes, its pressures beside Hertz, and the iterations.
 
 Source: Zavarise & De Lorenzis (2009), Section 7.2, Figs. 37 and 38. What is given and what is chosen is said in
-`contactverif.scenes.disk`.
+`contactverif.problems.disk`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib.path import Path
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
-from contactverif.scenes import hertz
+from contactverif.problems import hertz
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, solve_disk
 from contactverif_paper.figure_style import (

@@ -23,7 +23,7 @@ from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
-from contactverif.scenes import catalogue
+from contactverif.problems import catalogue
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import (
     REFERENCE_LINE,

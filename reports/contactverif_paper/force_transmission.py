@@ -19,7 +19,7 @@ import xarray as xr
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.scenes.named_states import named_case
+from contactverif.problems.named_states import named_case
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement

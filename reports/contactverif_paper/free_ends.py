@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
-from contactverif.scenes.uniform_stress import stress_error
+from contactverif.problems.uniform_stress import stress_error
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import TWO_COLUMNS, Series, add_legend, new_figure, new_panels, plot_logarithmic
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of

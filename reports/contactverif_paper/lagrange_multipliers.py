@@ -18,9 +18,9 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
+from contactverif.problems import catalogue
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_reports.html.pages import number

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.scenes import catalogue
-from contactverif.scenes.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif.problems import catalogue
+from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement

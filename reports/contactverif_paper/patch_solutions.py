@@ -19,8 +19,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics import newton
-from contactverif.scenes import catalogue
-from contactverif.scenes.uniform_stress import stress_error
+from contactverif.problems import catalogue
+from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from contactverif.scenes import catalogue
-from contactverif.scenes.uniform_stress import condition_tolerance
+from contactverif.problems import catalogue
+from contactverif.problems.uniform_stress import condition_tolerance
 from contactverif_paper import example_1, example_1bis
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation

@@ -94,7 +94,7 @@ def forget_everything() -> None:
     """Let go of all that a process remembers of bodies."""
     forget_bodies()
     for name, module in list(sys.modules.items()):
-        if name.startswith("contactverif.scenes."):
+        if name.startswith("contactverif.problems."):
             for remembered in vars(module).values():
                 getattr(remembered, "cache_clear", lambda: None)()
 

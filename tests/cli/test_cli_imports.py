@@ -26,10 +26,10 @@ print("\\nmodules:", *sorted(sys.modules))
 SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshio", "pytest", "pandas"}
 FOR_SOLVING = (
     "contactverif.mechanics",
-    "contactverif.scenes.blocks",
-    "contactverif.scenes.catalogue",
-    "contactverif.scenes.disk",
-    "contactverif.scenes.hertz",
+    "contactverif.problems.blocks",
+    "contactverif.problems.catalogue",
+    "contactverif.problems.disk",
+    "contactverif.problems.hertz",
     "contactverif.studies",
     "matplotlib",
     "meshio",

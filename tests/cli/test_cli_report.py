@@ -68,7 +68,7 @@ def test_a_page_of_the_report(ask: Ask, run: tuple[Path, Answer], tmp_path: Path
 def test_a_report_with_failures_is_shown_all_the_same(ask: Ask, tmp_path: Path) -> None:
     from handmade_run import run_with
 
-    from contactverif.scenes.catalogue import load_scene
+    from contactverif.problems.catalogue import load_scene
     from contactverif_reports.netcdf.write import write
 
     path = tmp_path / "wrong.nc"

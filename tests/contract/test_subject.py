@@ -17,8 +17,8 @@ from contactverif.contract.formulation import ContactPoints, Pairing, evaluate_b
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
+from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.named_states import named_case
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1)

@@ -20,7 +20,7 @@ from contactverif.mechanics.accuracy import (
     solve_for_accuracy,
     traction_forces,
 )
-from contactverif.scenes.catalogue import load_scene
+from contactverif.problems.catalogue import load_scene
 
 INTERFACE = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[3, 0], [0, 0]])
 

@@ -21,7 +21,7 @@ from contactverif.mechanics.bulk import assemble_stiffness, condense, loose_mode
 from contactverif.mechanics.mesh_bodies import body_from_mesh
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
-from contactverif.scenes.blocks import exact_unknowns, two_blocks
+from contactverif.problems.blocks import exact_unknowns, two_blocks
 
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
 

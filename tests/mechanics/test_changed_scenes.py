@@ -14,7 +14,7 @@ from contactverif.mechanics.changed_scenes import PLACELESS, change_units, move,
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
-from contactverif.scenes.blocks import two_blocks
+from contactverif.problems.blocks import two_blocks
 
 LENGTH, MODULUS = 2.0**-31, 4.0**13
 

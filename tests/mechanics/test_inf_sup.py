@@ -13,7 +13,7 @@ from contactverif.contract.arrays import dense
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.inf_sup import InfSup, force_rows, gap_rows, inf_sup_constant
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.refined_blocks import refined_blocks
+from contactverif.problems.refined_blocks import refined_blocks
 
 
 def formulation_on(name: str, scene: Scene) -> CheckedFormulation:

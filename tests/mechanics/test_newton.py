@@ -25,9 +25,9 @@ from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
+from contactverif.problems import catalogue
+from contactverif.problems.blocks import two_blocks
 from contactverif.run.registry import load_formulation
-from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import two_blocks
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 

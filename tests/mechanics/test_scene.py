@@ -27,9 +27,9 @@ from contactverif.mechanics.bulk import assemble_stiffness
 from contactverif.mechanics.mesh_bodies import body_from_mesh
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
+from contactverif.problems import catalogue
+from contactverif.problems.blocks import exact_unknowns, two_blocks
 from contactverif.run.registry import load_formulation
-from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import exact_unknowns, two_blocks
 from contactverif_nts import eq6, walk
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")

@@ -22,7 +22,7 @@ from contactverif.oracle import (
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
 )
-from contactverif.scenes.named_states import named_case
+from contactverif.problems.named_states import named_case
 from contactverif.strategies import flat_cases, general_cases, smooth_cases
 from contactverif.strategies.solids import dead_zone_cases
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import End
+from contactverif.problems import catalogue
 from contactverif.run.workers import worker_pool
-from contactverif.scenes import catalogue
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
 from contactverif_paper.figure_style import new_figure
 from contactverif_paper.items import ITEMS

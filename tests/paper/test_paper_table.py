@@ -15,11 +15,11 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.problems import catalogue
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import judge_case
-from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.uniform_stress import condition_tolerance, stress_error
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")

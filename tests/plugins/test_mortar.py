@@ -14,7 +14,7 @@ from contactverif import Interface
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.scenes.catalogue import load_scene
+from contactverif.problems.catalogue import load_scene
 from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
 from contactverif_mortar.integration_cells import WEIGHT, C, Cells, Quadrature
 from contactverif_mortar.pressure_shapes import Shapes

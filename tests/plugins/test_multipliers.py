@@ -19,9 +19,9 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.trace import Trace
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import make_scene
-from contactverif.scenes.uniform_stress import stress_error
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.catalogue import make_scene
+from contactverif.problems.uniform_stress import stress_error
 from contactverif_nts import box3, box3_couplings, box3_gains, box3_tangent, eq6, eq6_tangent, turned_force, walk
 
 METHODS = [

@@ -18,7 +18,7 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.scenes.named_states import named_case
+from contactverif.problems.named_states import named_case
 from contactverif_mortar import cell_forces, cell_geometry, cell_search, chen_hisada_method, integration_cells
 
 PRESSURE_FROM_POSITIONS = [

@@ -18,10 +18,10 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.trace import Trace
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.catalogue import make_scene
+from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import make_scene
-from contactverif.scenes.uniform_stress import stress_error
 from contactverif_nts import two_pass
 
 INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]

@@ -11,9 +11,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
+from contactverif.problems.hertz_box import COARSEST, HertzBox, exact_forces
+from contactverif.problems.hertz_errors import HertzStudy, hertz_errors
 from contactverif.run.runner import judge_case
-from contactverif.scenes.hertz_box import COARSEST, HertzBox, exact_forces
-from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
 from contactverif_properties.accuracy_hertz import ACCURACY_HERTZ, LIMITS, MESHES, PENALTIES, hertz_cases
 
 CASES = {case.name: case for case in hertz_cases()}

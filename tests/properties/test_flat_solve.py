@@ -16,9 +16,9 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.problems.blocks import pressure_of, two_blocks
+from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.runner import judge_case, run
-from contactverif.scenes.blocks import pressure_of, two_blocks
-from contactverif.scenes.catalogue import load_scene_case
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
 from contactverif_properties.flat_solve import FLAT_SOLVE

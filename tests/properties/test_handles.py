@@ -15,9 +15,9 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.formulation import Handle, Pairing
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
+from contactverif.problems.catalogue import load_scene
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import run
-from contactverif.scenes.catalogue import load_scene
 
 RIGHT = {
     "vts-ppt": contactverif_nts.vts_ppt,

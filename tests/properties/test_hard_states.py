@@ -10,16 +10,16 @@ import pytest
 
 from contactverif.contract.case import Case
 from contactverif.oracle import project_point
-from contactverif.scenes.flat_states import STEEP, TURNED, UPRIGHT, read_frame
-from contactverif.scenes.hard_corner_states import concave_corner_states, convex_kink_states
-from contactverif.scenes.hard_flat_states import (
+from contactverif.problems.flat_states import STEEP, TURNED, UPRIGHT, read_frame
+from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
+from contactverif.problems.hard_flat_states import (
     deep_states,
     node_hit_states,
     offset_states,
     search_states,
     tiny_segment_states,
 )
-from contactverif.scenes.touching_states import touching_states
+from contactverif.problems.touching_states import touching_states
 from contactverif_properties.shared.bounded_forces import knows_total
 from contactverif_properties.shared.flat_forces import exact_forces
 

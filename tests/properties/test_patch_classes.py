@@ -22,10 +22,10 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.problems.catalogue import load_scene_case
+from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
-from contactverif.scenes.catalogue import load_scene_case
-from contactverif.scenes.named_states import FLAT_NAMES, named_case
 from contactverif_nts import force_tables
 from contactverif_properties.shared.patch_class import LOST_END
 

@@ -10,8 +10,8 @@ from textbook_springs import NodalMultipliers
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
 from contactverif.run.runner import judge_case
-from contactverif.scenes.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
 from contactverif_properties.stability_inf_sup import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")

@@ -14,8 +14,7 @@ from textbook_cells import WeightedGaps
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.runner import judge_case, run
-from contactverif.scenes.wave_blocks import (
+from contactverif.problems.wave_blocks import (
     COLUMNS,
     PENALTIES,
     WAVE,
@@ -24,6 +23,7 @@ from contactverif.scenes.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
+from contactverif.run.runner import judge_case, run
 from contactverif_properties.shared.wave_answer import answer_to_wave
 from contactverif_properties.stability_locking import DRIFT, ROUGHNESS
 

@@ -16,9 +16,9 @@ from contactverif.cli.counterexample_text import counterexample_text
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict, judge
 from contactverif.contract.subject import Subject
+from contactverif.problems.long_states import long_states
 from contactverif.run.driver import draw_cases
 from contactverif.run.runner import judge_case, run
-from contactverif.scenes.long_states import long_states
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
 from contactverif_properties.shared.any_state import prepare_state

@@ -242,7 +242,7 @@ def test_a_strip_of_nothing_is_nothing() -> None:
 
 
 def test_the_bodies_of_a_scene_are_drawn_without_solving_it() -> None:
-    from contactverif.scenes.catalogue import load_scene
+    from contactverif.problems.catalogue import load_scene
     from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
 
     assert not has_outline(flat([1], [1]))

@@ -9,8 +9,8 @@ import pytest
 
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
+from contactverif.problems.catalogue import load_scene
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.catalogue import load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw.scene_figures import draw_scene
 from contactverif_reports.draw.scene_meshes import close_up, magnifications

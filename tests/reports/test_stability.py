@@ -17,7 +17,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.scenes.stability_states import stability_scenes, stability_states
+from contactverif.problems.stability_states import stability_scenes, stability_states
 from contactverif.studies.stability_study import run_stability
 from contactverif_properties.shared.conditioning import MOST_ROUNDINGS
 from contactverif_properties.shared.sweep_measurement import CONDITION, ERROR, FORCE_ERROR

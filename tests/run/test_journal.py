@@ -17,6 +17,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
+from contactverif.problems.named_states import named_case
 from contactverif.run import pieces
 from contactverif.run.completeness import find_gap
 from contactverif.run.journal_folder import (
@@ -33,7 +34,6 @@ from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run_journal import NO_PLAN, Journal
 from contactverif.run.runner import Progress, RunStopped, run
 from contactverif.run.sampling import Sampling
-from contactverif.scenes.named_states import named_case
 
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.

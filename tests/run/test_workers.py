@@ -22,12 +22,12 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Outcome
 from contactverif.contract.result import Row, Run
 from contactverif.contract.subject import Subject
+from contactverif.problems.named_states import named_case
 from contactverif.run import workers
 from contactverif.run.packing import CaseChunk, pack, unpack
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import run
 from contactverif.run.workers import WorkerError, default_jobs, usable_cores, worker_pool
-from contactverif.scenes.named_states import named_case
 
 PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
 

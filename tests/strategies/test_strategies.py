@@ -17,10 +17,10 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import default_points, kink_margin, projection_cases
+from contactverif.problems.blocks import is_uniform, overhangs
+from contactverif.problems.catalogue import load_scene_case
+from contactverif.problems.named_states import NAMED, named_case
 from contactverif.run.driver import draw_cases
-from contactverif.scenes.blocks import is_uniform, overhangs
-from contactverif.scenes.catalogue import load_scene_case
-from contactverif.scenes.named_states import NAMED, named_case
 from contactverif.strategies import flat_cases, general_cases, smooth_cases, tie_cases
 from contactverif.strategies.parts import lengths
 from contactverif.strategies.rings import Ring

@@ -21,8 +21,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.accuracy import solve_in_tries
+from contactverif.problems.hertz_errors import HertzStudy, hertz_errors
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.hertz_errors import HertzStudy, hertz_errors
 from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
 from contactverif.studies.bench.bench_scenes import make_task
 from contactverif.studies.bench.bench_study import run_bench

@@ -18,11 +18,11 @@ from contactverif.contract.case import Case
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import Solution, force_error, pressure_error, shape_integrals
 from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.problems import blocks, kinked_patch, ring_errors, wavy_errors
+from contactverif.problems.hertz_errors import NEARLY_BALANCED, HertzStudy, errors_of_solution
+from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
+from contactverif.problems.wavy import COLUMNS, UPPER, WavyProblem, wavy_scene
 from contactverif.run.driver import draw_cases
-from contactverif.scenes import blocks, kinked_patch, ring_errors, wavy_errors
-from contactverif.scenes.hertz_errors import NEARLY_BALANCED, HertzStudy, errors_of_solution
-from contactverif.scenes.shrink_fit import ShrinkFit, shrink_fit
-from contactverif.scenes.wavy import COLUMNS, UPPER, WavyProblem, wavy_scene
 from contactverif.strategies.solids import block_cases
 from contactverif_reports.bench.results import RANDOM, Cell
 

@@ -16,12 +16,14 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
 
 SMALLEST, LARGEST = 0.125, 0.25  # The range of random multipliers over the shortest segment.
 
 
+@random_source("contactverif_properties.shared.any_state.any_cases")
 def any_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     """Return a strategy of random meshes and states, exact ties among them.
 

@@ -43,7 +43,7 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
     Parameters
     ----------
     case : Case
-        A state of `contactverif.scenes.hard_corner_states`.
+        A state of `contactverif.problems.hard_corner_states`.
     subject : Subject
         The formulation; all of its multipliers, if it has any, press as the typical gap would.
 

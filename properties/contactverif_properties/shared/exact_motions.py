@@ -1,7 +1,7 @@
 """Exact motions: a state of coordinates with few bits is turned by a Pythagorean triple and shifted without rounding.
 
 Rule for the next editor: nothing is rounded on the way. What arrives is the exact image of what was there, so that the
-forces of the image are the exact image of the forces. `contactverif.scenes.stability_states` makes such states.
+forces of the image are the exact image of the forces. `contactverif.problems.stability_states` makes such states.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_points import (
@@ -157,6 +158,7 @@ def name_places(points: ContactPoints) -> BoolArray:
     return named
 
 
+@random_source("contactverif_properties.shared.exact_places.projected_cases")
 def projected_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
     """Return a strategy for each kind of projection, and for larger random states and exact ties.
 

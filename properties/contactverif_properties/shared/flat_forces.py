@@ -50,7 +50,7 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     Parameters
     ----------
     case : Case
-        A state of `contactverif.scenes.flat_states`.
+        A state of `contactverif.problems.flat_states`.
     subject : Subject
         The formulation.
 

@@ -10,6 +10,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.random_source import random_source
 from contactverif.strategies import flat_cases, general_cases
 
 CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.
@@ -18,6 +19,7 @@ FAR = 2.0  # A distance in longest segments: the shapes of a mortar method reach
 FLAT, ANY_SHAPE = "flat", "any shape"
 
 
+@random_source("contactverif_properties.shared.openings.pushing_cases")
 def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]]:
     """Return flat cases with a uniform penetration, and states of any shape, each half of all cases.
 

@@ -9,7 +9,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Surface
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.blocks import overhangs
+from contactverif.problems.blocks import overhangs
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import consistent_forces
 

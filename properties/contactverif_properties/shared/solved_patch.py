@@ -3,7 +3,7 @@
 The patch test asks about the residual alone, so Newton's method differentiates the residual by itself, and the
 formulation's own tangent plays no part. The question is whether the exact solution is a solution of the formulation.
 
-Rule for the next editor: the exact stress and the tolerances come from `contactverif.scenes.uniform_stress`, the errors
+Rule for the next editor: exact stress and tolerances come from `contactverif.problems.uniform_stress`, the errors
 from `patch_errors`; this file solves, and puts numbers and tolerances together.
 """
 
@@ -21,8 +21,8 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
-from contactverif.scenes.blocks import exact_unknowns, pressure_of
-from contactverif.scenes.uniform_stress import (
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.uniform_stress import (
     PRESSURE_TOLERANCE,
     STRESS_TOLERANCE,
     stress_error,

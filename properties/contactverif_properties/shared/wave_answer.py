@@ -15,8 +15,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.system import System
-from contactverif.scenes.blocks import exact_unknowns
-from contactverif.scenes.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
+from contactverif.problems.blocks import exact_unknowns
+from contactverif.problems.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
 from contactverif_properties.shared.exact_multipliers import exact_multipliers
 from contactverif_properties.shared.frozen_solution import solve_frozen
 

@@ -5,8 +5,8 @@ refined. In two more studies one of the meshes is four times finer than the othe
 the finer ones are made here. Each scene has the exact field of its own penalty, so that the errors are those of the
 meshes alone.
 
-Rule for the next editor: the exact field is in `contactverif.scenes.wavy`, the errors are those of
-`contactverif.scenes.wavy_errors`. Bounds belong to the properties, with the measurements that they come from.
+Rule for the next editor: the exact field is in `contactverif.problems.wavy`, the errors are those of
+`contactverif.problems.wavy_errors`. Bounds belong to the properties, with the measurements that they come from.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from contactverif.contract.property import Measurement
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import fit_rate, solve_for_accuracy
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.wavy import COLUMNS, LOWER, UPPER, WavyProblem, wavy_scene
-from contactverif.scenes.wavy_errors import (
+from contactverif.problems.wavy import COLUMNS, LOWER, UPPER, WavyProblem, wavy_scene
+from contactverif.problems.wavy_errors import (
     MASTER_FORCES,
     MASTER_MOTION,
     PRESSURE,

@@ -19,7 +19,7 @@ from contactverif.mechanics.accuracy import (
     shape_integrals,
     traction_forces,
 )
-from contactverif.scenes.shrink_fit import FiniteFit, Role, ShrinkFit
+from contactverif.problems.shrink_fit import FiniteFit, Role, ShrinkFit
 
 
 def ring_force_error(solution: Solution, fit: FiniteFit, slave: Role, *, of_master: bool = False) -> float:

@@ -30,7 +30,7 @@ from contactverif.mechanics.accuracy import (
     traction_forces,
 )
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.disk import DiskProblem, disk_on_foundation
+from contactverif.problems.disk import DiskProblem, disk_on_foundation
 
 PAPER = DiskProblem()
 FINER = 4  # The mesh of the reference is so many times finer.

@@ -9,7 +9,7 @@ from functools import cache
 from itertools import product
 
 from contactverif.contract.case import Case
-from contactverif.scenes.flat_states import STEEP, TURNED, UPRIGHT, Master, flat_master, flat_state
+from contactverif.problems.flat_states import STEEP, TURNED, UPRIGHT, Master, flat_master, flat_state
 
 _TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED, ", turned 5-12-13": STEEP}
 _TWO_TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED}

@@ -34,9 +34,9 @@ from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.disk import grade
-from contactverif.scenes.half_plane import displacements, stresses, surface_displacements
-from contactverif.scenes.line_pressure import LinePressure, hertz_contact, layer_contact
+from contactverif.problems.disk import grade
+from contactverif.problems.half_plane import displacements, stresses, surface_displacements
+from contactverif.problems.line_pressure import LinePressure, hertz_contact, layer_contact
 
 # Lengths over the half-width of the contact.
 SIDE, DEPTH = 4.0, 8.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.scenes.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
+from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 
 ROOF = KinkedPatch(line=((0.0, 0.0), (4.0, 3.0), (8.0, 0.0)), pressure=1e-3)
 

@@ -15,11 +15,11 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
+from contactverif.problems import catalogue
+from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
+from contactverif.problems.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
+from contactverif.problems.disk import disk_on_foundation
 from contactverif.run.registry import load_formulation
-from contactverif.scenes import catalogue
-from contactverif.scenes.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
-from contactverif.scenes.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
-from contactverif.scenes.disk import disk_on_foundation
 
 every_name = pytest.mark.parametrize("name", BLOCKS)
 every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])

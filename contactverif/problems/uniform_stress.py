@@ -22,7 +22,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.blocks import pressure_of
+from contactverif.problems.blocks import pressure_of
 
 CONDITION_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r"
 STRESS_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂ + M U/ℓ)/p"

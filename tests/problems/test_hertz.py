@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.scenes import hertz
-from contactverif.scenes.hertz import solve_winkler_contact
+from contactverif.problems import hertz
+from contactverif.problems.hertz import solve_winkler_contact
 
 FORCE, RADIUS, PENALTY = 1e6, 10.0, 1e9
 STIFFNESS = 1 / (1 / 1e8 + 1 / 1e9)

@@ -18,7 +18,7 @@ from math import pi
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.scenes.line_pressure import LinePressure
+from contactverif.problems.line_pressure import LinePressure
 
 _CHUNK = 512  # Number of points that are superposed at once, so that tables stay in the cache.
 

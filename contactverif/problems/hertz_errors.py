@@ -20,7 +20,7 @@ from contactverif.mechanics.accuracy import (
     solve_for_accuracy,
 )
 from contactverif.mechanics.scene import Scene
-from contactverif.scenes.hertz_box import HertzBox, exact_displacements, exact_forces, exact_moves, hertz_box
+from contactverif.problems.hertz_box import HertzBox, exact_displacements, exact_forces, exact_moves, hertz_box
 
 BOX = HertzBox()
 # An iterate that is out of balance by less than this share of the largest nodal force tells the errors of a solution.

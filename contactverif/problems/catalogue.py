@@ -29,8 +29,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.disk import DiskProblem, disk_on_foundation
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.disk import DiskProblem, disk_on_foundation
 
 MODERATE_PENALTY = 10.0  # The dimensionless penalty ε̂ h / E of a scene, unless one is given.
 _MATERIAL = "E = 1e4, ν = 0.3 in both; rollers at all sides; heights; two layers of cells"

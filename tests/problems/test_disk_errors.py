@@ -8,7 +8,7 @@ import pytest
 from subjects import load_subject
 
 from contactverif.mechanics.accuracy import Solution
-from contactverif.scenes.disk_errors import DiskErrors, disk_errors, solve_disk_for_accuracy
+from contactverif.problems.disk_errors import DiskErrors, disk_errors, solve_disk_for_accuracy
 
 FINE = 2  # The numbers on the site are those of four times. Twice is enough here, and a tenth of the work.
 

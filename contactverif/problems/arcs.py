@@ -41,7 +41,7 @@ class Arcs:
 
     Examples
     --------
-    >>> from contactverif.scenes.arcs import Arcs
+    >>> from contactverif.problems.arcs import Arcs
     >>> arcs = Arcs(convex_slave=True)
     >>> arcs.slave_radius, arcs.pressure
     (4.1, 1.0)

@@ -10,7 +10,7 @@ import pytest
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics.bulk import elasticity
-from contactverif.scenes.wavy import (
+from contactverif.problems.wavy import (
     LOWER,
     UPPER,
     WavyProblem,

@@ -19,8 +19,8 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import MODERATE_PENALTY, load_scene_case
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.catalogue import MODERATE_PENALTY, load_scene_case
 
 _BESIDE = 0.5  # The length by which the master goes beyond the slave on either side.
 _STRAIN = 2.0**-6  # The pressure over the softer body's E.

@@ -48,7 +48,7 @@ class KinkedPatch:
     --------
     A roof: two normals, and a penetration of 0.1 along both is a translation.
 
-    >>> from contactverif.scenes.kinked_patch import KinkedPatch
+    >>> from contactverif.problems.kinked_patch import KinkedPatch
     >>> roof = KinkedPatch(line=((0.0, 0.0), (4.0, 3.0), (8.0, 0.0)))
     >>> roof.normals.tolist()
     [[-0.6, 0.8], [0.6, 0.8]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contactverif.scenes.arcs import Arcs
+from contactverif.problems.arcs import Arcs
 
 
 @pytest.mark.parametrize("convex", [True, False])

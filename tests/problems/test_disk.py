@@ -15,9 +15,9 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import End
+from contactverif.problems.catalogue import make_scene
+from contactverif.problems.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif.run.registry import load_formulation
-from contactverif.scenes.catalogue import make_scene
-from contactverif.scenes.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, PaperFormulation
 

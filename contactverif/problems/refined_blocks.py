@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.scenes.blocks import two_blocks
+from contactverif.problems.blocks import two_blocks
 
 WIDTH, HEIGHT = 4.0, 1.0
 POISSON = 0.3

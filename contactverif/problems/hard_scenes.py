@@ -15,10 +15,10 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle
-from contactverif.scenes.blocks import two_blocks
-from contactverif.scenes.catalogue import load_scene_case
-from contactverif.scenes.hard_flat_states import TINY_MESHES, TINY_PENALTIES
-from contactverif.scenes.named_states import named_case
+from contactverif.problems.blocks import two_blocks
+from contactverif.problems.catalogue import load_scene_case
+from contactverif.problems.hard_flat_states import TINY_MESHES, TINY_PENALTIES
+from contactverif.problems.named_states import named_case
 
 _STRAIN = 2.0**-6  # The pressure over the softer body's E.
 _HEIGHT = 6.0

@@ -4,7 +4,7 @@ The pressure is symmetrical, p(x) = p(−x), and 0 for |x| ≥ a. It is a polyno
 shorter and shorter towards the edges: a penalty ε̂ makes a boundary layer there, whose width is E*/ε̂. All integrals of
 the pressure with 1, s and ln|x − s| are exact on these polynomials.
 
-Rule for the next editor: nothing here knows a mesh, a body or a formulation. `contactverif.scenes.hertz` solves the
+Rule for the next editor: nothing here knows a mesh, a body or a formulation. `contactverif.problems.hertz` solves the
 same equation for a given force, with fewer terms; a test compares both.
 
 References

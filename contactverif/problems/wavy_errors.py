@@ -1,6 +1,6 @@
 """The errors of a formulation on wavy half-planes in full contact: forces, displacements and pressures of a solution.
 
-Rule for the next editor: the exact field is in `contactverif.scenes.wavy`, the measures are those of
+Rule for the next editor: the exact field is in `contactverif.problems.wavy`, the measures are those of
 `contactverif.mechanics.accuracy`. Nothing is solved here.
 """
 
@@ -20,7 +20,7 @@ from contactverif.mechanics.accuracy import (
     shape_integrals,
     traction_forces,
 )
-from contactverif.scenes.wavy import UPPER, WavyProblem, wavy_displacements, wavy_pressure
+from contactverif.problems.wavy import UPPER, WavyProblem, wavy_displacements, wavy_pressure
 
 SLAVE_FORCES, MASTER_FORCES = "slave force error", "master force error"
 SLAVE_MOTION, MASTER_MOTION = "slave displacement error", "master displacement error"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.scenes.half_plane import displacements, mcewan_stresses, stresses, surface_displacements
-from contactverif.scenes.line_pressure import LinePressure, hertz_pressure, layer_contact
+from contactverif.problems.half_plane import displacements, mcewan_stresses, stresses, surface_displacements
+from contactverif.problems.line_pressure import LinePressure, hertz_pressure, layer_contact
 
 YOUNG, POISSON = 2.0, 0.3
 PRESSURES = {"Hertz": hertz_pressure(1.0, 1.0), "layer": layer_contact(1.0, 1.0, 2.0, 20.0)}

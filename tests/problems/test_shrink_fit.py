@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.scenes.shrink_fit import Role, ShrinkFit, rings_of, shrink_fit
+from contactverif.problems.shrink_fit import Role, ShrinkFit, rings_of, shrink_fit
 
 RINGS: tuple[Role, Role] = ("inner", "outer")
 

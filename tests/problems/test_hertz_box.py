@@ -8,8 +8,7 @@ import pytest
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
-from contactverif.run.registry import load_formulation
-from contactverif.scenes.hertz_box import (
+from contactverif.problems.hertz_box import (
     COARSEST,
     HertzBox,
     exact_displacements,
@@ -18,6 +17,7 @@ from contactverif.scenes.hertz_box import (
     mesh_lines,
     nodal_forces,
 )
+from contactverif.run.registry import load_formulation
 
 BOX = HertzBox()
 MESHES = (16, 23, 24, 33, 48, 54)

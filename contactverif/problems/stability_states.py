@@ -20,7 +20,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.scenes.blocks import two_blocks
+from contactverif.problems.blocks import two_blocks
 
 TURN = (3.0, 4.0)  # The rotation by cos = 3/5 and sin = 4/5.
 HYPOTENUSE = 5.0

@@ -23,7 +23,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.scenes.blocks import two_blocks
+from contactverif.problems.blocks import two_blocks
 
 LENGTH, HEIGHT, POISSON = 4.0, 1.0, 0.3
 N_ROWS = 4
