@@ -63,10 +63,10 @@ _HOMES = {
     "meshes.mesh_file": ("read_interface",),
     "run.registry": ("load_formulation", "load_properties"),
     "run.runner": ("judge_case", "verify"),
-    "scenes.blocks": ("two_blocks",),
-    "scenes.catalogue": ("load_scene",),
-    "scenes.named_states": ("named_case",),
-    "scenes.shrink_fit": ("ShrinkFit", "shrink_fit"),
+    "problems.blocks": ("two_blocks",),
+    "problems.catalogue": ("load_scene",),
+    "problems.named_states": ("named_case",),
+    "problems.shrink_fit": ("ShrinkFit", "shrink_fit"),
 }
 _NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
