@@ -12,26 +12,7 @@ from contactverif_reports.draw import draw_case
 
 
 def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
-    """Draw the case of an outcome to a file.
-
-    Parameters
-    ----------
-    subject : Subject
-        The formulation whose forces are drawn.
-    question : Property
-        The property that was checked; it may know the exact forces.
-    outcome : Outcome
-        The case and what became of it.
-    path : Path
-        The .png or .svg file.
-    argument : str
-        The option that named the file, for an error message.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written.
-    """
+    """Draw the case of an outcome to a file."""
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
     forces = forces_on(outcome.case, subject)
     exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None

@@ -129,13 +129,7 @@ def _only_one(option: str, values: Sequence[str]) -> str | None:
 
 
 def _reports_among(names: Sequence[str]) -> list[Path]:
-    """Return the two reports, if the names are those of reports; nothing if they are those of formulations.
-
-    Raises
-    ------
-    MisuseError
-        If the names are of both kinds, or not those of two reports.
-    """
+    """Return the two reports, if the names are those of reports; nothing if they are those of formulations."""
     reports = [name for name in names if _is_report(name)]
     if not reports:
         return []

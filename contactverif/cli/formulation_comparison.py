@@ -62,24 +62,7 @@ class Contest:
 def load_contest(
     names: Sequence[str], reference_name: str, globs: Sequence[str], limits: Limits | None = None
 ) -> Contest:
-    """Load the formulations and the properties.
-
-    Parameters
-    ----------
-    names : Sequence[str]
-        The candidates, as typed on the command line.
-    reference_name : str
-        The formulation to compare them with.
-    globs : Sequence[str]
-        Patterns of property ids.
-    limits : Limits | None
-        The limits of the processes in which the plugins live; None to load them in this process.
-
-    Raises
-    ------
-    MisuseError
-        If there is no candidate, a name or a pattern matches nothing, or the reference does not load.
-    """
+    """Load the formulations and the properties."""
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")

@@ -28,35 +28,14 @@ LABELS = {
 
 @dataclass(frozen=True, slots=True)
 class OutputFiles:
-    """The files of one command, at most one of each suffix.
+    """The files of one command, at most one of each suffix."""
 
-    Attributes
-    ----------
-    names : Mapping[str, Path]
-        {suffix: name as the user typed it}.
-    paths : Mapping[str, Path]
-        {suffix: absolute path}. A plugin may change the working folder while it runs.
-    """
-
-    names: Mapping[str, Path]
-    paths: Mapping[str, Path]
+    names: Mapping[str, Path]  # {suffix: name as the user typed it}.
+    paths: Mapping[str, Path]  # {suffix: absolute path}. A plugin may change the working folder while it runs.
 
     @classmethod
     def check(cls, names: Sequence[Path] | None, suffixes: Sequence[str]) -> OutputFiles:
-        """Return the files, once it is sure that they can be written.
-
-        Parameters
-        ----------
-        names : Sequence[Path] | None
-            The name behind each `--out` of the command line.
-        suffixes : Sequence[str]
-            The kinds of files that the command writes, such as ".nc".
-
-        Raises
-        ------
-        MisuseError
-            If a name ends otherwise, two names end alike, or a file cannot be written.
-        """
+        """Return the files, once it is sure that they can be written."""
         from contactverif_reports.files import check_writable
 
         by_suffix: dict[str, Path] = {}
@@ -92,28 +71,14 @@ class OutputFiles:
 
 @dataclass(frozen=True, slots=True)
 class PictureFolder:
-    """The folder that `--pictures` names, which exists.
+    """The folder that `--pictures` names, which exists."""
 
-    Attributes
-    ----------
-    name : Path
-        The folder as the user typed it.
-    path : Path
-        The same as an absolute path.
-    """
-
-    name: Path
-    path: Path
+    name: Path  # The folder as the user typed it.
+    path: Path  # The same as an absolute path.
 
     @classmethod
     def make(cls, name: Path | None) -> PictureFolder | None:
-        """Make the folder if it is not there; return None without a name.
-
-        Raises
-        ------
-        MisuseError
-            If the folder cannot be made.
-        """
+        """Make the folder if it is not there; return None without a name."""
         if name is None:
             return None
         from contactverif_reports.files import made_folder

@@ -21,27 +21,7 @@ from contactverif_reports.netcdf.read import read_run
 
 
 def compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFiles) -> bool:
-    """Show what changed from an old report to a new one, and write the page.
-
-    Parameters
-    ----------
-    paths : Sequence[Path]
-        The old report and the new one.
-    globs : Sequence[str]
-        Patterns of property ids; none means all.
-    files : OutputFiles
-        At most a page.
-
-    Returns
-    -------
-    bool
-        Whether nothing got worse.
-
-    Raises
-    ------
-    MisuseError
-        If a file is no report of this schema, or the two have nothing in common.
-    """
+    """Show what changed from an old report to a new one, and write the page; return whether nothing got worse."""
     old, new = (_read(path, argument) for path, argument in zip(paths, ("OLD.nc", "NEW.nc"), strict=True))
     every = dict.fromkeys([*old.properties, *new.properties])
     ids = _select(every, globs)

@@ -36,31 +36,7 @@ def draw_scene_or_case(
     files: OutputFiles,
     limits: Limits | None = None,
 ) -> bool:
-    """Draw a named scene, or a counterexample of a report.
-
-    Parameters
-    ----------
-    report, case_id : Path | None or str | None
-        The counterexample; both or none of them.
-    scene : str | None
-        The scene with its options, such as "c:refine=2".
-    names : Sequence[str]
-        The formulations. For a counterexample none means the one that failed.
-    files : OutputFiles
-        Pictures, and at most one .vtu file.
-    limits : Limits | None
-        The limits of the processes in which the plugins live; None to load them in this process.
-
-    Returns
-    -------
-    bool
-        Whether every formulation loaded and kept its contract.
-
-    Raises
-    ------
-    MisuseError
-        If it is not clear what is to be drawn.
-    """
+    """Draw a scene or a counterexample; return whether every formulation loaded and kept its contract."""
     for name in names:
         if list(names).count(name) > 1:
             raise MisuseError("--formulation", f"{name} twice", "each formulation once")

@@ -91,13 +91,7 @@ class WorkerOptions:
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help=JOBS_HELP, metavar="N")] = None
 
     def number(self, n_formulations: int, n_properties: int, examples: int) -> int:
-        """Return the number of processes: the user's, or one that fits the work.
-
-        Raises
-        ------
-        MisuseError
-            If it is less than 1, or many times the number of cores.
-        """
+        """Return the number of processes: the user's, or one that fits the work."""
         from contactverif.run.workers import check_jobs, default_jobs
 
         if self.jobs is None:
@@ -129,11 +123,6 @@ class IsolationOptions:
 
         Without a choice of the user a plugin has a process of its own, but under pytest, where a test may want to look
         into it.
-
-        Raises
-        ------
-        MisuseError
-            If a limit is not positive.
         """
         from contactverif.isolation.limits import Limits
 
@@ -163,13 +152,7 @@ class PlaceOptions:
     ] = None
 
     def read_interface(self) -> Interface | None:
-        """Return the interface of the mesh, None without a mesh.
-
-        Raises
-        ------
-        MisuseError
-            If the file or a group of it cannot be read, or a group is named without a mesh.
-        """
+        """Return the interface of the mesh, None without a mesh."""
         if self.mesh is None:
             for option, value in (("--slave", self.slave), ("--master", self.master), ("--flip", self.flip or None)):
                 if value is not None:
@@ -183,13 +166,7 @@ class PlaceOptions:
         return read_interface(self.mesh, slave=self.slave, master=self.master, flip=self.flip)
 
     def make_scene(self) -> Case | None:
-        """Return the case of the scene, None without a scene.
-
-        Raises
-        ------
-        MisuseError
-            If there is no such scene or option, or a mesh too.
-        """
+        """Return the case of the scene, None without a scene."""
         if self.scene is None:
             return None
         if self.mesh is not None:
@@ -200,18 +177,7 @@ class PlaceOptions:
 
 
 def spell_out_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command with each group of options replaced by its options, as typer needs it.
-
-    Parameters
-    ----------
-    command : Callable[..., None]
-        A command whose parameters may be annotated with a dataclass from this file.
-
-    Returns
-    -------
-    Callable[..., None]
-        The same command, called with keyword arguments only.
-    """
+    """Return the command with each group of options replaced by its options, as typer needs it."""
     hints = typing.get_type_hints(command, include_extras=True)
     groups = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
 

@@ -10,18 +10,7 @@ from contactverif.run.registry import formulation_names
 
 
 def announce_stored(name: str) -> str:
-    """Say on standard error which formulation a report names, with which options, before it is loaded; return the name.
-
-    Parameters
-    ----------
-    name : str
-        The formulation as the report names it.
-
-    Raises
-    ------
-    MisuseError
-        If it is not installed, or no name of a formulation.
-    """
+    """Say on standard error which formulation a report names, before it is loaded; return the name."""
     base, options = parse_name("REPORT", name)
     installed = formulation_names()
     for part in base.split("/"):

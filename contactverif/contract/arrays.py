@@ -67,13 +67,7 @@ def dense(matrix: Any) -> FloatArray:
 
 
 def as_array(argument: str, values: ArrayLike) -> NDArray[Any]:
-    """Return the values as an array of any dtype and shape.
-
-    Raises
-    ------
-    MisuseError
-        If rows have different lengths.
-    """
+    """Return the values as an array of any dtype and shape."""
     try:
         return np.asarray(values)
     except ValueError as error:
@@ -91,11 +85,6 @@ def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> Float
         Real numbers.
     shape : tuple[int, ...]
         The shape that is needed; −1 stands for any length.
-
-    Raises
-    ------
-    MisuseError
-        If the values are no real numbers, or have another shape.
     """
     raw = as_array(argument, values)
     if raw.dtype.kind not in "fiu":
@@ -105,13 +94,7 @@ def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> Float
 
 
 def check_shape(argument: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
-    """Check the shape of an array, in which −1 stands for any length.
-
-    Raises
-    ------
-    MisuseError
-        If the array has another shape.
-    """
+    """Check the shape of an array, in which −1 stands for any length."""
     fits = array.ndim == len(shape) and all(
         length in (-1, actual) for length, actual in zip(shape, array.shape, strict=True)
     )

@@ -159,20 +159,11 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MeshCheck:
-    """The part of a check of a mesh for which node numbers are enough.
+    """The part of a check of a mesh for which node numbers are enough."""
 
-    Attributes
-    ----------
-    contact_nodes : IntArray, shape (n_contact_nodes,)
-        The numbers of the nodes on the contact boundary, ascending.
-    is_numbered : bool
-        Cells and contact edges are there, and no number is beyond the nodes.
-    fault : tuple[str, str, str] | None
-        The attribute of `Body` that is wrong, what was found and what is needed; None if nothing is.
-    """
-
-    contact_nodes: IntArray
-    is_numbered: bool
+    contact_nodes: IntArray  # (n_contact_nodes,) The numbers of the nodes on the contact boundary, ascending.
+    is_numbered: bool  # Cells and contact edges are there, and no number is beyond the nodes.
+    # The attribute of `Body` that is wrong, what was found and what is needed; None if nothing is.
     fault: tuple[str, str, str] | None
 
 

@@ -15,24 +15,12 @@ CaseKey = tuple[str, Verdict, bool]  # Kind, verdict, and whether the case was i
 
 @dataclass(frozen=True, slots=True)
 class CaseCounts:
-    """Numbers of cases.
+    """Numbers of cases."""
 
-    Attributes
-    ----------
-    judged : int
-        The cases that were decided: they pass, fail or crash.
-    failed : int
-        Those of the judged cases that fail or crash.
-    undecided : int
-        The cases that were measured, but left open whether they pass.
-    idle : int
-        Those of the judged cases in which nothing was in contact, so that a pass says little.
-    """
-
-    judged: int = 0
-    failed: int = 0
-    undecided: int = 0
-    idle: int = 0
+    judged: int = 0  # The cases that were decided: they pass, fail or crash.
+    failed: int = 0  # Those of the judged cases that fail or crash.
+    undecided: int = 0  # The cases that were measured, but left open whether they pass.
+    idle: int = 0  # Those of the judged cases in which nothing was in contact, so that a pass says little.
 
     def __add__(self, other: CaseCounts) -> CaseCounts:
         return CaseCounts(
@@ -74,20 +62,7 @@ def key_of(outcome: Outcome) -> CaseKey:
 
 
 def count_by_kind(info: PropertyInfo, numbers: Mapping[CaseKey, int]) -> dict[str, CaseCounts]:
-    """Return counts for each kind of case.
-
-    Parameters
-    ----------
-    info : PropertyInfo
-        The property. Its kinds come first, in their order, even those without a case.
-    numbers : Mapping[CaseKey, int]
-        The numbers of outcomes by the key of `key_of`.
-
-    Returns
-    -------
-    dict[str, CaseCounts]
-        {kind: counts}; cases of no kind are under the empty word, which comes last.
-    """
+    """Return {kind: counts}, the kinds of the property first; cases of no kind are under the empty word, at the end."""
     counts = dict.fromkeys(info.kinds, CaseCounts())
     for (kind, verdict, idle), number in sorted(numbers.items(), key=lambda entry: (not entry[0][0], entry[0])):
         counts[kind] = counts.get(kind, CaseCounts()) + _counts(verdict, number, idle=idle)

@@ -11,34 +11,17 @@ from contactverif.contract.foreign_text import clean
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """A case without its meshes. Two cases with equal summaries are taken for the same case.
+    """A case without its meshes. Two cases with equal summaries are taken for the same case."""
 
-    Attributes
-    ----------
-    n_slave_segments, n_master_segments : int
-        Numbers of segments.
-    penalty : float
-        Distributed stiffness ε̂, force per length per length of penetration.
-    largest_coordinate : float
-        The largest coordinate of state and reference, a length.
-    shortest_segment : float
-        The shortest current segment of both sides, a length.
-    parameters : Mapping[str, float]
-        {name: number} of the parameters that are one number each.
-    name : str
-        The name of a case that has one ("C", "C′"), else empty.
-    kind : str
-        The kind of situation, in words, of a case that has one, else empty.
-    """
-
-    n_slave_segments: int
+    n_slave_segments: int  # Numbers of segments.
     n_master_segments: int
-    penalty: float
-    largest_coordinate: float
-    shortest_segment: float
+    penalty: float  # Distributed stiffness ε̂, force per length per length of penetration.
+    largest_coordinate: float  # The largest coordinate of state and reference, a length.
+    shortest_segment: float  # The shortest current segment of both sides, a length.
+    # {name: number} of the parameters that are one number each.
     parameters: Mapping[str, float] = field(default_factory=dict)
-    name: str = ""
-    kind: str = ""
+    name: str = ""  # The name of a case that has one ("C", "C′"), else empty.
+    kind: str = ""  # The kind of situation, in words, of a case that has one, else empty.
 
     def __post_init__(self) -> None:
         clean(self, names=("name", "kind"))

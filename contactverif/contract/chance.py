@@ -11,22 +11,7 @@ BY_CHANCE = 1e-4
 
 
 def exceeds(count: int, number: int, share: float) -> bool:
-    """Return whether so many of some independent cases, or more, would be rarer than `BY_CHANCE`.
-
-    Parameters
-    ----------
-    count : int
-        The number of cases that are of some kind.
-    number : int
-        The number of all cases.
-    share : float
-        The probability that a case is of that kind.
-
-    Returns
-    -------
-    bool
-        True if the binomial probability of `count` or more is below `BY_CHANCE`.
-    """
+    """Return whether `count` or more of `number` cases, each of probability `share`, are rarer than `BY_CHANCE`."""
     if count <= number * share:
         return False
     return _at_least(count, number, share) < BY_CHANCE

@@ -22,19 +22,9 @@ _LONGEST_FILE_NAME = 180  # File systems take 255 bytes, and a suffix and the ma
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Counterexample:
-    """A case on which a formulation fails, or with which it says that it fails.
+    """A case on which a formulation fails, or with which it says that it fails."""
 
-    Attributes
-    ----------
-    id : str
-        The id on the command line, `vts-me_n_4.patch.flat.transmission`.
-    row : Row
-        The row that the case belongs to.
-    outcome : Outcome
-        The verdict on the case, with its numbers.
-    """
-
-    id: str
+    id: str  # The id on the command line, `vts-me_n_4.patch.flat.transmission`.
     row: Row
     outcome: Outcome
 
@@ -105,13 +95,7 @@ def named_failures(run: Run) -> dict[str, Counterexample]:
 
 
 def find_counterexample(run: Run, id_: str) -> Counterexample:
-    """Return the counterexample of that id.
-
-    Raises
-    ------
-    MisuseError
-        If there is none; the message names ids that exist.
-    """
+    """Return the counterexample of that id."""
     examples = {**named_failures(run), **counterexamples(run)}
     if id_ not in examples:
         raise MisuseError("--case", repr(id_), _suggestion(id_, list(examples)))

@@ -20,27 +20,15 @@ _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """The cases of one property, of all formulations that it was judged for.
-
-    Attributes
-    ----------
-    info : PropertyInfo
-        The property.
-    n_formulations : int
-        The number of formulations with at least one case.
-    counts : CaseCounts
-        All planned cases.
-    kinds : Mapping[str, CaseCounts]
-        {kind of situation: counts}, in the order of the property; empty if its cases are of no kind.
-    reasons : Mapping[str, int]
-        {reason: number of cases} of the undecided cases, the most frequent first. Numbers in a reason are replaced by
-        "…", so that cases that differ in a number alone have one reason.
-    """
+    """The cases of one property, of all formulations that it was judged for."""
 
     info: PropertyInfo
-    n_formulations: int
+    n_formulations: int  # The number of formulations with at least one case.
     counts: CaseCounts
+    # {kind of situation: counts}, in the order of the property; empty if its cases are of no kind.
     kinds: Mapping[str, CaseCounts]
+    # {reason: number of cases} of the undecided cases, the most frequent first. Numbers in a reason are replaced by
+    # "…", so that cases that differ in a number alone have one reason.
     reasons: Mapping[str, int]
 
     @classmethod

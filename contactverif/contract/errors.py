@@ -43,19 +43,10 @@ class NonFiniteError(ContractError):
 
 
 class PluginError(ContractError):
-    """The plugin raised an exception, which is the `__cause__` of this error, or its process ended.
+    """The plugin raised an exception, which is the `__cause__` of this error, or its process ended."""
 
-    Parameters
-    ----------
-    message : str
-        What the plugin did.
-    cause : {"exception", "memory", "exit", "signal", "hang", "channel", "not asked"}
-        The kind of what it did: an exception, no memory, an exit, a signal that ended its process, no answer in time,
-        or an answer that nobody can read. "not asked": it has ended its process too often to be asked again.
-    ended : bool
-        The process of the plugin has ended.
-    """
-
+    # Causes: "exception", "memory", "exit", "signal", "hang" (no answer in time), "channel" (no readable answer) and
+    # "not asked": it has ended its process too often to be asked again. `ended`: its process has ended.
     def __init__(self, message: str, cause: str = "exception", *, ended: bool = False) -> None:
         super().__init__(message)
         self.cause, self.ended = cause, ended

@@ -86,15 +86,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def clean(instance: object, *, names: tuple[str, ...] = (), lines: tuple[str, ...] = ()) -> None:
-    """Make attributes of a frozen dataclass fit to be shown; its constructor calls this.
-
-    Parameters
-    ----------
-    instance : object
-        The dataclass.
-    names, lines : tuple[str, ...]
-        The attributes that hold a name, or a line of words.
-    """
+    """Make attributes of a frozen dataclass fit to be shown; its constructor calls this."""
     for attributes, longest in ((names, LONGEST_NAME), (lines, LONGEST_LINE)):
         for attribute in attributes:
             text = getattr(instance, attribute)
@@ -104,13 +96,7 @@ def clean(instance: object, *, names: tuple[str, ...] = (), lines: tuple[str, ..
 
 
 def refuse(argument: str, *names: str) -> None:
-    """Raise an error for a name that other parts refer to, so that it cannot be changed, if it cannot be shown.
-
-    Raises
-    ------
-    MisuseError
-        If a name is too long or holds a character that cannot be shown.
-    """
+    """Raise an error for a name that other parts refer to, so that it cannot be changed, if it cannot be shown."""
     for name in names:
         if name_line(name) != name:
             raise MisuseError(argument, repr(name_line(name)), f"at most {LONGEST_NAME} characters that can be shown")

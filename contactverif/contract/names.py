@@ -14,22 +14,7 @@ from contactverif.contract.errors import MisuseError
 
 
 def unknown_name_error(argument: str, name: str, names: Iterable[str]) -> MisuseError:
-    """Return the error for a name that does not exist; it suggests the nearest names, or lists all if none is near.
-
-    Parameters
-    ----------
-    argument : str
-        What the message begins with: the argument as the caller wrote it.
-    name : str
-        The name that does not exist.
-    names : Iterable[str]
-        The names that exist.
-
-    Returns
-    -------
-    MisuseError
-        The error, to be raised by the caller.
-    """
+    """Return the error for a name that does not exist; it suggests the nearest names, or lists all if none is near."""
     every = sorted(names)
     near = difflib.get_close_matches(name, every, n=3)
     if near:
@@ -41,27 +26,6 @@ def parse_name(
     argument: str, text: str, form: str = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 ) -> tuple[str, dict[str, Any]]:
     """Split `name:option=value,option=value` into the name and its options.
-
-    Parameters
-    ----------
-    argument : str
-        The argument that holds the text, for messages.
-    text : str
-        A name, with or without options. A value is read as bool (`true`, `false`), int, float or else as text.
-    form : str
-        The form that a message says is needed.
-
-    Returns
-    -------
-    name : str
-        The name before the colon.
-    options : dict[str, Any]
-        The values by option, in the order of the text.
-
-    Raises
-    ------
-    MisuseError
-        If the text does not have that form, or names an option twice.
 
     Examples
     --------

@@ -18,52 +18,28 @@ _Choice = TypeVar("_Choice")
 
 
 def choose(option: str, word: str, choices: Mapping[str, _Choice]) -> _Choice:
-    """Return the value that the word of an option stands for.
-
-    Raises
-    ------
-    MisuseError
-        If the word is none of the choices.
-    """
+    """Return the value that the word of an option stands for."""
     if not isinstance(word, str) or word not in choices:
         raise MisuseError(option, repr(word), " or ".join(map(repr, choices)))
     return choices[word]
 
 
 def check_penalty(penalty: float) -> float:
-    """Return the penalty as a float.
-
-    Raises
-    ------
-    MisuseError
-        If the penalty is no finite number above zero.
-    """
+    """Return the penalty as a float."""
     if isinstance(penalty, bool) or not isinstance(penalty, int | float) or not (isfinite(penalty) and penalty > 0):
         raise MisuseError("penalty", repr(penalty), "a finite number > 0")
     return float(penalty)
 
 
 def check_count(n: int, name: str = "n") -> int:
-    """Return the option n, the number of points on a slave segment, or another option that counts, by its name.
-
-    Raises
-    ------
-    MisuseError
-        If n is no whole number from 1 to 1000; with more points, arrays would not fit into memory.
-    """
+    """Return the option n, the number of points on a slave segment, or another option that counts, by its name."""
     if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_POINTS:
         raise MisuseError(name, repr(n), f"a whole number from 1 to {MOST_POINTS}")
     return n
 
 
 def check_tau(tau: float) -> float:
-    """Return τ, the part of a master segment by which a foot may lie past its free end, as a float.
-
-    Raises
-    ------
-    MisuseError
-        If τ is no number from 0 to below 1.
-    """
+    """Return τ, the part of a master segment by which a foot may lie past its free end, as a float."""
     if isinstance(tau, bool) or not isinstance(tau, int | float) or not 0 <= tau < 1:
         raise MisuseError("tau", repr(tau), "a number ≥ 0 and < 1")
     return float(tau)

@@ -18,16 +18,6 @@ Fractions = tuple[Fraction, ...]
 def parse_forces(text: str) -> tuple[Fractions, Fractions]:
     """Return the forces on the slave nodes and on the master nodes, from left to right, over penalty × penetration.
 
-    Parameters
-    ----------
-    text : str
-        Two rows with a semicolon between them, such as ``"1 2 1; 2 2"``; fractions are written ``5/3``.
-
-    Raises
-    ------
-    ContractError
-        If the text has another form.
-
     Examples
     --------
     >>> slave, master = parse_forces("1 2 1; 2 2")

@@ -46,45 +46,23 @@ class Result(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ClosestNumber:
-    """The number of a row that came closest to its tolerance, or went furthest beyond it.
-
-    Attributes
-    ----------
-    number : CheckedNumber
-        Value and tolerance.
-    case : int | None
-        The number of the random case; None for the witness.
-    """
+    """The number of a row that came closest to its tolerance, or went furthest beyond it."""
 
     number: CheckedNumber
-    case: int | None
+    case: int | None  # The number of the random case; None for the witness.
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """The counts over all outcomes of a row.
+    """The counts over all outcomes of a row."""
 
-    Attributes
-    ----------
-    verdicts : Mapping[Verdict, int]
-        Numbers of random cases with each verdict.
-    reasons : Mapping[str, int]
-        {reason: number of random cases} of the cases that were not decided, the most frequent first.
-    counts : CaseCounts
-        The numbers of planned cases that were judged, failed, undecided and idle.
-    kinds : Mapping[str, CaseCounts]
-        {kind of situation: the same numbers}; empty if the cases are of no kind.
-    breach : bool
-        The plugin broke the contract in some case, the witness included.
-    closest : ClosestNumber | None
-        The closest number of all decided cases, the witness included; None if nothing was measured.
-    """
-
-    verdicts: Mapping[Verdict, int]
+    verdicts: Mapping[Verdict, int]  # Numbers of random cases with each verdict.
+    # {reason: number of random cases} of the cases that were not decided, the most frequent first.
     reasons: Mapping[str, int]
-    counts: CaseCounts
-    kinds: Mapping[str, CaseCounts]
-    breach: bool
+    counts: CaseCounts  # The numbers of planned cases that were judged, failed, undecided and idle.
+    kinds: Mapping[str, CaseCounts]  # {kind of situation: the same numbers}; empty if the cases are of no kind.
+    breach: bool  # The plugin broke the contract in some case, the witness included.
+    # The closest number of all decided cases, the witness included; None if nothing was measured.
     closest: ClosestNumber | None
 
     @classmethod
@@ -283,15 +261,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NotLoaded:
-    """A formulation (or a property, under its id) that could not be loaded, so that nothing was checked.
-
-    Attributes
-    ----------
-    formulation : str
-        The name of the plugin.
-    reason : str
-        The error that loading it raised.
-    """
+    """A formulation (or a property, under its id) that could not be loaded, so that nothing was checked."""
 
     formulation: str
     reason: str

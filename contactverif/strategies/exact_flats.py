@@ -31,11 +31,6 @@ _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return states of uniform penetration, near the origin, whose exact forces are rationals.
 
-    Parameters
-    ----------
-    interface : Interface | None
-        Random meshes if None. A given interface has no such states.
-
     Returns
     -------
     SearchStrategy[Case] | None
@@ -47,19 +42,7 @@ def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case]
 
 
 def linear_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return states of a penetration that is linear along a straight slave, near the origin.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        Random meshes if None. A given interface has no such states.
-
-    Returns
-    -------
-    SearchStrategy[Case] | None
-        Cases with the parameter "shift", as `exact_flat_cases` returns them, and "slope" (of the slave). All slave
-        nodes penetrate, by 2^-13 to 2^-5 of a segment, and lie exactly on a straight line.
-    """
+    """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
     return _linear_flat_cases() if interface is None else None
 
 

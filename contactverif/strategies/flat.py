@@ -40,11 +40,6 @@ def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration; every slave point projects inside the master.
 
-    Parameters
-    ----------
-    interface : Interface | None
-        Random meshes if None; else states of this one, moved along its normal.
-
     Returns
     -------
     SearchStrategy[Case] | None

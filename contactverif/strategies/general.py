@@ -45,13 +45,7 @@ _TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # slop
 
 
 def general_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return states of any kind; one in eight exactly on the lattice, the others off it by some sevenths.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        Random meshes if None; else random states of this one.
-    """
+    """Return states of any kind; one in eight exactly on the lattice, the others off it by some sevenths."""
     return _general_cases(smooth=False) if interface is None else given_interface.states(interface, smooth=False)
 
 
@@ -77,35 +71,19 @@ def _general_cases(draw: DrawFn, smooth: bool) -> Case:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A slave chain below a broken line.
+    """A slave chain below a broken line."""
 
-    Attributes
-    ----------
-    steps : Sequence[tuple[float, int, int]]
-        The master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
-    bend : float
-        The steepness of a rise of 1; walls are steep anyway.
-    slave : Sequence[float]
-        Lengths along of the slave segments.
-    start : int
-        X of the slave's first node; the master's is at 0. The slave moves on, and the master grows, until half of a
-        slave segment is over it.
-    tilt : float
-        Slope of the slave against the master, turned about its middle, flatter for long chains.
-    quarters, unit : Sequence[int] or float
-        Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
-    upright : bool
-        Walls do not lean, and the slave stays where it starts.
-    """
-
+    # The master from left to right: length along, rise in units of `bend`, kind (a wall if 5).
     steps: Sequence[tuple[float, int, int]]
-    bend: float
-    slave: Sequence[float]
+    bend: float  # The steepness of a rise of 1; walls are steep anyway.
+    slave: Sequence[float]  # Lengths along of the slave segments.
+    # X of the first slave node; the first master node is at 0. The slave moves on, and the master grows, until half
+    # of a slave segment is over it.
     start: int
-    tilt: float
-    quarters: Sequence[int]
+    tilt: float  # Slope of the slave against the master, turned about its middle, flatter for long chains.
+    quarters: Sequence[int]  # Penetrations: quarters/4 × unit × the shortest segment, dealt to the slave nodes in turn.
     unit: float
-    upright: bool = False
+    upright: bool = False  # Walls do not lean, and the slave stays where it starts.
 
     def __call__(self, offsets: Sequence[int]) -> Panel:
         """Return the panel, its nodes moved off the lattice by these numerators, 0 for none."""

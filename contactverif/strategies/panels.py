@@ -16,39 +16,22 @@ from contactverif.strategies.parts import Motion
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Points that segments join one after the other.
+    """Points that segments join one after the other."""
 
-    Attributes
-    ----------
-    points : FloatArray, shape (n, 2)
-        The points in walking order, the body on the left.
-    closed : bool
-        The last point is joined to the first.
-    """
-
-    points: FloatArray
-    closed: bool = False
+    points: FloatArray  # (n, 2) The points in walking order, the body on the left.
+    closed: bool = False  # The last point is joined to the first.
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One slave chain and one master chain, at rest on the lattice.
+    """One slave chain and one master chain, at rest on the lattice."""
 
-    Attributes
-    ----------
-    slave, master : FloatArray, shape (n, 2)
-        Current positions in walking order, the body on the left: in +x and in −x if they are open and the slave
-        is on top.
-    reference : FloatArray, shape (n, 2)
-        Reference positions of the slave; the master is where it was.
-    closed : bool
-        Each chain's last point is joined to its first.
-    """
-
+    # (n, 2) Current positions in walking order, the body on the left: in +x and in −x if they are open and the slave
+    # is on top.
     slave: FloatArray
     master: FloatArray
-    reference: FloatArray
-    closed: bool = False
+    reference: FloatArray  # (n, 2) Reference positions of the slave; the master is where it was.
+    closed: bool = False  # Each chain's last point is joined to its first.
 
     @property
     def shortest_segment(self) -> float:
@@ -71,15 +54,6 @@ def assemble_panels(
     panels: Sequence[Panel], motion: Motion, shuffle: int = 0
 ) -> tuple[Interface, FloatArray, FloatArray]:
     """Assemble panels to an interface and its state, in a row, far apart.
-
-    Parameters
-    ----------
-    panels : Sequence[Panel]
-        The panels, from left to right.
-    motion : Motion
-        The scale of the whole, and the rigid motion of its state.
-    shuffle : int
-        0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
 
     Returns
     -------
@@ -104,15 +78,6 @@ def assemble_chains(
     slaves: Sequence[Chain], masters: Sequence[Chain], references: Sequence[Chain], scale: float, shuffle: int = 0
 ) -> tuple[Interface, IntArray]:
     """Return the interface of these chains.
-
-    Parameters
-    ----------
-    slaves, masters, references : Sequence[Chain]
-        The chains of both surfaces, and those of the slave in its reference configuration; the master is where it was.
-    scale : float
-        The factor of all lengths.
-    shuffle : int
-        0 numbers nodes and segments as one walks along them, any other number is a shuffle of its own.
 
     Returns
     -------

@@ -70,20 +70,10 @@ def seeds() -> SearchStrategy[int]:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A rigid motion after a scaling: x → 2^k (Q x + shift).
+    """A rigid motion after a scaling: x → 2^k (Q x + shift)."""
 
-    Attributes
-    ----------
-    degrees : int
-        The angle of the rotation Q, counter-clockwise; quarter turns are exact.
-    shift : tuple[int, int]
-        The translation in units of the lattice.
-    exponent : int
-        The exponent k.
-    """
-
-    degrees: int = 0
-    shift: tuple[int, int] = (0, 0)
+    degrees: int = 0  # The angle of the rotation Q, counter-clockwise; quarter turns are exact.
+    shift: tuple[int, int] = (0, 0)  # In units of the lattice.
     exponent: int = 0
 
     @property

@@ -49,23 +49,7 @@ KINDS = tuple(_SKETCHES)
 
 @cache
 def cases_of_kind(kind: str) -> SearchStrategy[Case]:
-    """Return cases of one kind.
-
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-
-    Returns
-    -------
-    SearchStrategy[Case]
-        Cases with the parameters "probe_segment" and "probe_c", the slave point that is of this kind.
-
-    Raises
-    ------
-    KeyError
-        If there is no such kind.
-    """
+    """Return cases of one kind; the parameters "probe_segment" and "probe_c" name the slave point of this kind."""
     return sketch_cases(_SKETCHES[kind])
 
 
@@ -76,18 +60,7 @@ def projections_by_kind(interface: Interface | None) -> dict[str, SearchStrategy
 def projections_by_kind(
     interface: Interface | None = None,
 ) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
-    """Return a strategy for each kind, as the source of a property's cases: each kind gets exactly its share of a run.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        Small meshes drawn for each kind if None; else states of this one, each called by the kind that it is of.
-
-    Returns
-    -------
-    dict[str, SearchStrategy[Case]] | SearchStrategy[Case]
-        {kind: strategy}; one strategy for all states of an interface.
-    """
+    """Return a strategy for each kind, so that each gets its share of a run; one strategy for a mesh of the user."""
     return {kind: cases_of_kind(kind) for kind in KINDS} if interface is None else given_projections.states(interface)
 
 
@@ -96,11 +69,6 @@ def projection_states(interface: Interface | None = None) -> SearchStrategy[Case
 
     Hypothesis varies what it has drawn before, so the shares of the kinds differ widely; `projections_by_kind` gives
     each kind its share.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        Small meshes drawn for each kind if None; else states of this one, each called by the kind that it is of.
     """
     if interface is not None:
         return given_projections.states(interface)

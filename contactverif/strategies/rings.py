@@ -19,25 +19,14 @@ RADIUS = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """Two concentric polygons, or parts of them.
+    """Two concentric polygons, or parts of them."""
 
-    Attributes
-    ----------
-    slave, master : Sequence[int]
-        Weights by which the segments share the angle.
-    degrees : int
-        The angle; 360 is closed.
-    inner_slave : bool
-        The slave is the disc, else the hole around it.
-    quarters, unit : Sequence[int] or float
-        As of `Broken`, measured along the radius. Then the slave grows or shrinks as a whole until half of a segment
-        penetrates.
-    """
-
-    slave: Sequence[int]
+    slave: Sequence[int]  # Weights by which the segments share the angle.
     master: Sequence[int]
-    degrees: int
-    inner_slave: bool
+    degrees: int  # The angle; 360 is closed.
+    inner_slave: bool  # The slave is the disc, else the hole around it.
+    # As of `Broken`, measured along the radius. Then the slave grows or shrinks as a whole until half of a segment
+    # penetrates.
     quarters: Sequence[int]
     unit: float
 

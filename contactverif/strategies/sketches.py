@@ -37,20 +37,10 @@ _LENGTHS = st.sampled_from([1.0, 2.0, 0.5, 0.25, 4.0])
 
 @dataclass(frozen=True, slots=True)
 class ExactTurn:
-    """A similarity x → 2^k (W x + shift), whose turn W is a Pythagorean one, so that lattice points are not rounded.
+    """A similarity x → 2^k (W x + shift), whose turn W is a Pythagorean one, so that lattice points are not rounded."""
 
-    Attributes
-    ----------
-    turn : tuple[int, int]
-        The first column of W = [[a, −b], [b, a]]; a² + b² is a square.
-    shift : tuple[int, int]
-        The translation in units of the lattice.
-    exponent : int
-        The exponent k.
-    """
-
-    turn: tuple[int, int] = (1, 0)
-    shift: tuple[int, int] = (0, 0)
+    turn: tuple[int, int] = (1, 0)  # The first column of W = [[a, −b], [b, a]]; a² + b² is a square.
+    shift: tuple[int, int] = (0, 0)  # In units of the lattice.
     exponent: int = 0
 
     @property
@@ -81,36 +71,17 @@ def _any_motions() -> SearchStrategy[ExactTurn | Motion]:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """Slave and master chains, and the slave point that they are about.
+    """Slave and master chains, and the slave point that they are about."""
 
-    Attributes
-    ----------
-    kind : str
-        The kind of projection.
-    masters : Sequence[Chain]
-        The master's chains, the body on the left: a master on the x-axis runs in −x, a slave above it in +x.
-    slave : Chain
-        The slave.
-    segment : int
-        The number of the slave segment that carries the point, on the walk.
-    c : float
-        The place of the point on its segment, from −1 to 1.
-    exact : bool
-        Rounding would spoil the kind.
-    ordered : bool
-        The numbers of nodes on the walk matter.
-    mirrored : bool
-        The mirror image is of the same kind.
-    """
-
-    kind: str
+    kind: str  # The kind of projection.
+    # The master's chains, the body on the left: a master on the x-axis runs in −x, a slave above it in +x.
     masters: Sequence[Chain]
     slave: Chain
-    segment: int
-    c: float
-    exact: bool = False
-    ordered: bool = False
-    mirrored: bool = True
+    segment: int  # The number of the slave segment that carries the point, on the walk.
+    c: float  # The place of the point on its segment, from −1 to 1.
+    exact: bool = False  # Rounding would spoil the kind.
+    ordered: bool = False  # The numbers of nodes on the walk matter.
+    mirrored: bool = True  # The mirror image is of the same kind.
 
     def mirror(self) -> Sketch:
         """Return the mirror image in the y-axis, every chain walked the other way."""

@@ -37,11 +37,6 @@ _TILTS = st.sampled_from([0.25, -0.25, 0.0625, -0.0625])  # Slopes of a slave th
 def translated_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
     """Return states near the origin that a translation by the parameter "shift" moves exactly.
 
-    Parameters
-    ----------
-    interface : Interface | None
-        Random meshes if None; else random states of this one, with its centre moved to the origin.
-
     Returns
     -------
     SearchStrategy[Case]

@@ -27,24 +27,13 @@ from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """A comparison with all that it rests on.
+    """A comparison with all that it rests on."""
 
-    Attributes
-    ----------
-    run : Run
-        The run of reference and candidates, as `verify` makes it.
-    comparison : Comparison
-        Its numbers side by side.
-    differing : tuple[Differing, ...]
-        The case of each property on which they differ most, the largest difference first.
-    costs : tuple[Cost, ...]
-        The times of an evaluation.
-    """
-
-    run: Run
-    comparison: Comparison
+    run: Run  # The run of reference and candidates, as `verify` makes it.
+    comparison: Comparison  # Its numbers side by side.
+    # The case of each property on which they differ most, the largest difference first.
     differing: tuple[Differing, ...]
-    costs: tuple[Cost, ...]
+    costs: tuple[Cost, ...]  # The times of an evaluation.
 
 
 def run_comparison(
@@ -61,41 +50,7 @@ def run_comparison(
     executor: Executor | None = None,
     journal: Journal | None = None,
 ) -> Study:
-    """Check every property of the reference and of the candidates, on the same cases.
-
-    Parameters
-    ----------
-    reference : Subject
-        The formulation that the candidates are compared with.
-    candidates : Sequence[Subject | NotLoaded]
-        The formulations to compare.
-    properties : Sequence[Property | NotLoaded]
-        The properties to check.
-    profile : Profile | str
-        The number and size of the cases, as in `contactverif.run.runner.run`.
-    examples, seed : int | None
-        The number of cases and the seed of their search, as in `run`.
-    interface : Interface | None
-        The interface to check on, as in `run`.
-    scene : Case | None
-        The scene to check on, as in `run`.
-    progress : Callable[[Progress], None] | None
-        A function that is called as the run advances, as in `run`.
-    executor : Executor | None
-        Worker processes, as in `run`.
-    journal : Journal | None
-        The journal, as in `run`.
-
-    Returns
-    -------
-    Study
-        Run, comparison, differing cases and costs.
-
-    Raises
-    ------
-    MisuseError
-        If the reference is a candidate too, there is no candidate, or `run` raises it.
-    """
+    """Check every property of the reference and of the candidates, on the same cases."""
     if not candidates:
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
     if any(_name(candidate) == reference.name for candidate in candidates):

@@ -21,22 +21,7 @@ def run_stability(
     progress: Callable[[Progress], None] | None = None,
     outputs: Sequence[str] = (),
 ) -> Run:
-    """Judge formulations on all states of the sweeps.
-
-    Parameters
-    ----------
-    subjects : Sequence[Subject | NotLoaded]
-        The formulations, as the registry loads them.
-    progress : Callable[[Progress], None] | None
-        A function that is called after every state.
-    outputs : Sequence[str]
-        The names of the files that are written, for the command that makes them again.
-
-    Returns
-    -------
-    Run
-        The run. Its provenance is the same on every machine: versions, commit and command.
-    """
+    """Judge formulations on all states of the sweeps."""
     result = run(subjects, load_properties(PROPERTIES), seed=0, progress=progress)
     names = [item.name if isinstance(item, Subject) else item.formulation for item in subjects]
     options = [word for output in outputs for word in ("--out", output)]

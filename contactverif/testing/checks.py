@@ -23,27 +23,13 @@ from contactverif.testing.mark import CheckOptions
 
 @dataclass(slots=True, repr=False)
 class Check:
-    """One property of one formulation; calling it judges the cases and tells pytest the result.
-
-    Attributes
-    ----------
-    subject : Subject | NotLoaded
-        The formulation.
-    question : Property | NotLoaded
-        The property.
-    profile : Profile
-        The size of the run, with a seed.
-    known : Mapping[str, str]
-        {property id: why its failure is known}, for this property at most.
-    row : Row | None
-        The result; None before the call.
-    """
+    """One property of one formulation; calling it judges the cases and tells pytest the result."""
 
     subject: Subject | NotLoaded
     question: Property | NotLoaded
-    profile: Profile
-    known: Mapping[str, str]
-    row: Row | None = field(default=None, init=False)
+    profile: Profile  # The size of the run, with a seed.
+    known: Mapping[str, str]  # {property id: why its failure is known}, for this property at most.
+    row: Row | None = field(default=None, init=False)  # The result; None before the call.
 
     @property
     def id(self) -> str:
@@ -60,14 +46,7 @@ class Check:
         return self.profile.seed or 0
 
     def __call__(self) -> None:
-        """Judge the cases.
-
-        Raises
-        ------
-        AssertionError
-            If a promise is broken, something crashes, was not judged or does not load, or if forces have the opposite
-            sign.
-        """
+        """Judge the cases."""
         __tracebackhide__ = True
         for part in (self.subject, self.question):
             if isinstance(part, NotLoaded):
@@ -92,27 +71,7 @@ class Check:
 
 
 def make_checks(arguments: CheckOptions, options: Any, fresh_seed: int) -> list[Check]:
-    """Return the checks of a decorated test.
-
-    Parameters
-    ----------
-    arguments : CheckOptions
-        The arguments of the decorator.
-    options : Any
-        The options of the pytest command line, which overrule the arguments.
-    fresh_seed : int
-        The seed if nobody names one.
-
-    Returns
-    -------
-    list[Check]
-        One check for each formulation and property.
-
-    Raises
-    ------
-    MisuseError
-        If a formulation, option, property or profile does not exist, or a known failure is of no property here.
-    """
+    """Return the checks of a decorated test."""
     questions = load_properties(arguments.properties)
     _check_known(arguments.known, [_id(question) for question in questions])
     profile = profile_named(options.contactverif_profile or arguments.profile or "dev").resolve(

@@ -19,11 +19,6 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
         The command that runs the check again.
     opposite_sign : bool
         The forces have the opposite sign. That is said first.
-
-    Returns
-    -------
-    str
-        Several lines; all but the first are indented.
     """
     question = row.info
     lines = [f"{row.formulation}: {OPPOSITE_SIGN}"] if opposite_sign else []

@@ -15,23 +15,11 @@ MARK = "contactverif_properties"
 
 @dataclass(frozen=True, slots=True)
 class CheckOptions:
-    """The arguments of `parametrize_with_properties`, until pytest collects the test.
+    """The arguments of `parametrize_with_properties`, until pytest collects the test."""
 
-    Attributes
-    ----------
-    formulations : tuple[str | Callable[..., Any], ...]
-        Names as on the command line, or factories.
-    properties : tuple[str, ...]
-        Patterns of property ids.
-    examples, seed, profile : int | None or str | None
-        The size of the run; None where the test file leaves it open.
-    known : Mapping[str, str]
-        {property id: why its failure is known}.
-    """
-
-    formulations: tuple[str | Callable[..., Any], ...]
-    properties: tuple[str, ...]
-    examples: int | None
+    formulations: tuple[str | Callable[..., Any], ...]  # Names as on the command line, or factories.
+    properties: tuple[str, ...]  # Patterns of property ids.
+    examples: int | None  # The size of the run; None where the test file leaves it open.
     seed: int | None
     profile: str | None
-    known: Mapping[str, str]
+    known: Mapping[str, str]  # {property id: why its failure is known}.

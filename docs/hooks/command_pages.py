@@ -25,27 +25,13 @@ _METAVARS = {int: "INTEGER", float: "NUMBER", Path: "FILE", str: "TEXT"}
 
 @dataclass(frozen=True)
 class Parameter:
-    """An argument or option of a command, as its function declares it.
-
-    Attributes
-    ----------
-    name : str
-        Name in the function.
-    info : ArgumentInfo | OptionInfo
-        The declaration.
-    types : frozenset[type]
-        The Python types of its values.
-    many : bool
-        It may be given several times.
-    default : Any
-        The value where it is not given; `...` where it must be.
-    """
+    """An argument or option of a command, as its function declares it."""
 
     name: str
     info: ArgumentInfo | OptionInfo
-    types: frozenset[type]
-    many: bool
-    default: Any
+    types: frozenset[type]  # The Python types of its values.
+    many: bool  # It may be given several times.
+    default: Any  # The value where it is not given; `...` where it must be.
 
     @property
     def metavar(self) -> str:

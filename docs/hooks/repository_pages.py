@@ -31,13 +31,6 @@ def relink(text: str, path: str) -> str:
     """Return the Markdown of a file of the repository with links that hold in the site.
 
     A link to a file that is no page of the site becomes plain text.
-
-    Parameters
-    ----------
-    text : str
-        The Markdown text.
-    path : str
-        The file's path in the repository.
     """
     here = posixpath.dirname(HOMES[path])
 

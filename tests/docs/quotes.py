@@ -61,27 +61,13 @@ _QUOTE = re.compile(
 
 @dataclass(frozen=True)
 class Quote:
-    """A block that quotes something, and where it stands.
+    """A block that quotes something, and where it stands."""
 
-    Attributes
-    ----------
-    kind : str
-        "output" or "source".
-    argument : str
-        The patterns, or the file and the class.
-    block : str
-        The text in the page today.
-    command : str
-        The quoted command; empty if a file is quoted.
-    foreign : bool
-        The command stands on another page.
-    """
-
-    kind: str
-    argument: str
-    block: str
-    command: str
-    foreign: bool
+    kind: str  # "output" or "source".
+    argument: str  # The patterns, or the file and the class.
+    block: str  # The text in the page today.
+    command: str  # The quoted command; empty if a file is quoted.
+    foreign: bool  # The command stands on another page.
 
 
 def pages() -> list[Path]:
@@ -211,22 +197,7 @@ def picture_of(command: str) -> str:
 
 
 def outputs(page: Path, folder: Path, extra: Sequence[str] = ()) -> dict[str, subprocess.CompletedProcess[str]]:
-    """Run the commands of a page whose output or picture is shown, and those before them.
-
-    Parameters
-    ----------
-    page : Path
-        The Markdown file.
-    folder : Path
-        An empty folder, in which the commands run.
-    extra : Sequence[str]
-        Options for `verify` and `compare`, such as fewer examples.
-
-    Returns
-    -------
-    dict[str, subprocess.CompletedProcess[str]]
-        {command as it stands in the page: what came out}.
-    """
+    """Run the commands of a page whose output or picture is shown, and those before them."""
     prepare(page, folder)
     results = {}
     for line in _needed_commands(page):
@@ -316,13 +287,7 @@ def keep_pictures(folder: Path) -> None:
 
 
 def main(names: Sequence[str]) -> None:
-    """Run every quoted command and every example, and write pages and pictures anew.
-
-    Parameters
-    ----------
-    names : Sequence[str]
-        Paths of pages and examples; all of them if there are none.
-    """
+    """Run every quoted command and every example, and write pages and pictures anew."""
     selection = [Path(name).resolve() for name in names if name.endswith(".md")] or ([] if names else pages())
     results: dict[str, str] = {}
     for page in selection:

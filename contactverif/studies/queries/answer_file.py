@@ -19,61 +19,30 @@ _FORM = "QUERY SEGMENT SIGN XI DISTANCE, or QUERY ?"
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer of a program to a query; None where the program says that it does not know.
+    """The answer of a program to a query; None where the program says that it does not know."""
 
-    Attributes
-    ----------
-    segment : int | None
-        The nearest segment.
-    sign : int | None
-        The sign of the gap: −1 inside the body, 0 on the surface, +1 outside.
-    xi : float | None
-        The foot on the segment's line, unclipped.
-    distance : float | None
-        The distance to the closed segment, a length.
-    """
-
-    segment: int | None
-    sign: int | None = None
-    xi: float | None = None
-    distance: float | None = None
+    segment: int | None  # The nearest segment.
+    sign: int | None = None  # The sign of the gap: −1 inside the body, 0 on the surface, +1 outside.
+    xi: float | None = None  # The foot on the segment's line, unclipped.
+    distance: float | None = None  # The distance to the closed segment, a length.
 
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The answers of a program to all queries, in their order.
+    """The answers of a program to all queries, in their order."""
 
-    Attributes
-    ----------
-    answers : list[Answer]
-        One for each query.
-    seconds : Mapping[str, float]
-        {kind: the seconds that its queries took}, as far as the program says so; "" stands for all kinds together.
-    """
-
-    answers: list[Answer]
+    answers: list[Answer]  # One for each query.
+    # {kind: the seconds that its queries took}, as far as the program says so; "" stands for all kinds together.
     seconds: Mapping[str, float]
 
 
 def read_answers(lines: TextLines, queries: Queries) -> Answers:
     """Read the answers of a program.
 
-    Parameters
-    ----------
-    lines : TextLines
-        The text that it wrote.
-    queries : Queries
-        The questions.
-
     Returns
     -------
     Answers
         One answer for each query, and the seconds that comments `# seconds [KIND] S` state.
-
-    Raises
-    ------
-    MisuseError
-        If a line is not as it must be, or a query has no answer or two.
     """
     count = len(queries.queries)
     by_query: dict[int, Answer] = {}

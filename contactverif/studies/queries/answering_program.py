@@ -31,23 +31,6 @@ def ask_program(command: Sequence[str], path: Path) -> Answers:
     If the program states no seconds, it is run several times more: on the file, and on its surfaces without any query.
     The difference of the fastest runs is the time of all decisions, with the reading and writing of their lines. So the
     start of the program, and whatever it prepares for the surfaces, does not count.
-
-    Parameters
-    ----------
-    command : Sequence[str]
-        The program and its arguments.
-    path : Path
-        The file of queries.
-
-    Returns
-    -------
-    Answers
-        What it answers.
-
-    Raises
-    ------
-    MisuseError
-        If the program cannot be started or fails, or its answers cannot be read.
     """
     text = path.read_bytes()
     queries, _ = read_queries(path)

@@ -62,11 +62,6 @@ def _search(
 def search_built_in(queries: Queries) -> Answers:
     """Answer all queries by the search that plugins may use.
 
-    Parameters
-    ----------
-    queries : Queries
-        The questions.
-
     Returns
     -------
     Answers

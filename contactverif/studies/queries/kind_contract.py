@@ -24,24 +24,12 @@ def always(shape: Shape, point: Vector, nearest: Nearest) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of query.
+    """A kind of query."""
 
-    Attributes
-    ----------
-    name : str
-        One word, as it stands in the file.
-    meaning : str
-        The situation, in a few words.
-    draw : Draw
-        The function that draws a surface and some points for it.
-    holds : Condition
-        The function that decides by the exact answer whether a point is of this kind.
-    """
-
-    name: str
-    meaning: str
-    draw: Draw
-    holds: Condition = always
+    name: str  # One word, as it stands in the file.
+    meaning: str  # The situation, in a few words.
+    draw: Draw  # The function that draws a surface and some points for it.
+    holds: Condition = always  # The function that decides by the exact answer whether a point is of this kind.
 
 
 def has_inner_foot(shape: Shape, point: Vector, nearest: Nearest) -> bool:

@@ -18,15 +18,7 @@ _Item = TypeVar("_Item")
 
 
 class Dice:
-    """A stream of random numbers.
-
-    Parameters
-    ----------
-    seed : int
-        The same seed and the same stream give the same numbers.
-    stream : int
-        The number of the stream. Two streams of one seed are independent.
-    """
+    """A stream of random numbers."""
 
     def __init__(self, seed: int, stream: int) -> None:
         self._words = np.random.PCG64(np.random.SeedSequence([seed, stream]))

@@ -27,17 +27,7 @@ _QUERIES, _EXACT = "contactverif-queries", "contactverif-exact"
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A point whose nearest segment is asked for.
-
-    Attributes
-    ----------
-    surface : int
-        The number of the surface.
-    point : Vector
-        The point.
-    kind : str
-        The name of its kind.
-    """
+    """A point whose nearest segment is asked for."""
 
     surface: int
     point: Vector
@@ -54,41 +44,23 @@ class Queries:
 
 @dataclass(frozen=True, slots=True)
 class ExactSegment:
-    """A nearest segment of a query.
-
-    Attributes
-    ----------
-    segment : int
-        Its number.
-    xi : Fraction
-        The foot on the segment's line, unclipped: 0 at its first node, 1 at its second.
-    signed_squared_gap : Fraction
-        The square of the gap at the nearest point, negative inside the body. At a node it belongs to the segment with
-        the smaller overshoot of the two that meet there.
-    """
+    """A nearest segment of a query."""
 
     segment: int
-    xi: Fraction
+    xi: Fraction  # The foot on the segment's line, unclipped: 0 at its first node, 1 at its second.
+    # The square of the gap at the nearest point, negative inside the body. At a node it belongs to the segment with
+    # the smaller overshoot of the two that meet there.
     signed_squared_gap: Fraction
 
 
 @dataclass(frozen=True, slots=True)
 class ExactAnswer:
-    """The exact answer to a query.
+    """The exact answer to a query."""
 
-    Attributes
-    ----------
-    squared_distance : Fraction
-        The square of the distance.
-    segments : tuple[ExactSegment, ...]
-        All segments at this distance, the one with the smallest overshoot first, then by number.
-    n_first : int
-        The number of segments that have the smallest overshoot; more than one is a tie by any rule.
-    """
-
-    squared_distance: Fraction
+    squared_distance: Fraction  # The square of the distance.
+    # All segments at this distance, the one with the smallest overshoot first, then by number.
     segments: tuple[ExactSegment, ...]
-    n_first: int
+    n_first: int  # The number of segments that have the smallest overshoot; more than one is a tie by any rule.
 
     @classmethod
     def from_nearest(cls, nearest: Nearest) -> ExactAnswer:
@@ -124,23 +96,7 @@ def exact_text(answers: Sequence[ExactAnswer], questions: str, *comments: str) -
 
 
 def read_queries(path: Path) -> tuple[Queries, str]:
-    """Read a file of questions.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    tuple[Queries, str]
-        The questions, and the fingerprint by which exact answers say that they belong to them.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be read or a line is not as it must be; it names the line.
-    """
+    """Return the questions, and the fingerprint by which exact answers say that they belong to them."""
     lines = TextLines.read(path)
     n_surfaces, n_queries = _counts(lines, _QUERIES, 2)
     surfaces = tuple(_read_surface(lines, number) for number in range(n_surfaces))
@@ -150,13 +106,7 @@ def read_queries(path: Path) -> tuple[Queries, str]:
 
 
 def read_exact(path: Path, fingerprint: str, number: int) -> list[ExactAnswer]:
-    """Read the exact answers to the questions with this fingerprint and number.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be read, belongs to other questions, or a line is not as it must be.
-    """
+    """Read the exact answers to the questions with this fingerprint and number."""
     lines = TextLines.read(path)
     first = lines.next(f"{_EXACT} {FORMAT} {number} {fingerprint}")
     if first.words != [_EXACT, str(FORMAT), str(number), fingerprint]:

@@ -21,25 +21,7 @@ _MOST_DRAWS = 1000  # Surfaces drawn in a row without a point of the kind; more 
 
 
 def make_queries(seed: int, number: int) -> tuple[Queries, list[ExactAnswer]]:
-    """Draw queries, about as many of each kind, and find the exact answer of each.
-
-    Parameters
-    ----------
-    seed : int
-        The same seed gives the same queries, on every machine.
-    number : int
-        The number of queries.
-
-    Returns
-    -------
-    tuple[Queries, list[ExactAnswer]]
-        The queries, kind by kind, and their answers in the same order.
-
-    Raises
-    ------
-    MisuseError
-        If the seed is negative or large, or there are fewer queries than kinds or more than a million.
-    """
+    """Draw queries, about as many of each kind, and find the exact answer of each."""
     if not 0 <= seed < 2**63:
         raise MisuseError("seed", str(seed), "a number of at least 0, below 2^63")
     if not len(KINDS) <= number <= _MOST_QUERIES:
@@ -64,25 +46,7 @@ def exact_path(path: Path) -> Path:
 
 
 def write_queries(path: Path, seed: int, number: int) -> int:
-    """Write a file of queries and the file of their exact answers, each whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file of queries; `exact_path` names the other one.
-    seed, number : int
-        The seed and the number of the queries, as in `make_queries`.
-
-    Returns
-    -------
-    int
-        The number of kinds.
-
-    Raises
-    ------
-    MisuseError
-        If `make_queries` raises it.
-    """
+    """Write the queries and, at `exact_path`, their exact answers; return the number of kinds."""
     queries, answers = make_queries(seed, number)
     meanings = [f"{kind.name}: {kind.meaning}" for kind in KINDS]
     questions = queries_text(queries, f"{number} queries of contactverif, seed {seed}, of these kinds:", *meanings)

@@ -27,40 +27,19 @@ _MILLION = 1e6
 
 @dataclass(slots=True)
 class Score:
-    """The counts and worst errors of the answers to some queries.
-
-    Attributes
-    ----------
-    kind : str
-        The kind of the queries.
-    queries : int
-        The number of queries.
-    wrong_segments, wrong_signs : int
-        The numbers of wrong decisions, each counted once.
-    beyond_roundoff : int
-        The number of wrong decisions that roundoff does not explain.
-    undecided : int
-        The number of queries for which the program does not know the segment or the sign.
-    other_rule : int
-        The number of right segments that another rule than the smallest overshoot has chosen in a tie.
-    worst_xi : float
-        The largest error of ξ, in units of u (L + |P − A|) / L, over right segments.
-    worst_distance : float
-        The largest error of the distance, in units of u (L + |P − A|), over right segments.
-    seconds : float | None
-        The time of all decisions; None if nobody has said it.
-    """
+    """The counts and worst errors of the answers to some queries."""
 
     kind: str
     queries: int = 0
     wrong_segments: int = 0
     wrong_signs: int = 0
-    beyond_roundoff: int = 0
-    undecided: int = 0
+    beyond_roundoff: int = 0  # The number of wrong decisions that roundoff does not explain.
+    undecided: int = 0  # The number of queries for which the program does not know the segment or the sign.
+    # The number of right segments that another rule than the smallest overshoot has chosen in a tie.
     other_rule: int = 0
-    worst_xi: float = 0.0
-    worst_distance: float = 0.0
-    seconds: float | None = None
+    worst_xi: float = 0.0  # The largest error of ξ, in units of u (L + |P − A|) / L, over right segments.
+    worst_distance: float = 0.0  # The largest error of the distance, in units of u (L + |P − A|), over right segments.
+    seconds: float | None = None  # The time of all decisions; None where it is not stated.
 
     @property
     def wrong(self) -> int:
@@ -80,40 +59,15 @@ class Score:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """The scores of a program.
+    """The scores of a program."""
 
-    Attributes
-    ----------
-    total : Score
-        The score over all queries.
-    kinds : list[Score]
-        The score of each kind, in the order of the file.
-    first_wrong : list[str]
-        The first wrong decision of each kind, in words.
-    """
-
-    total: Score
-    kinds: list[Score]
-    first_wrong: list[str] = field(default_factory=list)
+    total: Score  # The score over all queries.
+    kinds: list[Score]  # The score of each kind, in the order of the file.
+    first_wrong: list[str] = field(default_factory=list)  # The first wrong decision of each kind, in words.
 
 
 def score_answers(queries: Queries, exact: Sequence[ExactAnswer], answers: Answers) -> Scores:
-    """Compare the answers of a program with the exact ones.
-
-    Parameters
-    ----------
-    queries : Queries
-        The questions.
-    exact : Sequence[ExactAnswer]
-        The exact answer to each.
-    answers : Answers
-        The answer of the program to each.
-
-    Returns
-    -------
-    Scores
-        The counts and errors, in all and for each kind.
-    """
+    """Compare the answers of a program with the exact ones."""
     total = Score("all kinds", seconds=answers.seconds.get(""))
     kinds: dict[str, Score] = {}
     first_wrong: dict[str, str] = {}

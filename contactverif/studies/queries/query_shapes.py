@@ -23,17 +23,9 @@ Chain = list[Vector]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """A surface with positions, to which queries are put.
+    """A surface with positions, to which queries are put."""
 
-    Attributes
-    ----------
-    nodes : FloatArray, shape (n_nodes, 2)
-        The positions.
-    surface : Surface
-        The segments between them.
-    """
-
-    nodes: FloatArray
+    nodes: FloatArray  # (n_nodes, 2) The positions.
     surface: Surface
 
     @property
@@ -48,17 +40,7 @@ class Shape:
 
 
 def make_shape(*chains: Chain, closed: Sequence[int] = (), order: Sequence[int] | None = None) -> Shape:
-    """Return the surface of some chains.
-
-    Parameters
-    ----------
-    *chains : Chain
-        The points of each chain in walking order.
-    closed : Sequence[int]
-        The chains whose last point a segment joins to the first, by their place in the list.
-    order : Sequence[int] | None
-        The order in which the segments are numbered; by default that of the walk.
-    """
+    """Return the surface of some chains, with the segments numbered in this order (by default that of the walk)."""
     points: Chain = []
     pairs: list[tuple[int, int]] = []
     for place, chain in enumerate(chains):

@@ -20,17 +20,9 @@ _LONGEST = 60  # The number of characters of a line that an error shows.
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of a file.
+    """A line of a file."""
 
-    Attributes
-    ----------
-    place : str
-        The file and the number of the line, in words.
-    words : list[str]
-        Its words.
-    """
-
-    place: str
+    place: str  # The file and the number of the line, in words.
     words: list[str]
 
     def error(self, needed: str) -> MisuseError:
@@ -73,15 +65,7 @@ class Line:
 
 
 class TextLines:
-    """The lines of a text, one after the other.
-
-    Parameters
-    ----------
-    name : str
-        The name of the file, for errors.
-    text : str
-        Its text.
-    """
+    """The lines of a text, one after the other."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self._lines, self._next = name, text.splitlines(), 0
@@ -89,13 +73,7 @@ class TextLines:
 
     @classmethod
     def read(cls, path: Path) -> TextLines:
-        """Return the lines of a file.
-
-        Raises
-        ------
-        MisuseError
-            If it cannot be read.
-        """
+        """Return the lines of a file."""
         size = check_ordinary(path, "FILE", "a text file that can be read").st_size
         if size > MOST_BYTES:
             raise MisuseError("FILE", f"{path} of {size} bytes", f"a text file of at most {MOST_BYTES}")
