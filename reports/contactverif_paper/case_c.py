@@ -44,16 +44,12 @@ STIFFNESS = np.array([0.01, 0.03, 0.06, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0])  # 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaseC:
-    """The forces of a uniform pressure, the solved patch test, and how VTS-ME ends over the penalty.
-
-    Attributes
-    ----------
-    ends : IntArray, shape (n_scenes, n_penalties)
-        The `End` of VTS-ME on case C and on C′, whose virtual slave nodes lie beside master nodes.
-    """
+    """The forces of a uniform pressure, the solved patch test, and how VTS-ME ends over the penalty."""
 
     forces: ForceTable
     patch: PatchSolution
+    # (n_scenes, n_penalties) The `End` of VTS-ME on case C and on C′, whose virtual slave nodes lie beside master
+    # nodes.
     ends: IntArray
 
 

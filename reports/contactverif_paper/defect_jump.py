@@ -43,21 +43,11 @@ _NEAR = 2.0**-40  # The distance to either side of the jump over the slave's len
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jump:
-    """The jump of the forces where the end of an area of competence passes a master node.
+    """The jump of the forces where the end of an area of competence passes a master node."""
 
-    Attributes
-    ----------
-    sliding : Series
-        Over the position of that end: the force on the master over that on the slave, at `SLIDING_TILT`.
-    jump : Series
-        Over the tilt (rad): the largest jump of a nodal force, over the slave's force.
-    formula : FloatArray, shape (n_tilts,)
-        The same by formula, for the printed algorithm.
-    """
-
-    sliding: Series
-    jump: Series
-    formula: FloatArray
+    sliding: Series  # Over the position of that end: the force on the master over that on the slave, at `SLIDING_TILT`.
+    jump: Series  # Over the tilt (rad): the largest jump of a nodal force, over the slave's force.
+    formula: FloatArray  # (n_tilts,) The same by formula, for the printed algorithm.
 
 
 def compute(report_progress: Progress) -> Jump:

@@ -37,18 +37,10 @@ _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imbalance:
-    """The loss of force and moment over the tilt (rad).
+    """The loss of force and moment over the tilt (rad)."""
 
-    Attributes
-    ----------
-    force : Series
-        |ΣR| over the slave's force.
-    moment : Series
-        |Σ x×R| about the slave's middle over that force times the slave's length.
-    """
-
-    force: Series
-    moment: Series
+    force: Series  # |ΣR| over the slave's force.
+    moment: Series  # |Σ x×R| about the slave's middle over that force times the slave's length.
 
 
 def compute(report_progress: Progress) -> Imbalance:

@@ -25,31 +25,15 @@ PAPER = DiskProblem()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiskSolution:
-    """A solution of Example 2.
+    """A solution of Example 2."""
 
-    Attributes
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    problem : DiskProblem
-        What was solved.
-    converged : bool
-        True if it is a solution.
-    iterations : int
-        Linear systems solved, from the disk lowered to roundoff.
-    x, pressure : FloatArray, shape (n_points,)
-        The contact points from left to right: a length, and force per length.
-    half_width : float
-        Half-width of the contact, where the gap changes its sign, a length; NaN if it does not.
-    """
-
-    formulation: PaperFormulation
-    problem: DiskProblem
-    converged: bool
-    iterations: int
-    x: FloatArray
+    formulation: PaperFormulation  # The formulation.
+    problem: DiskProblem  # What was solved.
+    converged: bool  # True if it is a solution.
+    iterations: int  # Linear systems solved, from the disk lowered to roundoff.
+    x: FloatArray  # (n_points,) The contact points from left to right: a length, and force per length.
     pressure: FloatArray
-    half_width: float
+    half_width: float  # Half-width of the contact, where the gap changes its sign, a length; NaN if it does not.
 
     @property
     def peak(self) -> float:
@@ -78,11 +62,6 @@ def solve_disk(
         Parts that each side of each cell of the base meshes is divided into.
     lowered : float
         Depth of the disk in the first guess, over what is about right.
-
-    Raises
-    ------
-    MisuseError
-        If the formulation does not load, or as `disk_on_foundation` does.
     """
     scene = disk_scene(problem, refine)
     plugin = subject_of(formulation).for_case(scene.case())
@@ -117,13 +96,7 @@ def flatter(slope: float) -> DiskProblem:
 
 
 def difference(solution: DiskSolution, other: DiskSolution) -> tuple[FloatArray, FloatArray]:
-    """Return x of the points in contact in both, and the difference of their pressures (Fig. 39).
-
-    Raises
-    ------
-    MisuseError
-        If the two have not the same points.
-    """
+    """Return x of the points in contact in both, and the difference of their pressures (Fig. 39)."""
     if solution.x.shape != other.x.shape:
         counts = (
             f"{len(solution.x)} points of {solution.formulation.name} and {len(other.x)} of {other.formulation.name}"

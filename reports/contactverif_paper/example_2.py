@@ -50,29 +50,16 @@ _CLOSE_UP = np.array([[-0.8, -0.5], [0.8, 0.7]])  # Lower left and upper right c
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example2:
-    """Solutions on the base meshes, and the exact answers for half-planes.
+    """Solutions on the base meshes, and the exact answers for half-planes."""
 
-    Attributes
-    ----------
-    solutions : tuple[DiskSolution, ...]
-        From a disk that is lowered about as far as it ends; a solution for each of `FORMULATIONS`.
-    touching : tuple[DiskSolution, ...]
-        The same from a disk that just touches.
-    hertz, winkler : tuple[float, float]
-        Largest pressure and half-width after Hertz, and after Hertz on a layer of springs ε̂.
-    winkler_x, winkler_pressure : FloatArray, shape (n_places,)
-        The pressure after Hertz on springs.
-    bodies : tuple[Body, ...]
-        The disk and the foundation, undeformed.
-    """
-
+    # From a disk that is lowered about as far as it ends; a solution for each of `FORMULATIONS`.
     solutions: tuple[DiskSolution, ...]
-    touching: tuple[DiskSolution, ...]
-    hertz: tuple[float, float]
+    touching: tuple[DiskSolution, ...]  # The same from a disk that just touches.
+    hertz: tuple[float, float]  # Largest pressure and half-width after Hertz, and after Hertz on a layer of springs ε̂.
     winkler: tuple[float, float]
-    winkler_x: FloatArray
+    winkler_x: FloatArray  # (n_places,) The pressure after Hertz on springs.
     winkler_pressure: FloatArray
-    bodies: tuple[Body, ...]
+    bodies: tuple[Body, ...]  # The disk and the foundation, undeformed.
 
 
 def compute(report_progress: Progress) -> Example2:

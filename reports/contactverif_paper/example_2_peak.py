@@ -44,31 +44,15 @@ _MEGA = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PeakStudy:
-    """The steps between the largest pressure and that of Hertz on a layer of springs.
+    """The steps between the largest pressure and that of Hertz on a layer of springs."""
 
-    Attributes
-    ----------
-    size : FloatArray, shape (n_meshes,)
-        The size of an element in the middle, a length.
-    peaks, half_width : FloatArray, shape (n_formulations, n_meshes)
-        Largest pressure and half-width of the contact.
-    iterations : IntArray, shape (n_formulations, n_meshes)
-        Linear systems solved.
-    slopes : Series
-        Over a/R, over that of the paper: largest pressure over that of Hertz on springs, less 1.
-    sizes : Series
-        Over the size of the foundation, over the one chosen: the same.
-    winkler : float
-        The largest pressure of Hertz on springs.
-    """
-
-    size: FloatArray
-    peaks: FloatArray
+    size: FloatArray  # (n_meshes,) The size of an element in the middle, a length.
+    peaks: FloatArray  # (n_formulations, n_meshes) Largest pressure and half-width of the contact.
     half_width: FloatArray
-    iterations: IntArray
-    slopes: Series
-    sizes: Series
-    winkler: float
+    iterations: IntArray  # (n_formulations, n_meshes) Linear systems solved.
+    slopes: Series  # Over a/R, over that of the paper: largest pressure over that of Hertz on springs, less 1.
+    sizes: Series  # Over the size of the foundation, over the one chosen: the same.
+    winkler: float  # The largest pressure of Hertz on springs.
 
 
 def compute(report_progress: Progress) -> PeakStudy:

@@ -55,28 +55,15 @@ _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the st
 
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
-    """The way of Newton's method to a solution.
+    """The way of Newton's method to a solution."""
 
-    Attributes
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    residuals, energies : FloatArray, shape (n_iterates,)
-        The largest entry of the residual (a force) and |Δq · residual|, up to the solution.
-    beyond : FloatArray, shape (n_steps,)
-        The residuals of further steps, which only roundoff stops.
-    floor : float
-        What roundoff alone makes of the residual.
-    end : str
-        How Newton's method ended.
-    """
-
-    formulation: PaperFormulation
+    formulation: PaperFormulation  # The formulation.
+    # (n_iterates,) The largest entry of the residual (a force) and |Δq · residual|, up to the solution.
     residuals: FloatArray
     energies: FloatArray
-    beyond: FloatArray
-    floor: float
-    end: str
+    beyond: FloatArray  # (n_steps,) The residuals of further steps, which only roundoff stops.
+    floor: float  # What roundoff alone makes of the residual.
+    end: str  # How Newton's method ended.
 
     @property
     def n_iterations(self) -> int:
@@ -109,21 +96,11 @@ RULES: Mapping[str, Callable[[History], int]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convergence:
-    """Residual histories, and the linear rate of the basic version over the penalty.
+    """Residual histories, and the linear rate of the basic version over the penalty."""
 
-    Attributes
-    ----------
-    histories : tuple[tuple[History, ...], ...]
-        A row for each of `RATIOS`, a history for each of `FORMULATIONS`.
-    radius : FloatArray, shape (n_penalties,)
-        Spectral radius of I − K_basic⁻¹ K_consistent at the solution.
-    rate : FloatArray, shape (n_penalties,)
-        Ratio of successive residuals that Newton's method shows.
-    """
-
-    histories: tuple[tuple[History, ...], ...]
-    radius: FloatArray
-    rate: FloatArray
+    histories: tuple[tuple[History, ...], ...]  # A row for each of `RATIOS`, a history for each of `FORMULATIONS`.
+    radius: FloatArray  # (n_penalties,) Spectral radius of I − K_basic⁻¹ K_consistent at the solution.
+    rate: FloatArray  # (n_penalties,) Ratio of successive residuals that Newton's method shows.
 
     def counts(self, formulation: PaperFormulation) -> IntArray:
         """Return the iterations (n_rules, n_ratios) of a formulation."""

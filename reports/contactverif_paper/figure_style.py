@@ -49,21 +49,11 @@ _ROUND_STEPS = (1, 2, 5, 10)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """A number of each formulation over a parameter.
+    """A number of each formulation over a parameter."""
 
-    Attributes
-    ----------
-    formulations : tuple[PaperFormulation, ...]
-        The rows.
-    at : FloatArray, shape (n_places,)
-        The parameter.
-    values : FloatArray, shape (n_formulations, n_places)
-        The numbers.
-    """
-
-    formulations: tuple[PaperFormulation, ...]
-    at: FloatArray
-    values: FloatArray
+    formulations: tuple[PaperFormulation, ...]  # The rows.
+    at: FloatArray  # (n_places,) The parameter.
+    values: FloatArray  # (n_formulations, n_places) The numbers.
 
     def row(self, formulation: PaperFormulation) -> FloatArray:
         """Return the numbers (n_places,) of one formulation."""

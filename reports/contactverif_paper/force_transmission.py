@@ -42,28 +42,14 @@ _ROUNDINGS = 256  # A force is the sum of a few dozen terms.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """The nodal forces of a uniform pressure p = 1, in rationals; forces per unit of thickness over p.
+    """The nodal forces of a uniform pressure p = 1, in rationals; forces per unit of thickness over p."""
 
-    Attributes
-    ----------
-    formulation : PaperFormulation
-        Who transmits them.
-    slave, master : tuple[Fraction, ...]
-        On the nodes from left to right, as they are transferred to the other surface.
-    points : tuple[Fraction, ...]
-        At the virtual slave nodes; empty if the formulation has none.
-    rounding : float
-        The largest difference of a computed float from its rational.
-    printed : tuple[Fraction, ...]
-        What the paper prints for the master; empty where it is silent.
-    """
-
-    formulation: PaperFormulation
-    slave: tuple[Fraction, ...]
+    formulation: PaperFormulation  # Who transmits them.
+    slave: tuple[Fraction, ...]  # On the nodes from left to right, as they are transferred to the other surface.
     master: tuple[Fraction, ...]
-    points: tuple[Fraction, ...] = ()
-    rounding: float = 0.0
-    printed: tuple[Fraction, ...] = ()
+    points: tuple[Fraction, ...] = ()  # At the virtual slave nodes; empty if the formulation has none.
+    rounding: float = 0.0  # The largest difference of a computed float from its rational.
+    printed: tuple[Fraction, ...] = ()  # What the paper prints for the master; empty where it is silent.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,19 +79,7 @@ class ForceTable:
 
 
 def force_table(name: str, title: str, exact: str, printed: Mapping[PaperFormulation, str]) -> ForceTable:
-    """Compute the table of one case.
-
-    Parameters
-    ----------
-    name : str
-        Name of the state (`named_states`).
-    title : str
-        What the paper calls it.
-    exact : str
-        The forces on the master that the paper prints as exact, from left to right: "3/2 3 7/2 3 1".
-    printed : Mapping[PaperFormulation, str]
-        The same for each formulation that the paper shows.
-    """
+    """Compute the table of one case."""
     case = named_case(name)
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     along = case.parameters["along"]
@@ -138,20 +112,7 @@ def force_statement(table: ForceTable, place: str, claim: str) -> Statement:
 
 
 def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple[Fraction, ...], float]:
-    """Return the rationals that the floats are roundings of, and the largest difference.
-
-    Parameters
-    ----------
-    values : Iterable[float] | FloatArray
-        The floats.
-    scale : float
-        The sum of all forces, by which rounding is judged.
-
-    Raises
-    ------
-    ArithmeticError
-        If a float is further from every rational with a small denominator than rounding explains.
-    """
+    """Return the rationals that the floats are roundings of, and the largest difference."""
     floats = [float(value) for value in values]
     nearest = tuple(Fraction(value).limit_denominator(_LARGEST_DENOMINATOR) for value in floats)
     error = max((abs(float(Fraction(a) - exact)) for a, exact in zip(floats, nearest, strict=True)), default=0.0)

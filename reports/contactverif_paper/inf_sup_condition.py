@@ -39,24 +39,12 @@ _SERIES = ("inf-sup constant", "slave segment", "zero eigenvalues", "multipliers
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constants:
-    """The inf-sup constants.
+    """The inf-sup constants."""
 
-    Attributes
-    ----------
-    beta : FloatArray, shape (n_formulations, n_families, n_meshes)
-        The smallest β that is not 0, dimensionless.
-    segments : FloatArray, shape (n_families, n_meshes)
-        The slave segments h, a length each.
-    zeros : FloatArray, shape (n_formulations, n_families)
-        The share of pressures that move nothing, on the finest mesh.
-    slopes : FloatArray, shape (n_formulations, n_families)
-        The slope of log β against log h between the two finest meshes.
-    """
-
-    beta: FloatArray
-    segments: FloatArray
-    zeros: FloatArray
-    slopes: FloatArray
+    beta: FloatArray  # (n_formulations, n_families, n_meshes) The smallest β that is not 0, dimensionless.
+    segments: FloatArray  # (n_families, n_meshes) The slave segments h, a length each.
+    zeros: FloatArray  # (n_formulations, n_families) The share of pressures that move nothing, on the finest mesh.
+    slopes: FloatArray  # (n_formulations, n_families) The slope of log β against log h between the two finest meshes.
 
     def stable(self, formulation: PaperFormulation) -> bool:
         """Return whether β does not fall, and every pressure moves something, on all families."""

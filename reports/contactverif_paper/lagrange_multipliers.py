@@ -54,37 +54,18 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # 1: the paper says t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MultiplierTest:
-    """A patch test with Lagrange multipliers.
+    """A patch test with Lagrange multipliers."""
 
-    Attributes
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    scene : str
-        One of `SCENES`.
-    end : str
-        How Newton's method ended.
-    error : float
-        Error of the stress over the pressure; NaN without a solution.
-    tolerance : float
-        What roundoff explains.
-    low, high : float
-        Range of the pressures λ (a nodal method: λ over the length that the node stands for) over the exact one.
-    deficiency : int
-        Number of vanishing singular values of the last matrix.
-    printed : int
-        What the paper says of the stress: 1 passes, 0 fails, −1 silent.
-    """
-
-    formulation: PaperFormulation
-    scene: str
-    end: str
-    error: float
-    tolerance: float
+    formulation: PaperFormulation  # The formulation.
+    scene: str  # One of `SCENES`.
+    end: str  # How Newton's method ended.
+    error: float  # Error of the stress over the pressure; NaN without a solution.
+    tolerance: float  # What roundoff explains.
+    # Range of the pressures λ (a nodal method: λ over the length that the node stands for) over the exact one.
     low: float
     high: float
-    deficiency: int
-    printed: int = -1
+    deficiency: int  # Number of vanishing singular values of the last matrix.
+    printed: int = -1  # What the paper says of the stress: 1 passes, 0 fails, −1 silent.
 
     @property
     def passes(self) -> bool:

@@ -50,23 +50,17 @@ AMPLITUDE = 0.8  # The wave of real contact over its mean pressure.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Locking:
-    """Compliance and pressures.
+    """Compliance and pressures."""
 
-    Attributes
-    ----------
-    drift, roughness : FloatArray, shape (n_formulations, n_penalties)
-        The loss of compliance since the softest penalty, and the range of pressures, over those of matching meshes.
-    places, pressures : tuple[FloatArray, ...], each of shape (n_points,)
-        For each of `WITH_PRESSURES`: x of the contact points, a length, and the pressure over its mean in real contact.
-    converged : bool
-        Newton's method converged at each penalty of real contact.
-    """
-
+    # (n_formulations, n_penalties) The loss of compliance since the softest penalty, and the range of pressures, over
+    # those of matching meshes.
     drift: FloatArray
     roughness: FloatArray
+    # (n_points,) For each of `WITH_PRESSURES`: x of the contact points, a length, and the pressure over its mean in
+    # real contact.
     places: tuple[FloatArray, ...]
     pressures: tuple[FloatArray, ...]
-    converged: bool
+    converged: bool  # Newton's method converged at each penalty of real contact.
 
 
 def compute(report_progress: Progress) -> Locking:

@@ -48,13 +48,7 @@ VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
 
 @cache
 def subject_of(formulation: PaperFormulation) -> Subject:
-    """Load the formulation.
-
-    Raises
-    ------
-    MisuseError
-        If it does not load.
-    """
+    """Load the formulation."""
     loaded = load_formulation(formulation.name)
     if isinstance(loaded, NotLoaded):
         raise MisuseError("formulation", f"{formulation.name}, not loaded: {loaded.reason}", "one that loads")

@@ -56,35 +56,14 @@ _WORDS: Mapping[Agreement, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A statement of the paper, in our words, beside what was computed.
+    """A statement of the paper, in our words, beside what was computed."""
 
-    Attributes
-    ----------
-    place : str
-        Where in the paper: a figure, a section, an equation.
-    claim : str
-        What the paper says.
-    result : str
-        What was computed.
-    agreement : Agreement
-        The verdict.
-    figure : str
-        File name, without its suffix, of the figure that shows it; empty if none does.
-    condition : str
-        When the statement holds; empty unless the verdict is CONDITIONAL.
-
-    Raises
-    ------
-    ValueError
-        If a condition is given without that verdict, or the verdict without a condition.
-    """
-
-    place: str
-    claim: str
-    result: str
-    agreement: Agreement
-    figure: str = ""
-    condition: str = ""
+    place: str  # Where in the paper: a figure, a section, an equation.
+    claim: str  # What the paper says.
+    result: str  # What was computed.
+    agreement: Agreement  # The verdict.
+    figure: str = ""  # File name, without its suffix, of the figure that shows it; empty if none does.
+    condition: str = ""  # When the statement holds; empty unless the verdict is CONDITIONAL.
 
     def __post_init__(self) -> None:
         if bool(self.condition) != (self.agreement is Agreement.CONDITIONAL):
@@ -93,21 +72,11 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell of a table on the page.
+    """A cell of a table on the page."""
 
-    Attributes
-    ----------
-    values : tuple[str, ...]
-        Text, or several values in a row, each in a space of its own.
-    details : tuple[str, ...]
-        Lines below it, in small letters.
-    tone : str
-        CSS classes, of "good", "bad", "soft", "strong", "n" (a number, set to the right).
-    """
-
-    values: tuple[str, ...]
-    details: tuple[str, ...] = ()
-    tone: str = ""
+    values: tuple[str, ...]  # Text, or several values in a row, each in a space of its own.
+    details: tuple[str, ...] = ()  # Lines below it, in small letters.
+    tone: str = ""  # CSS classes, of "good", "bad", "soft", "strong", "n" (a number, set to the right).
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,67 +95,31 @@ class PageTable:
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """A figure of the page, and how it is drawn from the data of its item.
+    """A figure of the page, and how it is drawn from the data of its item."""
 
-    Attributes
-    ----------
-    name : str
-        File name without suffix.
-    source : str
-        The paper's figure that it reproduces, or `OURS`.
-    caption : str
-        What it shows, in whole sentences.
-    plot : Callable[[Any], Figure]
-        Draws it from the data that the item's `compute` returns.
-    """
-
-    name: str
-    source: str
-    caption: str
-    plot: Callable[[Any], Figure]
+    name: str  # File name without suffix.
+    source: str  # The paper's figure that it reproduces, or `OURS`.
+    caption: str  # What it shows, in whole sentences.
+    plot: Callable[[Any], Figure]  # Draws it from the data that the item's `compute` returns.
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """An item of the paper, as its file registers it.
+    """An item of the paper, as its file registers it."""
 
-    Attributes
-    ----------
-    name : str
-        Its group in `paper.nc`.
-    title : str
-        The heading of its section on the page.
-    compute : Callable[[Progress], Any]
-        Computes its data and calls `Progress` `n_steps` times.
-    statements : Callable[[Any], tuple[Statement, ...]]
-        Compares the data with what the paper says.
-    datasets : Callable[[Any], Mapping[str, xr.Dataset]]
-        Returns its numbers: {group below its own: dataset}, with "" for its own group.
-    figures : tuple[PaperFigure, ...]
-        Its figures, in order.
-    tables : Callable[[Any], tuple[PageTable, ...]]
-        Fills its tables.
-    text : str
-        A paragraph under the heading.
-    choices : Mapping[str, str]
-        {subject: what was chosen where the paper is silent}.
-    n_steps : int
-        The number of times that `compute` reports progress.
-    slow : bool
-        True if it takes long enough for the tests to skip it.
-    """
-
-    name: str
-    title: str
-    compute: Callable[[Progress], Any]
-    statements: Callable[[Any], tuple[Statement, ...]]
+    name: str  # Its group in `paper.nc`.
+    title: str  # The heading of its section on the page.
+    compute: Callable[[Progress], Any]  # Computes its data and calls `Progress` `n_steps` times.
+    statements: Callable[[Any], tuple[Statement, ...]]  # Compares the data with what the paper says.
+    # Returns its numbers: {group below its own: dataset}, with "" for its own group.
     datasets: Callable[[Any], Mapping[str, xr.Dataset]]
-    figures: tuple[PaperFigure, ...] = ()
-    tables: Callable[[Any], tuple[PageTable, ...]] = lambda _: ()
-    text: str = ""
+    figures: tuple[PaperFigure, ...] = ()  # Its figures, in order.
+    tables: Callable[[Any], tuple[PageTable, ...]] = lambda _: ()  # Fills its tables.
+    text: str = ""  # A paragraph under the heading.
+    # {subject: what was chosen where the paper is silent}.
     choices: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    n_steps: int = 1
-    slow: bool = False
+    n_steps: int = 1  # The number of times that `compute` reports progress.
+    slow: bool = False  # True if it takes long enough for the tests to skip it.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,13 +155,7 @@ class Paper:
         return {subject: choice for result in self.results for subject, choice in result.item.choices.items()}
 
     def data(self, name: str) -> Any:
-        """Return the data of the item of that name.
-
-        Raises
-        ------
-        KeyError
-            If no such item was computed.
-        """
+        """Return the data of the item of that name."""
         for result in self.results:
             if result.item.name == name:
                 return result.data

@@ -36,20 +36,7 @@ CLASSES: Mapping[Agreement, str] = {
 
 
 def check_folder(folder: Path, argument: str = "--out") -> None:
-    """Make the folder, and say before anything takes long what would stop files from being written to it.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    argument : str
-        The name of the option, for the message.
-
-    Raises
-    ------
-    MisuseError
-        If it cannot be made or written to.
-    """
+    """Make the folder, and say before anything takes long what would stop files from being written to it."""
     made_folder(folder, argument)
     for name in (NUMBERS, PAGE):
         check_writable(folder / name, argument, f"a folder that may hold {name}")
@@ -58,29 +45,7 @@ def check_folder(folder: Path, argument: str = "--out") -> None:
 def write(
     paper: Paper, folder: Path, report_progress: Progress = lambda _: None, argument: str = "--out"
 ) -> tuple[Path, ...]:
-    """Write all files, each whole or not at all.
-
-    Parameters
-    ----------
-    paper : Paper
-        The results.
-    folder : Path
-        The folder; it is made if it does not exist.
-    report_progress : Progress
-        Is called before each figure.
-    argument : str
-        The name of the option, for messages.
-
-    Returns
-    -------
-    tuple[Path, ...]
-        The files, the page last.
-
-    Raises
-    ------
-    MisuseError
-        As `check_folder`.
-    """
+    """Write all files, each whole or not at all."""
     check_folder(folder, argument)
     paths = [folder / NUMBERS]
     with whole(folder / NUMBERS) as part:
@@ -100,15 +65,7 @@ def write(
 
 
 def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    paper : Paper
-        The results.
-    figures : Mapping[str, Markup]
-        {name: figure as an SVG element}.
-    """
+    """Return the page."""
     return render(
         "paper.html.j2",
         package="contactverif_paper",

@@ -22,24 +22,7 @@ def compute(
     items: tuple[Item, ...] = ITEMS,
     executor: Executor | None = None,
 ) -> Paper:
-    """Compute the items.
-
-    Parameters
-    ----------
-    report_progress : Progress
-        Is called with a few words before each step.
-    with_study : bool
-        False leaves out the items that take most of the time: Example 2 on finer meshes.
-    items : tuple[Item, ...]
-        The items, in the order of the page.
-    executor : Executor | None
-        Worker processes that compute the items; None computes them here.
-
-    Returns
-    -------
-    Paper
-        The data of each item, its statements and its tables.
-    """
+    """Compute the items."""
     selection = _select(items, with_study=with_study)
     data = _compute_all(selection, report_progress, Team(executor))
     results = [ItemResult(item, each, item.statements(each), item.tables(each)) for item, each in data]

@@ -25,13 +25,7 @@ _WORTH_COMPRESSING = 4096  # bytes
 
 
 def tree_of(paper: Paper) -> xr.DataTree:
-    """Return all groups.
-
-    Raises
-    ------
-    ValueError
-        If two items have the same name, or one is called `statements` or `figures`.
-    """
+    """Return all groups."""
     groups = {
         "/": xr.Dataset(attrs=_root(paper)),
         f"/{STATEMENTS}": _statements(paper.statements),

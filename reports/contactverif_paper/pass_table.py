@@ -59,21 +59,11 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PassTable:
-    """The largest error of a stress over the pressure, and what the paper says.
+    """The largest error of a stress over the pressure, and what the paper says."""
 
-    Attributes
-    ----------
-    errors : FloatArray, shape (n_formulations, n_scenes)
-        The errors; NaN where Newton's method ended at no solution.
-    tolerances : FloatArray, shape (n_scenes,)
-        What roundoff explains.
-    printed : IntArray, shape (n_formulations, n_scenes)
-        PASSES, FAILURE or SILENT.
-    """
-
-    errors: FloatArray
-    tolerances: FloatArray
-    printed: IntArray
+    errors: FloatArray  # (n_formulations, n_scenes) The errors; NaN where Newton's method ended at no solution.
+    tolerances: FloatArray  # (n_scenes,) What roundoff explains.
+    printed: IntArray  # (n_formulations, n_scenes) PASSES, FAILURE or SILENT.
 
     @property
     def verdicts(self) -> np.ndarray:

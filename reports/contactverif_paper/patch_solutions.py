@@ -38,38 +38,19 @@ FIVE = (*FOUR, formulations.VTS_PPT)
 
 @dataclass(frozen=True, slots=True)
 class PatchSetup:
-    """A patch test of the paper as its figures show it.
+    """A patch test of the paper as its figures show it."""
 
-    Attributes
-    ----------
-    scene : str
-        Name of the scene on the command line.
-    title : str
-        What the paper calls it, at the beginning of a sentence.
-    pressures, meshes : str
-        Numbers of the paper's figures.
-    x_axis, axis : tuple[float, float]
-        Ends of the axes that the paper prints: the coordinate, and the pressure over the exact one.
-    stiffness : float
-        ε̂ over E, per unit of length. It is our choice.
-    formulations : tuple[PaperFormulation, ...]
-        The formulations that the figures show.
-    close_up : tuple[float, float] | None
-        Ends of the pressure axis of the close-up; None where there is none.
-    origin : float
-        The scene's coordinate of the origin of the paper's axis, a length.
-    """
-
-    scene: str
-    title: str
-    pressures: str
+    scene: str  # Name of the scene on the command line.
+    title: str  # What the paper calls it, at the beginning of a sentence.
+    pressures: str  # Numbers of the paper's figures.
     meshes: str
+    # Ends of the axes that the paper prints: the coordinate, and the pressure over the exact one.
     x_axis: tuple[float, float]
     axis: tuple[float, float]
-    stiffness: float
-    formulations: tuple[PaperFormulation, ...]
-    close_up: tuple[float, float] | None = None
-    origin: float = 0.0
+    stiffness: float  # ε̂ over E, per unit of length. It is our choice.
+    formulations: tuple[PaperFormulation, ...]  # The formulations that the figures show.
+    close_up: tuple[float, float] | None = None  # Ends of the pressure axis of the close-up; None where there is none.
+    origin: float = 0.0  # The scene's coordinate of the origin of the paper's axis, a length.
 
     @property
     def n_steps(self) -> int:
@@ -79,27 +60,14 @@ class PatchSetup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """The pressure that one formulation leaves on a scene.
+    """The pressure that one formulation leaves on a scene."""
 
-    Attributes
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    x : FloatArray, shape (n_points,)
-        Reference coordinates of the paper's axis, a length.
-    pressure : FloatArray, shape (n_points,)
-        The contact pressure over the exact one.
-    at_points : bool
-        True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
-    solution : Solution
-        The solved scene.
-    """
-
-    formulation: PaperFormulation
-    x: FloatArray
-    pressure: FloatArray
+    formulation: PaperFormulation  # The formulation.
+    x: FloatArray  # (n_points,) Reference coordinates of the paper's axis, a length.
+    pressure: FloatArray  # (n_points,) The contact pressure over the exact one.
+    # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
     at_points: bool
-    solution: Solution
+    solution: Solution  # The solved scene.
 
     @property
     def departure(self) -> float:
@@ -109,24 +77,12 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchSolution:
-    """A patch test, solved by the formulations of its figures.
+    """A patch test, solved by the formulations of its figures."""
 
-    Attributes
-    ----------
-    setup : PatchSetup
-        What was solved.
-    exact : float
-        The exact pressure, force per length.
-    solved : SolvedScene
-        The scene with all solutions, ready to be drawn.
-    curves : tuple[Curve, ...]
-        A curve for each formulation.
-    """
-
-    setup: PatchSetup
-    exact: float
-    solved: SolvedScene
-    curves: tuple[Curve, ...]
+    setup: PatchSetup  # What was solved.
+    exact: float  # The exact pressure, force per length.
+    solved: SolvedScene  # The scene with all solutions, ready to be drawn.
+    curves: tuple[Curve, ...]  # A curve for each formulation.
 
     def curve(self, formulation: PaperFormulation) -> Curve:
         """Return the curve of a formulation."""
@@ -171,13 +127,6 @@ def departures(setup: PatchSetup, stiffness: float) -> dict[PaperFormulation, fl
 def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, float]], bool]) -> float:
     """Return the ε̂/E below which a relation between departures holds, by bisection; NaN if no limit was found.
 
-    Parameters
-    ----------
-    setup : PatchSetup
-        The patch test.
-    holds : Callable[[dict[PaperFormulation, float]], bool]
-        The relation. It should hold at soft penalties and fail at stiff ones.
-
     Returns
     -------
     float
@@ -194,17 +143,7 @@ def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, f
 
 @cache
 def moderate_error(formulation: PaperFormulation, scene_name: str, ratio: float = 1.0) -> float:
-    """Return the largest error of a stress over the pressure at ε̂ = 10 E/h; NaN without a solution.
-
-    Parameters
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    scene_name : str
-        Name of the scene.
-    ratio : float
-        E of the master over E of the slave.
-    """
+    """Return the largest error of a stress over the pressure at ε̂ = 10 E/h; NaN without a solution."""
     scene = catalogue.make_scene(scene_name, ratio=ratio)
     trace = newton.solve(scene, subject_of(formulation).for_case(scene.case()))
     return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan

@@ -18,23 +18,7 @@ from contactverif_paper.patch_solutions import PatchSetup, PatchSolution, patch_
 def punch_item(
     name: str, patch: PatchSetup, figures: tuple[int, int, int], *, title: str, meshes: str, choice: str
 ) -> Item:
-    """Return the item of one example.
-
-    Parameters
-    ----------
-    name : str
-        The name of the item.
-    patch : PatchSetup
-        The example.
-    figures : tuple[int, int, int]
-        The numbers of the figures that show the meshes, the penetrations and the pressures.
-    title : str
-        The title behind the name of the example.
-    meshes : str
-        A sentence on the lengths of the segments.
-    choice : str
-        What the paper does not print.
-    """
+    """Return the item of one example."""
     example = patch.title
     captions = (
         f"{example}: the meshes. {meshes}",

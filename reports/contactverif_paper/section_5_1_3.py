@@ -22,23 +22,13 @@ from contactverif_reports.netcdf.variables import numbers
 
 @dataclass(frozen=True, slots=True)
 class TwoPasses:
-    """Errors of one and of two passes on case B.
+    """Errors of one and of two passes on case B."""
 
-    Attributes
-    ----------
-    one_pass, two_passes : float
-        The largest |p/p_exact − 1| at the penalty of Fig. 18.
-    moderate_one_pass, moderate_two_passes : float
-        The stress errors at ε̂ = 10 E/h, over the pressure.
-    limit : float
-        The ε̂/E up to which two passes are no better, per unit of length.
-    """
-
-    one_pass: float
+    one_pass: float  # The largest |p/p_exact − 1| at the penalty of Fig. 18.
     two_passes: float
-    moderate_one_pass: float
+    moderate_one_pass: float  # The stress errors at ε̂ = 10 E/h, over the pressure.
     moderate_two_passes: float
-    limit: float
+    limit: float  # The ε̂/E up to which two passes are no better, per unit of length.
 
 
 def compute(report_progress: Progress) -> TwoPasses:

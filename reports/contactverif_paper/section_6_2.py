@@ -38,24 +38,16 @@ _TINY = 2.0**-100  # The length of a complex step; lengths are about 1, so it ro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tangents:
-    """Properties of the tangents in the solution, each (n_formulations,).
+    """Properties of the tangents in the solution, each (n_formulations,)."""
 
-    Attributes
-    ----------
-    error : FloatArray, shape (n_formulations,)
-        Largest difference of K d from a complex step along d, over the largest entry of K d, over random d.
-    asymmetry : FloatArray, shape (n_formulations,)
-        Largest entry of K − Kᵀ over that of K.
-    order : FloatArray, shape (n_formulations,)
-        Order of one Newton step towards the solution; infinite if the step is exact, NaN if nothing decides.
-    iterations : IntArray, shape (n_formulations,)
-        Linear systems solved from the slave just touching to roundoff.
-    """
-
+    # (n_formulations,) Largest difference of K d from a complex step along d, over the largest entry of K d, over
+    # random d.
     error: FloatArray
-    asymmetry: FloatArray
+    asymmetry: FloatArray  # (n_formulations,) Largest entry of K − Kᵀ over that of K.
+    # (n_formulations,) Order of one Newton step towards the solution; infinite if the step is exact, NaN if nothing
+    # decides.
     order: FloatArray
-    iterations: IntArray
+    iterations: IntArray  # (n_formulations,) Linear systems solved from the slave just touching to roundoff.
 
 
 @cache

@@ -50,24 +50,16 @@ _VANISHES = 1e-12  # A coefficient below this share of the largest one is zero.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cost:
-    """Terms and cost.
+    """Terms and cost."""
 
-    Attributes
-    ----------
-    terms : IntArray, shape (n_formulations, n_masters)
-        Coefficients of dyads in the tangent of one slave segment, for each of `FORMULATIONS` and `MASTERS`.
-    entries : FloatArray, shape (n_timed, n_ratios)
-        Entries of the tangent that do not vanish, for each slave segment, of `TIMED` and `MESH_RATIOS`.
-    seconds : FloatArray, shape (n_timed, n_ratios, 2)
-        Measured time of a residual and of a tangent, for each slave segment.
-    tangents : Tangents
-        The tangents of Section 6.2.
-    """
-
+    # (n_formulations, n_masters) Coefficients of dyads in the tangent of one slave segment, for each of `FORMULATIONS`
+    # and `MASTERS`.
     terms: IntArray
+    # (n_timed, n_ratios) Entries of the tangent that do not vanish, for each slave segment, of `TIMED` and
+    # `MESH_RATIOS`.
     entries: FloatArray
-    seconds: FloatArray
-    tangents: Tangents
+    seconds: FloatArray  # (n_timed, n_ratios, 2) Measured time of a residual and of a tangent, for each slave segment.
+    tangents: Tangents  # The tangents of Section 6.2.
 
 
 def compute(report_progress: Progress) -> Cost:
@@ -83,15 +75,7 @@ def compute(report_progress: Progress) -> Cost:
 
 
 def count_terms(formulation: PaperFormulation, master: tuple[tuple[float, float], ...]) -> int:
-    """Return the number of coefficients of dyads that do not vanish, in the frame of the master segment of the middle.
-
-    Parameters
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    master : tuple[tuple[float, float], ...]
-        Positions of the master's nodes, against the slave's direction.
-    """
+    """Return the number of coefficients of dyads that do not vanish, in the frame of the master segment of the middle."""
     x = np.vstack([SLAVE, master])
     interface = Interface.from_chains(x[:2] * [1.0, 0.0], x[2:] * [1.0, 0.0])
     plugin, z = subject_of(formulation).with_penalty(PENALTY), x.reshape(-1)

@@ -29,25 +29,15 @@ _COMPARED = (formulations.NTS_AR, formulations.NTS, formulations.TWO_PASS)
 
 @dataclass(frozen=True, slots=True)
 class Section71:
-    """Errors on Examples 1 and 1bis.
+    """Errors on Examples 1 and 1bis."""
 
-    Attributes
-    ----------
-    departures : tuple[tuple[float, ...], ...]
-        The largest |p/p_exact − 1| at the penalty of the figures: (example, formulation) with NTS-AR first.
-    limits : tuple[float, ...]
-        For each example the ε̂/E up to which NTS-AR is the best of the three, per unit of length.
-    moderate_one, moderate_two : float
-        Stress errors of NTS-AR and of two passes on Example 1 at ε̂ = 10 E/h.
-    unequal_error, tolerance : float
-        Stress error of VTS-PPT on Example 1bis with the other foundation, and its roundoff.
-    """
-
+    # The largest |p/p_exact − 1| at the penalty of the figures: (example, formulation) with NTS-AR first.
     departures: tuple[tuple[float, ...], ...]
+    # For each example the ε̂/E up to which NTS-AR is the best of the three, per unit of length.
     limits: tuple[float, ...]
-    moderate_one: float
+    moderate_one: float  # Stress errors of NTS-AR and of two passes on Example 1 at ε̂ = 10 E/h.
     moderate_two: float
-    unequal_error: float
+    unequal_error: float  # Stress error of VTS-PPT on Example 1bis with the other foundation, and its roundoff.
     tolerance: float
 
 

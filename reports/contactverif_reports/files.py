@@ -14,13 +14,7 @@ _LARGE = 2**26  # The size of a large file, in bytes.
 
 
 def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument: str = "path") -> Path:
-    """Return the path if its name ends as a file of that kind does.
-
-    Raises
-    ------
-    MisuseError
-        If it does not.
-    """
+    """Return the path if its name ends as a file of that kind does."""
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         raise MisuseError(argument, f"{os.fspath(path)!r}", f"a name that ends in {' or '.join(suffixes)}")
@@ -28,22 +22,7 @@ def checked_name(path: str | os.PathLike[str], suffixes: Sequence[str], argument
 
 
 def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: str = "FILE.nc") -> None:
-    """Check before a long computation that its file can be written afterwards.
-
-    Parameters
-    ----------
-    path : str or os.PathLike[str]
-        The file to be written.
-    argument : str
-        The name of the argument in error messages.
-    form : str
-        The form of such a file's name in error messages.
-
-    Raises
-    ------
-    MisuseError
-        If there is no such folder, nothing may be written there, or the path is no ordinary file.
-    """
+    """Check before a long computation that its file can be written afterwards."""
     name = os.fspath(path)
     target = Path(os.path.realpath(path))  # `resolve` raises an error for links that form a loop.
     if not name or name.endswith(os.sep):
@@ -80,13 +59,7 @@ def reason_not_to_grow(path: Path) -> str:
 
 
 def made_folder(folder: Path, argument: str) -> None:
-    """Make the folder, and those above it, if it does not exist.
-
-    Raises
-    ------
-    MisuseError
-        If it cannot be made.
-    """
+    """Make the folder, and those above it, if it does not exist."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

@@ -25,37 +25,20 @@ MESH_CHOICE_SHARE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cell:
-    """A row as numbers by case.
+    """A row as numbers by case."""
 
-    Attributes
-    ----------
-    row : Row
-        The result of one formulation on one property.
-    verdicts : IntArray, shape (n_cases,)
-        Codes of `Verdict` of the random cases.
-    margins : FloatArray, shape (n_cases,)
-        The number of each case that is closest to its tolerance or furthest beyond it, over that tolerance (the
-        inverse for "at least"): above 1 fails. Infinite where a case fails without such a number (a crash, a NaN, a
-        breach); NaN where nothing was decided or measured.
-    orders : FloatArray, shape (n_cases,)
-        Order of one Newton step; NaN where the property measures none.
-    details : Mapping[str, FloatArray]
-        {name: (n_cases,)} of further numbers; NaN where a case has none.
-    closest : CheckedNumber | None
-        The closest number of all random cases; None where there is none.
-    kinds : FloatArray, shape (n_cases, 5)
-        Numbers of segments, penalty, largest coordinate, shortest segment: equal for equal cases.
-    seconds : float
-        Median of the time that a case took, so that the first one, in which kernels compile, does not count.
-    """
-
-    row: Row
-    verdicts: IntArray
+    row: Row  # The result of one formulation on one property.
+    verdicts: IntArray  # (n_cases,) Codes of `Verdict` of the random cases.
+    # (n_cases,) The number of each case that is closest to its tolerance or furthest beyond it, over that tolerance
+    # (the inverse for "at least"): above 1 fails. Infinite where a case fails without such a number (a crash, a NaN, a
+    # breach); NaN where nothing was decided or measured.
     margins: FloatArray
-    orders: FloatArray
-    details: Mapping[str, FloatArray]
-    closest: CheckedNumber | None
+    orders: FloatArray  # (n_cases,) Order of one Newton step; NaN where the property measures none.
+    details: Mapping[str, FloatArray]  # {name: (n_cases,)} of further numbers; NaN where a case has none.
+    closest: CheckedNumber | None  # The closest number of all random cases; None where there is none.
+    # (n_cases, 5) Numbers of segments, penalty, largest coordinate, shortest segment: equal for equal cases.
     kinds: FloatArray
+    # Median of the time that a case took, so that the first one, in which kernels compile, does not count.
     seconds: float
 
     @classmethod
@@ -191,28 +174,19 @@ class Paired:
 
     Their margins are equal if both keep their tolerances, or if both do not and are no further apart than one
     tolerance: roundoff may change a number by that much.
-
-    Attributes
-    ----------
-    n, better, equal, worse : int
-        Numbers of cases.
-    ratio : float
-        Median over the cases of the candidate's margin over the reference's. A margin within the tolerance counts as 1,
-        because below it all is roundoff. NaN where there is none.
-    decades : FloatArray, shape (n_cases,)
-        Powers of ten that the candidate is further beyond the tolerance than the reference; a margin within it counts
-        as 1. Negative where the reference is further, NaN where one of them is undecided.
-    apart : BoolArray, shape (n_cases,)
-        One passes and the other does not.
     """
 
-    n: int
+    n: int  # Numbers of cases.
     better: int
     equal: int
     worse: int
+    # Median over the cases of the candidate's margin over the reference's. A margin within the tolerance counts as 1,
+    # because below it all is roundoff. NaN where there is none.
     ratio: float
+    # (n_cases,) Powers of ten that the candidate is further beyond the tolerance than the reference; a margin within
+    # it counts as 1. Negative where the reference is further, NaN where one of them is undecided.
     decades: FloatArray
-    apart: BoolArray
+    apart: BoolArray  # (n_cases,) One passes and the other does not.
 
     @classmethod
     def from_cells(cls, candidate: Cell, reference: Cell) -> Paired:

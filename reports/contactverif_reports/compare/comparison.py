@@ -25,35 +25,19 @@ CONVERGED = 0.0  # The code of an end that is a solution.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Iterations:
-    """The Newton iterations of a formulation, where a property solved.
+    """The Newton iterations of a formulation, where a property solved."""
 
-    Attributes
-    ----------
-    formulation, property_id : str
-        The names on the command line.
-    solution : str
-        The name of the solution if a case has several ("high penalty"), else empty.
-    solved, converged : int
-        Numbers of cases.
-    median, most : float
-        Median and largest number of iterations of those that converged; NaN where none did.
-    fewer, same, more : int
-        Numbers of cases against the reference, of those where the reference converged too.
-    order : float
-        Median order of one step, NaN where it was not measured.
-    """
-
-    formulation: str
+    formulation: str  # The names on the command line.
     property_id: str
-    solution: str
-    solved: int
+    solution: str  # The name of the solution if a case has several ("high penalty"), else empty.
+    solved: int  # Numbers of cases.
     converged: int
-    median: float
+    median: float  # Median and largest number of iterations of those that converged; NaN where none did.
     most: float
-    fewer: int
+    fewer: int  # Numbers of cases against the reference, of those where the reference converged too.
     same: int
     more: int
-    order: float = nan
+    order: float = nan  # Median order of one step, NaN where it was not measured.
 
     @property
     def title(self) -> str:
@@ -63,36 +47,16 @@ class Iterations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Candidates against a reference, on the same cases.
+    """Candidates against a reference, on the same cases."""
 
-    Attributes
-    ----------
-    reference : str
-        The formulation that the candidates are compared with.
-    formulations : tuple[str, ...]
-        All of them, the reference first.
-    properties : tuple[str, ...]
-        Ids, in the order of the run.
-    cells : Mapping[tuple[str, str], Cell]
-        {(formulation, property): numbers}.
-    paired : Mapping[tuple[str, str], Paired]
-        {(candidate, property): comparison}, where both decided some case.
-    iterations : tuple[Iterations, ...]
-        Newton's iterations, property by property.
-    not_loaded : Mapping[str, str]
-        {name: reason} of plugins that did not load.
-    provenance : Mapping[str, str]
-        Where the run comes from.
-    """
-
-    reference: str
-    formulations: tuple[str, ...]
-    properties: tuple[str, ...]
-    cells: Mapping[tuple[str, str], Cell]
-    paired: Mapping[tuple[str, str], Paired]
-    iterations: tuple[Iterations, ...]
-    not_loaded: Mapping[str, str]
-    provenance: Mapping[str, str]
+    reference: str  # The formulation that the candidates are compared with.
+    formulations: tuple[str, ...]  # All of them, the reference first.
+    properties: tuple[str, ...]  # Ids, in the order of the run.
+    cells: Mapping[tuple[str, str], Cell]  # {(formulation, property): numbers}.
+    paired: Mapping[tuple[str, str], Paired]  # {(candidate, property): comparison}, where both decided some case.
+    iterations: tuple[Iterations, ...]  # Newton's iterations, property by property.
+    not_loaded: Mapping[str, str]  # {name: reason} of plugins that did not load.
+    provenance: Mapping[str, str]  # Where the run comes from.
 
     @classmethod
     def from_run(cls, run: Run, reference: str) -> Comparison:
@@ -133,24 +97,12 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cost:
-    """The time of one evaluation on one state, the fastest of the turns.
+    """The time of one evaluation on one state, the fastest of the turns."""
 
-    Attributes
-    ----------
-    formulation : str
-        The name on the command line.
-    n_segments : int
-        The number of slave segments.
-    seconds : dict[str, float]
-        {"pair", "residual", "tangent"}; NaN for a part that is not provided.
-    failed : str
-        The reason why it could not be timed; empty if it was.
-    """
-
-    formulation: str
-    n_segments: int
-    seconds: dict[str, float]
-    failed: str = ""
+    formulation: str  # The name on the command line.
+    n_segments: int  # The number of slave segments.
+    seconds: dict[str, float]  # {"pair", "residual", "tangent"}; NaN for a part that is not provided.
+    failed: str = ""  # The reason why it could not be timed; empty if it was.
 
     @property
     def total(self) -> float:
@@ -161,35 +113,18 @@ class Cost:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Differing:
-    """The case of a property on which a candidate and the reference differ most.
+    """The case of a property on which a candidate and the reference differ most."""
 
-    Attributes
-    ----------
-    info : PropertyInfo
-        The property.
-    formulation : str
-        The candidate.
-    number : int
-        The number of the case in the run.
-    apart : bool
-        One passes and the other does not.
-    decades : float
-        Powers of ten that the candidate is further beyond the tolerance than the reference; negative where the
-        reference is further.
-    margin, reference_margin : float
-        The error of each over its tolerance.
-    outcome, reference_outcome : Outcome
-        The verdict on each, with its numbers.
-    """
-
-    info: PropertyInfo
-    formulation: str
-    number: int
-    apart: bool
+    info: PropertyInfo  # The property.
+    formulation: str  # The candidate.
+    number: int  # The number of the case in the run.
+    apart: bool  # One passes and the other does not.
+    # Powers of ten that the candidate is further beyond the tolerance than the reference; negative where the reference
+    # is further.
     decades: float
-    margin: float
+    margin: float  # The error of each over its tolerance.
     reference_margin: float
-    outcome: Outcome
+    outcome: Outcome  # The verdict on each, with its numbers.
     reference_outcome: Outcome
 
     @property
@@ -199,18 +134,7 @@ class Differing:
 
 
 def count_iterations(cells: Sequence[Cell]) -> list[Iterations]:
-    """Count Newton's iterations over the rows of one property, one line for each solution and formulation.
-
-    Parameters
-    ----------
-    cells : Sequence[Cell]
-        The rows, the reference first.
-
-    Returns
-    -------
-    list[Iterations]
-        A line for each solution that the property keeps and each formulation that has it.
-    """
+    """Count Newton's iterations over the rows of one property, one line for each solution and formulation."""
     names = sorted({name for cell in cells for name in cell.details if name.partition(", ")[0] == ITERATIONS})
     return [
         _iterations(cell, name, _converged_counts(cells[0], name))

@@ -48,25 +48,13 @@ ROUNDOFFS = 2.0  # The number of tolerances by which two right margins may diffe
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
-    """One formulation and property, before and after.
+    """One formulation and property, before and after."""
 
-    Attributes
-    ----------
-    old, new : Cell
-        The numbers of both rows.
-    paired : Paired | None
-        The new beside the old, case by case; None where the cases are not the same.
-    regressions : tuple[str, ...]
-        The regressions, in words; empty if there is none.
-    noteworthy : tuple[str, ...]
-        The changes that are worth a look and no regression, in words.
-    """
-
-    old: Cell
+    old: Cell  # The numbers of both rows.
     new: Cell
-    paired: Paired | None
-    regressions: tuple[str, ...]
-    noteworthy: tuple[str, ...] = ()
+    paired: Paired | None  # The new beside the old, case by case; None where the cases are not the same.
+    regressions: tuple[str, ...]  # The regressions, in words; empty if there is none.
+    noteworthy: tuple[str, ...] = ()  # The changes that are worth a look and no regression, in words.
 
     @property
     def better(self) -> bool:
@@ -81,21 +69,11 @@ class Change:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedRun:
-    """A run with the name of its report and its numbers by case.
+    """A run with the name of its report and its numbers by case."""
 
-    Attributes
-    ----------
-    path : str
-        The report as the caller wrote it.
-    run : Run
-        The run that it stores.
-    cells : Mapping[tuple[str, str], Cell]
-        {(formulation, property): numbers}.
-    """
-
-    path: str
-    run: Run
-    cells: Mapping[tuple[str, str], Cell]
+    path: str  # The report as the caller wrote it.
+    run: Run  # The run that it stores.
+    cells: Mapping[tuple[str, str], Cell]  # {(formulation, property): numbers}.
 
     @classmethod
     def from_run(cls, path: str, run: Run) -> NamedRun:
@@ -110,26 +88,16 @@ class NamedRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
-    """An old report and a new one.
+    """An old report and a new one."""
 
-    Attributes
-    ----------
-    old, new : NamedRun
-        The runs.
-    changes : tuple[Change, ...]
-        The rows that both have.
-    removed, added : tuple[str, ...]
-        The entries of the old report only, and of the new report only: names of formulations, ids of properties, or
-        rows.
-    no_longer_loaded : Mapping[str, str]
-        {name: reason} of the plugins that the old report has and the new run could not load.
-    """
-
-    old: NamedRun
+    old: NamedRun  # The runs.
     new: NamedRun
-    changes: tuple[Change, ...]
+    changes: tuple[Change, ...]  # The rows that both have.
+    # The entries of the old report only, and of the new report only: names of formulations, ids of properties, or
+    # rows.
     removed: tuple[str, ...]
     added: tuple[str, ...]
+    # {name: reason} of the plugins that the old report has and the new run could not load.
     no_longer_loaded: Mapping[str, str]
 
     @property
@@ -176,20 +144,7 @@ class Changes:
 
 
 def compare_rows(old: Cell, new: Cell, *, same_seed: bool, same_examples: bool = True) -> Change:
-    """Compare one row, before and after.
-
-    Parameters
-    ----------
-    old, new : Cell
-        The row in both reports.
-    same_seed, same_examples : bool
-        The reports have the same seed, and the same number of examples.
-
-    Returns
-    -------
-    Change
-        The two, with all that got worse.
-    """
+    """Compare one row, before and after."""
     paired = Paired.from_cells(new, old) if same_seed and same_cases(old, new) else None
     lines = [*_verdicts(old, new)]
     n_old, n_new = len(old.verdicts), len(new.verdicts)

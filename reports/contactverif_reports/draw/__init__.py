@@ -38,11 +38,6 @@ def draw_case(
     forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
         Nodal forces of the formulation and exact ones, as they act on the nodes (minus the residual). They are drawn
         as arrows of one scale.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written, or its name ends otherwise.
     """
     from contactverif_reports.draw.case_figure import SUFFIXES, make_case_figure, save  # importing matplotlib is slow
 

@@ -117,11 +117,6 @@ def magnification(gap: FloatArray, roundoff: float, size: float) -> float:
         The rounding of a length; gaps far below it are none.
     size : float
         The size of the interface, a length.
-
-    Returns
-    -------
-    float
-        The factor; 1 if the gap is visible already or there is none.
     """
     largest = float(np.abs(gap).max())
     if largest <= roundoff * 1e-3 or largest >= _VISIBLE_GAP * size:
@@ -148,20 +143,7 @@ def _label_axes(axes: Axes, unit_name: str) -> None:
 
 
 def save(figure: Figure, target: Path) -> None:
-    """Write a figure to a file; the same figure gives the same bytes, without a date or random ids.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    target : Path
-        A .png or .svg file; an older one is replaced.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written.
-    """
+    """Write a figure to a file; the same figure gives the same bytes, without a date or random ids."""
     suffix = target.suffix.lower()
     metadata = {"Date": None} if suffix == ".svg" else {"Software": None}
     try:

@@ -18,28 +18,14 @@ NEARLY_FLAT = 0.05  # A surface is drawn as a straight line if its rise is at mo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """The nodes of a case along the mean direction of its slave surface.
+    """The nodes of a case along the mean direction of its slave surface."""
 
-    Attributes
-    ----------
-    direction : FloatArray, shape (2,)
-        Unit vector along which the slave runs, with its body on the left.
-    along, above : FloatArray, shape (n_nodes,)
-        Coordinates of the nodes along `direction` and to its left, a length each.
-    rise : float
-        Largest difference of `above` within a surface, a length.
-    roundoff : float
-        A length; a smaller one is rounding of the coordinates.
-    straight : bool
-        Whether each slave segment runs along `direction` and each master segment against it.
-    """
-
-    direction: FloatArray
-    along: FloatArray
+    direction: FloatArray  # (2,) Unit vector along which the slave runs, with its body on the left.
+    along: FloatArray  # (n_nodes,) Coordinates of the nodes along `direction` and to its left, a length each.
     above: FloatArray
-    rise: float
-    roundoff: float
-    straight: bool
+    rise: float  # Largest difference of `above` within a surface, a length.
+    roundoff: float  # A length; a smaller one is rounding of the coordinates.
+    straight: bool  # Whether each slave segment runs along `direction` and each master segment against it.
 
     @classmethod
     def from_case(cls, case: Case) -> Course:
@@ -83,21 +69,11 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """The gaps of the slave nodes to their nearest master segments.
+    """The gaps of the slave nodes to their nearest master segments."""
 
-    Attributes
-    ----------
-    gap : FloatArray, shape (n_slave_nodes,)
-        The gap, a length, negative in penetration.
-    normal : FloatArray, shape (n_slave_nodes, 2)
-        The normal of that segment, out of the master.
-    facing : BoolArray, shape (n_slave_nodes,)
-        Whether the node faces the master; False beyond an end of the master surface.
-    """
-
-    gap: FloatArray
-    normal: FloatArray
-    facing: BoolArray
+    gap: FloatArray  # (n_slave_nodes,) The gap, a length, negative in penetration.
+    normal: FloatArray  # (n_slave_nodes, 2) The normal of that segment, out of the master.
+    facing: BoolArray  # (n_slave_nodes,) Whether the node faces the master; False beyond an end of the master surface.
 
     @classmethod
     def from_case(cls, case: Case) -> Gaps:

@@ -27,11 +27,6 @@ def as_text(case: Case, width: int = 72) -> str:
         The case.
     width : int
         The largest number of columns, at least 60.
-
-    Returns
-    -------
-    str
-        Lines separated by newlines.
     """
     width = max(width, 60)
     course, gaps = Course.from_case(case), Gaps.from_case(case)

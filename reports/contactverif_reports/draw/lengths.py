@@ -14,17 +14,7 @@ _LARGEST_DENOMINATOR = 64
 
 
 def format_number(value: float, slack: float = 0.0, digits: int = 4) -> str:
-    """Return the shortest text for a number: an integer, a decimal, a fraction or an integer times 2^k.
-
-    Parameters
-    ----------
-    value : float
-        The number.
-    slack : float
-        The largest difference between the number and what the text says.
-    digits : int
-        The number of significant digits if no short text is near enough.
-    """
+    """Return the shortest text for a number: an integer, a decimal, a fraction or an integer times 2^k."""
     if not math.isfinite(value):
         return "–"
     slack = min(slack, 1e-6 * abs(value))

@@ -19,17 +19,7 @@ _POWER_OF_TEN = re.compile(r"(?=.*\d)-?\$(\\mathdefault\{)?[-−+]?[0-9.]*(\\tim
 
 
 def save_plainly(figure: Figure, target: Any, **options: Any) -> None:
-    """Write a figure with `Figure.savefig`, its texts as they are.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    target : Any
-        A path or an open file.
-    **options : Any
-        Further arguments of `Figure.savefig`.
-    """
+    """Write a figure with `Figure.savefig`, its texts as they are."""
     for text in figure.findobj(Text):
         label = text.get_text()
         if label and not _POWER_OF_TEN.fullmatch(label):  # An empty text may become a power of ten as it is drawn.

@@ -25,11 +25,6 @@ def draw_raster(case: Case, course: Course, gaps: Gaps, width: int) -> tuple[lis
         Its geometry.
     width : int
         The number of columns.
-
-    Returns
-    -------
-    tuple[list[str], str]
-        The rows, and the legend.
     """
     n_slave = case.interface.n_slave_nodes
     positions, is_apart = _positions_to_draw(case, course, gaps, width)

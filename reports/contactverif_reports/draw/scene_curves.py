@@ -52,15 +52,6 @@ def draw_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "mast
 
     The curve is the nodal force over the node's share of the interface. On the slave, thin lines show the pressure at
     the contact points too.
-
-    Parameters
-    ----------
-    axes : Axes
-        The axes to draw to.
-    solved : SolvedScene
-        The scene and its solutions.
-    side : "slave" or "master"
-        The side.
     """
     order = [index for index, its_side in enumerate(solved.sides) if its_side == side]
     for number, solution in enumerate(solved.solutions):
@@ -79,17 +70,7 @@ def draw_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "mast
 
 
 def draw_history(axes: Axes, solved: SolvedScene, quantity: Literal["residuals", "energies"]) -> None:
-    """Draw a norm against the iterates of Newton's method, for each formulation.
-
-    Parameters
-    ----------
-    axes : Axes
-        The axes to draw to; the scale is logarithmic.
-    solved : SolvedScene
-        The scene and its solutions.
-    quantity : "residuals" or "energies"
-        The norm. A residual of 0 is drawn at the roundoff of the residual.
-    """
+    """Draw a norm against the iterates of Newton's method, for each formulation."""
     for number, solution in enumerate(solved.solutions):
         values = getattr(solution, quantity)
         floors = solution.floors if quantity == "residuals" else np.full_like(values, np.finfo(float).tiny)

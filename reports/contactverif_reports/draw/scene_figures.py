@@ -36,22 +36,7 @@ _SMALL: dict[Any, Any] = {
 
 
 def draw_scene(solved: SolvedScene, path: str | os.PathLike[str], *, title: str = "") -> None:
-    """Draw a solved scene to a .png or .svg file.
-
-    Parameters
-    ----------
-    solved : SolvedScene
-        The scene, with at least one solution.
-    path : str | os.PathLike[str]
-        The file to write; an older one is replaced.
-    title : str
-        The title above the picture; it is wrapped.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written, or its name ends otherwise.
-    """
+    """Draw a solved scene to a .png or .svg file."""
     target = checked_name(path, SUFFIXES)
     with matplotlib.rc_context(_SMALL):
         save(_figure(solved, title), target)

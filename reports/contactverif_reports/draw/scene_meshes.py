@@ -128,21 +128,7 @@ def draw_meshes(axes: Axes, solved: SolvedScene, box: FloatArray) -> None:
 def draw_bodies(
     axes: Axes, solved: SolvedScene, solution: Solution, large: Magnification, scale: ScalarMappable
 ) -> None:
-    """Draw the bodies, coloured by the pressure across the interface; penetration is hatched.
-
-    Parameters
-    ----------
-    axes : Axes
-        The axes to draw to.
-    solved : SolvedScene
-        The scene.
-    solution : Solution
-        One of its solutions.
-    large : Magnification
-        The factors for displacements and gaps.
-    scale : ScalarMappable
-        The colours, as `colour_scale` returns them.
-    """
+    """Draw the bodies, coloured by the pressure across the interface; penetration is hatched."""
     box = close_up(solved)
     reference = solved.case.interface.nodes
     surface = reference + large.move * (solution.z.reshape(-1, 2) - reference)  # (n_nodes, 2) of the interface

@@ -28,15 +28,7 @@ def has_outline(case: Case) -> bool:
 
 
 def make_outline_figure(case: Case, width: float) -> Figure:
-    """Return a figure of the bodies in their reference configuration; a rigid body is its surface.
-
-    Parameters
-    ----------
-    case : Case
-        A case that holds bodies.
-    width : float
-        The width of the figure in inches.
-    """
+    """Return a figure of the bodies in their reference configuration; a rigid body is its surface."""
     packed = {
         name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
     }

@@ -30,11 +30,6 @@ def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> st
         The blocks.
     width : int
         The largest number of columns, at least 40.
-
-    Returns
-    -------
-    str
-        Lines separated by newlines.
     """
     course = Course.from_case(case)
     lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
@@ -81,11 +76,6 @@ def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) 
         The bodies.
     width : int
         The largest number of columns.
-
-    Returns
-    -------
-    str
-        Lines separated by newlines.
     """
     inked = [(_INKS["master"], master), (_INKS["slave"], slave)]
     nodes = np.vstack([slave.nodes, master.nodes])

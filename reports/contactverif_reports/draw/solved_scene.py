@@ -22,78 +22,39 @@ _SLIVER = 1e-6  # A smaller share of a segment under the other side counts as no
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointPressures:
-    """The contact points of a formulation, and the pressure at each.
+    """The contact points of a formulation, and the pressure at each."""
 
-    Attributes
-    ----------
-    segment : IntArray, shape (n_points,)
-        The slave segment that carries the point.
-    c : FloatArray, shape (n_points,)
-        The place on the segment, −1 at its first node, +1 at its second.
-    area : FloatArray, shape (n_points, 2)
-        The ends of the area of competence, as `c`; NaN where the plugin does not say.
-    pressure : FloatArray, shape (n_points,)
-        Force per length, ≥ 0; NaN where there is none.
-    """
-
-    segment: IntArray
-    c: FloatArray
-    area: FloatArray
-    pressure: FloatArray
+    segment: IntArray  # (n_points,) The slave segment that carries the point.
+    c: FloatArray  # (n_points,) The place on the segment, −1 at its first node, +1 at its second.
+    area: FloatArray  # (n_points, 2) The ends of the area of competence, as `c`; NaN where the plugin does not say.
+    pressure: FloatArray  # (n_points,) Force per length, ≥ 0; NaN where there is none.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A scene as one formulation solves it.
+    """A scene as one formulation solves it."""
 
-    Attributes
-    ----------
-    formulation : str
-        The name on the command line.
-    end : str
-        How the solution ended, in a few words: "converged", "2-cycle", ….
-    converged : bool
-        Whether the last iterate is a solution.
-    displacements : tuple[FloatArray, ...]
-        Displacements of the nodes of each body (n_nodes, 2), global axes, a length.
-    stresses : tuple[FloatArray, ...]
-        Stresses of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per
-        length².
-    z : FloatArray, shape (n_unknowns,)
-        Positions of the interface, flat.
-    forces : FloatArray, shape (n_nodes, 2)
-        Contact forces on the nodes of the interface; NaN where the plugin gives none.
-    residuals, energies, floors, factors : FloatArray, shape (n_iterates,)
-        As in a trace: the largest force that is not in balance, the energy of the step from there (NaN at the
-        last), the residual's own roundoff, and the share of the loads.
-    points : PointPressures | None
-        None where the plugin does not provide them or gives forces instead of pressures.
-    pressure : float
-        The exact contact pressure p; NaN where it is not known or not the same everywhere.
-    stress_error : float
-        Largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
-    remark : str
-        A remark on what did not come out as it should; empty if all did.
-    advice : str
-        If Newton's method did not converge: what happened, and what to try next; else empty.
-    """
-
-    formulation: str
-    end: str
-    converged: bool
+    formulation: str  # The name on the command line.
+    end: str  # How the solution ended, in a few words: "converged", "2-cycle", ….
+    converged: bool  # Whether the last iterate is a solution.
+    # Displacements of the nodes of each body (n_nodes, 2), global axes, a length.
     displacements: tuple[FloatArray, ...]
+    # Stresses of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per length².
     stresses: tuple[FloatArray, ...]
-    z: FloatArray
-    forces: FloatArray
+    z: FloatArray  # (n_unknowns,) Positions of the interface, flat.
+    forces: FloatArray  # (n_nodes, 2) Contact forces on the nodes of the interface; NaN where the plugin gives none.
+    # (n_iterates,) As in a trace: the largest force that is not in balance, the energy of the step from there (NaN at
+    # the last), the residual's own roundoff, and the share of the loads.
     residuals: FloatArray
     energies: FloatArray
     floors: FloatArray
     factors: FloatArray
+    # None where the plugin does not provide them or gives forces instead of pressures.
     points: PointPressures | None = None
-    pressure: float = np.nan
-    stress_error: float = np.nan
-    remark: str = ""
-    advice: str = ""
+    pressure: float = np.nan  # The exact contact pressure p; NaN where it is not known or not the same everywhere.
+    stress_error: float = np.nan  # Largest |σ − σ_exact| / p at a Gauss point; NaN where nothing is known exactly.
+    remark: str = ""  # A remark on what did not come out as it should; empty if all did.
+    advice: str = ""  # If Newton's method did not converge: what happened, and what to try next; else empty.
 
     @property
     def n_iterations(self) -> int:
@@ -103,27 +64,14 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedScene:
-    """A scene, and the solutions of one or several formulations.
+    """A scene, and the solutions of one or several formulations."""
 
-    Attributes
-    ----------
-    case : Case
-        The interface, before it is solved.
-    bodies : tuple[Body, ...]
-        All bodies.
-    on_interface : tuple[IntArray, ...]
-        For each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can touch
-        nothing.
-    solutions : tuple[Solution, ...]
-        At least one.
-    failures : Mapping[str, str]
-        {formulation: why there is no solution}, one line of text each.
-    """
-
-    case: Case
-    bodies: tuple[Body, ...]
+    case: Case  # The interface, before it is solved.
+    bodies: tuple[Body, ...]  # All bodies.
+    # For each body (n_contact_nodes,) the interface's numbers of its `contact_nodes`; empty if it can touch nothing.
     on_interface: tuple[IntArray, ...]
-    solutions: tuple[Solution, ...]
+    solutions: tuple[Solution, ...]  # At least one.
+    # {formulation: why there is no solution}, one line of text each.
     failures: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -56,24 +56,12 @@ _AXES_LABELS = (
 
 
 def draw_stability(panels: Sequence[SweepPanel], target: Path) -> None:
-    """Draw all panels to a .png or .svg file.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written.
-    """
+    """Draw all panels to a .png or .svg file."""
     save(make_stability_figure(panels), target)
 
 
 def make_stability_figure(panels: Sequence[SweepPanel]) -> Figure:
-    """Return the figure; the legend stands in a free place of the grid, or above one row of panels.
-
-    Parameters
-    ----------
-    panels : Sequence[SweepPanel]
-        The formulations, at least one.
-    """
+    """Return the figure; the legend stands in a free place of the grid, or above one row of panels."""
     with matplotlib.rc_context(_STYLE):
         return _make_figure(panels)
 

@@ -41,11 +41,6 @@ def draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[li
         The unit of the lengths that are written.
     width : int
         The largest number of columns.
-
-    Returns
-    -------
-    tuple[list[str], str]
-        The rows, and a remark about the scale, empty if the lines are to scale.
     """
     places, number = _places(course, case.interface.n_slave_nodes)
     width -= MARGIN + len(str(case.interface.n_nodes)) - 1  # The last node number ends behind its node.

@@ -26,20 +26,6 @@ def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[s
     the node's share of the interface; 0 off the interface). On cells: `stress_xx`, `stress_yy`, `stress_xy` (means
     over the Gauss points), `pressure` (−σ across the body's first axis; 0 in a rigid body), `body` (its number) and
     `side` (0 slave, 1 master, −1 out of reach). A rigid body is the line cells of its surface.
-
-    Parameters
-    ----------
-    solved : SolvedScene
-        The scene.
-    solution : Solution
-        One of its solutions.
-    path : str | os.PathLike[str]
-        The file to write; an older one is replaced.
-
-    Raises
-    ------
-    MisuseError
-        If the file cannot be written, or its name ends otherwise.
     """
     import meshio
 

@@ -26,45 +26,19 @@ _LEGEND_SIZE = 7  # The size of the legend's letters in points; with larger ones
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """The arrays that a picture of a differing case needs; without any of them the mesh alone is drawn.
+    """The arrays that a picture of a differing case needs; without any of them the mesh alone is drawn."""
 
-    Attributes
-    ----------
-    candidate, reference : FloatArray | None, shape (n_nodes, 2)
-        The nodal forces that each of them gives.
-    exact : FloatArray | None, shape (n_nodes, 2)
-        The exact nodal forces.
-    solved : SolvedScene | None
-        A case with bodies, solved by both; it is drawn instead of the forces at its first guess.
-    """
-
-    candidate: FloatArray | None = None
+    candidate: FloatArray | None = None  # (n_nodes, 2) The nodal forces that each of them gives.
     reference: FloatArray | None = None
-    exact: FloatArray | None = None
+    exact: FloatArray | None = None  # (n_nodes, 2) The exact nodal forces.
+    # A case with bodies, solved by both; it is drawn instead of the forces at its first guess.
     solved: SolvedScene | None = None
 
 
 def comparison_page(
     comparison: Comparison, differing: Sequence[Differing], drawings: Sequence[Drawing], costs: Sequence[Cost]
 ) -> str:
-    """Return the page of formulations against a reference.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The numbers side by side.
-    differing : Sequence[Differing]
-        The meshes on which they differ most.
-    drawings : Sequence[Drawing]
-        The arrays to draw on those meshes, one entry each.
-    costs : Sequence[Cost]
-        The times of an evaluation.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-    """
+    """Return the page of formulations against a reference."""
     axis = Axis.from_margins(cell.margins for cell in comparison.cells.values())
     return render(
         "compare.html.j2",
@@ -84,20 +58,7 @@ def comparison_page(
 
 
 def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> str:
-    """Return the page of an old report and a new one.
-
-    Parameters
-    ----------
-    changes : Changes
-        The two reports side by side.
-    examples : Mapping[str, Counterexample]
-        {id: counterexample} of the new report, of what got worse.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-    """
+    """Return the page of an old report and a new one."""
     axis = Axis.from_margins(cell.margins for change in changes.changes for cell in (change.old, change.new))
     return render(
         "changes.html.j2",

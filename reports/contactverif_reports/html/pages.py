@@ -57,34 +57,13 @@ def render(template_name: str, *, package: str = "contactverif_reports.html", **
 
 
 def check_page(path: str | os.PathLike[str], argument: str = "--out") -> None:
-    """Check before a long computation that its page can be written afterwards.
-
-    Raises
-    ------
-    MisuseError
-        As `write_page`.
-    """
+    """Check before a long computation that its page can be written afterwards."""
     checked_name(path, SUFFIXES, argument)
     check_writable(path, argument, "FILE.html")
 
 
 def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out") -> None:
-    """Write a page, whole or not at all, as UTF-8.
-
-    Parameters
-    ----------
-    path : str or os.PathLike[str]
-        The file to write.
-    html : str
-        The page.
-    argument : str
-        The name of the argument in error messages.
-
-    Raises
-    ------
-    MisuseError
-        If the name is no page's, or the file cannot be written.
-    """
+    """Write a page, whole or not at all, as UTF-8."""
     check_page(path, argument)
     try:
         with whole(path) as part:
@@ -98,13 +77,6 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
 
     The same figure gives the same bytes. Text stays text: it is selected, searched and read aloud, and a page of many
     figures stays small; widths were computed with a wide font, so that another one fits too.
-
-    Parameters
-    ----------
-    figure : Figure
-        A figure of matplotlib.
-    label : str
-        The text that a screen reader reads aloud; without one the figure is decoration beside its caption.
     """
     import matplotlib
 

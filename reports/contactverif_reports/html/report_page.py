@@ -27,30 +27,15 @@ _PROMISES = {True: "passes", False: "fails", None: "–"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """A counterexample on the page.
+    """A counterexample on the page."""
 
-    Attributes
-    ----------
-    counterexample : Counterexample
-        The case with its row.
-    figure : Markup
-        The figure; empty where `text` draws the case.
-    text : str
-        The drawing in text; empty where there is a figure.
-    numbers : tuple[CheckedNumber, ...]
-        The measured numbers beside their tolerances.
-    reason : str
-        The reason of the failure where the numbers do not say it, else the place of the worst number, if it has one.
-    replay : str
-        The command that judges the case again.
-    """
-
-    counterexample: Counterexample
-    figure: Markup
-    text: str
-    numbers: tuple[CheckedNumber, ...]
+    counterexample: Counterexample  # The case with its row.
+    figure: Markup  # The figure; empty where `text` draws the case.
+    text: str  # The drawing in text; empty where there is a figure.
+    numbers: tuple[CheckedNumber, ...]  # The measured numbers beside their tolerances.
+    # The reason of the failure where the numbers do not say it, else the place of the worst number, if it has one.
     reason: str
-    replay: str
+    replay: str  # The command that judges the case again.
 
     @property
     def id(self) -> str:
@@ -65,58 +50,26 @@ class Example:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A row of the table of a formulation.
+    """A row of the table of a formulation."""
 
-    Attributes
-    ----------
-    row : Row
-        The row.
-    cell : Cell
-        Its numbers by case.
-    promise : str
-        What the formulation states, in a word.
-    strip : Markup
-        The distribution of value over tolerance.
-    example : str
-        The id of its counterexample, empty if it has none.
-    """
-
-    row: Row
-    cell: Cell
-    promise: str
-    strip: Markup
-    example: str
+    row: Row  # The row.
+    cell: Cell  # Its numbers by case.
+    promise: str  # What the formulation states, in a word.
+    strip: Markup  # The distribution of value over tolerance.
+    example: str  # The id of its counterexample, empty if it has none.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """The part of the page about one formulation.
+    """The part of the page about one formulation."""
 
-    Attributes
-    ----------
-    formulation : str
-        The name on the command line.
-    number : int
-        The number of the section, from 1, for anchors.
-    open : bool
-        The section is unfolded.
-    missing : tuple[str, ...]
-        Parts of the contract that the formulation does not provide.
-    lines : tuple[Line, ...]
-        A line for each property.
-    examples : tuple[Example, ...]
-        Its counterexamples.
-    iterations : tuple[Iterations, ...]
-        Newton's iterations where a property solved.
-    """
-
-    formulation: str
-    number: int
-    open: bool
-    missing: tuple[str, ...]
-    lines: tuple[Line, ...]
-    examples: tuple[Example, ...]
-    iterations: tuple[Iterations, ...] = field(default=())
+    formulation: str  # The name on the command line.
+    number: int  # The number of the section, from 1, for anchors.
+    open: bool  # The section is unfolded.
+    missing: tuple[str, ...]  # Parts of the contract that the formulation does not provide.
+    lines: tuple[Line, ...]  # A line for each property.
+    examples: tuple[Example, ...]  # Its counterexamples.
+    iterations: tuple[Iterations, ...] = field(default=())  # Newton's iterations where a property solved.
 
     @property
     def counts(self) -> str:
@@ -126,20 +79,7 @@ class Section:
 
 
 def report_page(run: Run, path: str | os.PathLike[str]) -> str:
-    """Return the page of a run. The same run and the same path give the same text.
-
-    Parameters
-    ----------
-    run : Run
-        The run, from memory or from a file.
-    path : str | os.PathLike[str]
-        The name of its report, for the commands that replay its counterexamples.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-    """
+    """Return the page of a run. The same run and the same path give the same text."""
     cells = {key: Cell.from_row(row) for key, row in run.row_of.items()}
     axis = Axis.from_margins(cell.margins for cell in cells.values())
     examples = _examples(run, os.fspath(path))

@@ -121,15 +121,7 @@ def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
 
 
 def case_of_group(dataset: Group) -> Case:
-    """Return the case that `case_group` made a group of.
-
-    Raises
-    ------
-    KeyError
-        If an array or its name is missing.
-    ValueError
-        If the arrays make no case.
-    """
+    """Return the case that `case_group` made a group of."""
     arrays = {str(variable.attrs[ARRAY_NAME]): variable.values for variable in dataset.variables.values()}
     case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
     check_bodies(case.parameters)

@@ -16,21 +16,6 @@ def same_data(path_a: str | os.PathLike[str], path_b: str | os.PathLike[str]) ->
     """Return the differences of two reports, a line each; none for two runs with the same seed.
 
     The group `timing` and the root attributes `created`, `command` and `platform` are left out.
-
-    Parameters
-    ----------
-    path_a, path_b : str | os.PathLike[str]
-        The reports.
-
-    Returns
-    -------
-    list[str]
-        A line for each attribute, dimension or variable that differs.
-
-    Raises
-    ------
-    MisuseError
-        If one of them cannot be read.
     """
     with open_report(path_a, decode=False) as groups:
         a = dict(_entries(groups))

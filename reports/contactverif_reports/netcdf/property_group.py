@@ -18,22 +18,7 @@ CASES_OF_A_BLOCK = 10_000
 
 
 def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Sequence[str]) -> xr.Dataset:
-    """Return the group of a property, with the dimensions `formulation`, `case` and `quantity`.
-
-    Parameters
-    ----------
-    info : PropertyInfo
-        The property.
-    rows : Mapping[str, Row]
-        Its rows by formulation; a formulation without a row is all padding.
-    formulations : Sequence[str]
-        All formulations of the run.
-
-    Returns
-    -------
-    xr.Dataset
-        Variables and attributes; `case` is as long as the longest row.
-    """
+    """Return the group of a property, with the dimensions `formulation`, `case` and `quantity`."""
     outcomes = [rows[name].outcomes if name in rows else () for name in formulations]
     witnesses = [rows[name].witness if name in rows else None for name in formulations]
     n_cases = max(map(len, outcomes))

@@ -45,67 +45,25 @@ _LONGEST_REASON = 300  # Characters: a reason may quote what the file holds.
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
-    """Return the run that a report stores.
-
-    Parameters
-    ----------
-    path : str | os.PathLike[str]
-        The report.
-
-    Returns
-    -------
-    Run
-        The same run that was written. Of the random cases it holds the numbers, of counterexamples the whole case.
-
-    Raises
-    ------
-    MisuseError
-        If the file is not there, no netCDF file, no report of this schema, or damaged.
-    """
+    """Return the run that a report stores."""
     with open_report(path) as groups:
         return _Reader(groups).run()
 
 
 def read_case(path: str | os.PathLike[str], case_id: str) -> Counterexample:
-    """Return the counterexample of that id.
-
-    Raises
-    ------
-    MisuseError
-        If the report cannot be read, or there is no such id.
-    """
+    """Return the counterexample of that id."""
     return find_counterexample(read_run(path), case_id)
 
 
 def case_ids(path: str | os.PathLike[str]) -> list[str]:
-    """Return the ids of the counterexamples of a report, in the order of the run, then those of named cases.
-
-    Raises
-    ------
-    MisuseError
-        If the report cannot be read.
-    """
+    """Return the ids of the counterexamples of a report, in the order of the run, then those of named cases."""
     run = read_run(path)
     return list({**counterexamples(run), **named_failures(run)})
 
 
 @contextmanager
 def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterator[Groups]:
-    """Yield the groups of a report {path: dataset}, loaded; the file is closed already.
-
-    Parameters
-    ----------
-    path : str | os.PathLike[str]
-        The report.
-    decode : bool
-        Make strings of characters. Numbers are never masked or scaled.
-
-    Raises
-    ------
-    MisuseError
-        If the file is not there, no netCDF file, or no report of this schema; and if the block finds something
-        missing or damaged in it.
-    """
+    """Yield the groups of a report {path: dataset}, loaded; the file is closed already."""
     name = os.fspath(path)
     groups = read_groups(path, _ARGUMENT, _NEEDED, decode=decode)
     try:

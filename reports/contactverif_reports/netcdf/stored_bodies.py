@@ -14,20 +14,7 @@ _OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (
 
 
 def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
-    """Check shapes, finite numbers and node numbers of the bodies of a case, if it holds any.
-
-    Parameters
-    ----------
-    parameters : Mapping[str, NDArray[Any]]
-        The parameters of the case.
-
-    Raises
-    ------
-    KeyError
-        If an array is missing.
-    ValueError
-        If an array has another shape, or a number means nothing.
-    """
+    """Check shapes, finite numbers and node numbers of the bodies of a case, if it holds any."""
     packed = {name.removeprefix(_PREFIX): values for name, values in parameters.items() if name.startswith(_PREFIX)}
     if not packed:
         return

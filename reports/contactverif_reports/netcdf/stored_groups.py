@@ -35,37 +35,19 @@ _MAGIC = b"\x89HDF\r\n\x1a\n"  # The first bytes of each netCDF-4 file.
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a group.
+    """A variable of a group."""
 
-    Attributes
-    ----------
-    dims : tuple[str, ...]
-        The names of its dimensions.
-    values : NDArray[Any]
-        Its entries, read-only.
-    attrs : Mapping[str, Any]
-        Its attributes: words, or arrays of numbers.
-    """
-
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-    attrs: Mapping[str, Any]
+    dims: tuple[str, ...]  # The names of its dimensions.
+    values: NDArray[Any]  # Its entries, read-only.
+    attrs: Mapping[str, Any]  # Its attributes: words, or arrays of numbers.
 
 
 @dataclass(frozen=True)
 class Group(Mapping[str, Variable]):
-    """A group: a mapping from names to variables.
+    """A group: a mapping from names to variables."""
 
-    Attributes
-    ----------
-    attrs : Mapping[str, Any]
-        Its attributes: words, or arrays of numbers.
-    variables : Mapping[str, Variable]
-        Its variables by name.
-    """
-
-    attrs: Mapping[str, Any]
-    variables: Mapping[str, Variable]
+    attrs: Mapping[str, Any]  # Its attributes: words, or arrays of numbers.
+    variables: Mapping[str, Variable]  # Its variables by name.
 
     def __getitem__(self, name: str) -> Variable:
         return self.variables[name]
@@ -78,13 +60,7 @@ class Group(Mapping[str, Variable]):
 
     @cached_property
     def sizes(self) -> Mapping[str, int]:
-        """The lengths of all dimensions of its variables.
-
-        Raises
-        ------
-        ValueError
-            If a dimension has two lengths.
-        """
+        """The lengths of all dimensions of its variables."""
         sizes: dict[str, int] = {}
         for name, variable in self.variables.items():
             for dim, length in zip(variable.dims, variable.values.shape, strict=True):
@@ -94,22 +70,7 @@ class Group(Mapping[str, Variable]):
 
 
 def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, decode: bool = True) -> dict[str, Group]:
-    """Return all groups of a netCDF-4 file by path.
-
-    Parameters
-    ----------
-    path : str | os.PathLike[str]
-        The file.
-    argument, needed : str
-        The argument that named it, and the file that is needed, for messages.
-    decode : bool
-        Make strings of characters.
-
-    Raises
-    ------
-    MisuseError
-        If there is no such file, or it cannot be read within the limits.
-    """
+    """Return all groups of a netCDF-4 file by path."""
     name = os.fspath(path)
     size = check_ordinary(path, argument, needed).st_size
     with open(path, "rb") as file:
@@ -166,13 +127,7 @@ def _words(characters: NDArray[Any]) -> NDArray[Any]:
 
 
 def pack_groups(path: str) -> bytes:
-    """Return all groups of a netCDF file as bytes; this runs in a child process.
-
-    Raises
-    ------
-    ValueError
-        If the library cannot open it, or sizes or types are not those of a report.
-    """
+    """Return all groups of a netCDF file as bytes; this runs in a child process."""
     try:
         file = netCDF4.Dataset(path)
     except OSError as error:  # Its words repeat the path.

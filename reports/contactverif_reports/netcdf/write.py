@@ -11,22 +11,7 @@ __all__ = ["check_writable", "write"]
 
 
 def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
-    """Write the report of a run, whole or not at all, in place of a file that is there.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    path : str | os.PathLike[str]
-        The file.
-    with_named_cases : bool
-        Store each named case that a formulation fails, so that each can be replayed, and not only the worst.
-
-    Raises
-    ------
-    MisuseError
-        If the path cannot be written.
-    """
+    """Write the report of a run, whole or not at all, in place of a file that is there."""
     from contactverif_reports.netcdf.tree import tree_of
     from contactverif_reports.netcdf.write_tree import write_tree
 

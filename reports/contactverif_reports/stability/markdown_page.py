@@ -24,20 +24,7 @@ matrix of bodies and contact."""
 
 
 def stability_page(run: Run, files: Mapping[str, str]) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    run : Run
-        A run of the sweeps.
-    files : Mapping[str, str]
-        {suffix: name} of the files that were written beside it, ".nc", ".svg" or ".png".
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the page."""
     panels = sweep_panels(run)
     parts = [
         "# Error against condition number",

@@ -38,34 +38,16 @@ FAR_AND_CLOSE = COLUMNS["offset 1e6, gap 1e-6"]  # The states whose relative err
 
 @dataclass(frozen=True, slots=True)
 class SweepPoint:
-    """A formulation on one state.
+    """A formulation on one state."""
 
-    Attributes
-    ----------
-    name : str
-        The name of the state.
-    case_id : str
-        The id by which `contactverif replay` finds the case.
-    sweep : str
-        The sweep that the state belongs to, a key of `SWEEPS`.
-    roundings : float
-        ω, the error over u κ.
-    error, condition : float
-        The relative error and the condition number κ of the worst force: error = ω u κ.
-    force_error : float
-        The largest error of a force over the largest force.
-    verdict : Verdict
-        The verdict on the state.
-    """
-
-    name: str
-    case_id: str
-    sweep: str
-    roundings: float
-    error: float
+    name: str  # The name of the state.
+    case_id: str  # The id by which `contactverif replay` finds the case.
+    sweep: str  # The sweep that the state belongs to, a key of `SWEEPS`.
+    roundings: float  # ω, the error over u κ.
+    error: float  # The relative error and the condition number κ of the worst force: error = ω u κ.
     condition: float
-    force_error: float
-    verdict: Verdict
+    force_error: float  # The largest error of a force over the largest force.
+    verdict: Verdict  # The verdict on the state.
 
     @property
     def above(self) -> bool:
@@ -75,25 +57,14 @@ class SweepPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepPanel:
-    """All points of one formulation.
+    """All points of one formulation."""
 
-    Attributes
-    ----------
-    formulation : str
-        The name on the command line.
-    points : tuple[SweepPoint, ...]
-        The states that gave numbers.
-    n_undecided, n_crashed : int
-        Numbers of states without a verdict, and of those where the formulation raised an error or broke the contract.
-    remarks : tuple[str, ...]
-        Reasons why a property was not asked, or was not judged.
-    """
-
-    formulation: str
-    points: tuple[SweepPoint, ...]
+    formulation: str  # The name on the command line.
+    points: tuple[SweepPoint, ...]  # The states that gave numbers.
+    # Numbers of states without a verdict, and of those where the formulation raised an error or broke the contract.
     n_undecided: int = 0
     n_crashed: int = 0
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # Reasons why a property was not asked, or was not judged.
 
     @property
     def above(self) -> tuple[SweepPoint, ...]:
@@ -126,18 +97,7 @@ def short_number(value: float) -> str:
 
 
 def sweep_panels(run: Run) -> tuple[SweepPanel, ...]:
-    """Return the points of each formulation of a run.
-
-    Parameters
-    ----------
-    run : Run
-        A run of the properties of the sweeps. Rows of other properties are left out.
-
-    Returns
-    -------
-    tuple[SweepPanel, ...]
-        One panel a formulation, in the order of the run.
-    """
+    """Return the points of each formulation of a run."""
     return tuple(_panel(name, list(run.rows_of(name))) for name in run.formulations)
 
 
