@@ -75,7 +75,7 @@ def compute(report_progress: Progress) -> Cost:
 
 
 def count_terms(formulation: PaperFormulation, master: tuple[tuple[float, float], ...]) -> int:
-    """Return the number of coefficients of dyads that do not vanish, in the frame of the master segment of the middle."""
+    """Return the number of coefficients of dyads that do not vanish, in the frame of the middle master segment."""
     x = np.vstack([SLAVE, master])
     interface = Interface.from_chains(x[:2] * [1.0, 0.0], x[2:] * [1.0, 0.0])
     plugin, z = subject_of(formulation).with_penalty(PENALTY), x.reshape(-1)
