@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
+    from contactverif.contract.cases import Cases
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
     from contactverif.contract.formulation import (
         ContactPoints,
@@ -49,6 +50,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "contract.body": ("Body",),
     "contract.case": ("Case",),
+    "contract.cases": ("Cases",),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
     "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
@@ -74,6 +76,7 @@ _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items()
 __all__ = [
     "Body",
     "Case",
+    "Cases",
     "CheckedFormulation",
     "ContactPoints",
     "ContactverifError",

@@ -8,10 +8,13 @@ only a `Property` holds functions.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from importlib import import_module
+from inspect import getdoc
 from math import isfinite
-from typing import Any, Literal
+from sys import modules
+from typing import Any, Literal, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
@@ -25,6 +28,7 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 # With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the
 # share is below 3/2300 with a probability of 95 %.
 NONE_UNDECIDED = 3 / 2300
+WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
 
 
 class Verdict(IntEnum):
@@ -140,6 +144,9 @@ class Measurement:
         clean(self, lines=("undecided", "broken", "place"))
 
 
+Measure = Callable[[Case, Subject], Measurement]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PropertyInfo:
     """The description of a property for a reader of results: plain data, which a report stores.
@@ -193,6 +200,20 @@ class PropertyInfo:
                 raise MisuseError(f"{self.id}: {name}", f"{getattr(self, name)}", "a share from 0 to 1")
 
 
+class OtherAttributes(TypedDict, total=False):
+    """The attributes of a `Property` that have a default."""
+
+    needs: frozenset[str]
+    series: Mapping[str, str]
+    kinds: tuple[str, ...]
+    least_contact: float
+    usual_undecided: float
+    applicable: Callable[[Traits], str]
+    asks: frozenset[str]
+    bodies: bool
+    exact: Callable[[Case], FloatArray] | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Property(PropertyInfo):
     """A property that formulations are checked for; besides the attributes of `PropertyInfo` it has functions.
@@ -200,47 +221,83 @@ class Property(PropertyInfo):
     Attributes
     ----------
     cases : Callable[[Any], Any]
-        Makes a hypothesis strategy of `Case`. Given an interface, it makes random states on that one, or returns
-        None if the property cannot be checked there. A property of bodies is given the case of a scene instead. It may
-        return a mapping {kind of situation: strategy} instead: each kind gets the same share of the cases. It may
-        return a tuple of cases instead, each with a name of its own: a finite list. All of them run, whatever the
-        number of examples, and tables and reports call each by its name.
-        Properties whose `cases` is the same function with a stored name (`random_source`) are judged on the same cases.
+        The cases, a `Cases`.
     measure : Callable[[Case, Subject], Measurement]
         Measures one case; it raises what the plugin raises.
     promise : Callable[[Traits], bool | None]
         Reads the traits: True if the formulation states that it passes, False if it states (with a witness) that
         it fails, None if it states nothing.
     applicable : Callable[[Traits], str]
-        Returns an empty string, or the reason why the property makes no sense for these traits.
+        Returns an empty string, or the reason why the property makes no sense for these traits, of which the
+        enforcement is among `asks`.
+    asks : frozenset[str]
+        The enforcements of the formulations that the property is asked of.
     bodies : bool
         The cases are scenes, which are solved; else they are states of an interface alone.
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
+    question : str
+        What is asked, why it matters, how it is judged and what is undecided, from which the property's page is made.
     """
 
     cases: Callable[[Any], Any]
-    measure: Callable[[Case, Subject], Measurement]
+    measure: Measure
     promise: Callable[[Traits], bool | None]
     applicable: Callable[[Traits], str] = lambda traits: ""
+    asks: frozenset[str] = WITHOUT_BARRIER
     bodies: bool = False
     exact: Callable[[Case], FloatArray] | None = None
+    question: str = ""
+
+    @classmethod
+    def define(
+        cls,
+        *,
+        id: str,
+        family: str,
+        summary: str,
+        quantities: tuple[Quantity, ...],
+        cases: Callable[[Any], Any],
+        promise: Callable[[Traits], bool | None],
+        **others: Unpack[OtherAttributes],
+    ) -> Callable[[Measure], Property]:
+        """Return a decorator that makes a property of the function that measures; its docstring is the question.
+
+        The arguments are the attributes of the property. A property that is made so can be pickled.
+        """
+        return lambda measure: cls(
+            id, family, summary, quantities, cases, measure, promise, question=getdoc(measure) or "", **others
+        )
 
     @property
     def info(self) -> PropertyInfo:
         """The plain data alone."""
-        return PropertyInfo(
-            self.id,
-            self.family,
-            self.summary,
-            self.quantities,
-            needs=self.needs,
-            series=dict(self.series),
-            kinds=self.kinds,
-            least_contact=self.least_contact,
-            usual_undecided=self.usual_undecided,
-        )
+        return PropertyInfo(**{part.name: getattr(self, part.name) for part in fields(PropertyInfo)})
+
+    def refusal(self, traits: Traits) -> str:
+        """Return why the property is not asked of a formulation, or an empty string."""
+        if traits.enforcement in self.asks:
+            return self.applicable(traits)
+        if traits.enforcement == "barrier" and "penalty" in self.asks:
+            return "the states penetrate, where a barrier is not defined"
+        return f"the enforcement is by a {traits.enforcement}"
+
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        # The name of a decorated function is that of the property, so the function itself cannot be pickled by it.
+        module, name = (getattr(self.measure, part, "") for part in ("__module__", "__qualname__"))
+        at_home = getattr(modules.get(module), name, None)
+        if not isinstance(at_home, Property) or at_home.measure is not self.measure:
+            return super(Property, self).__reduce_ex__(2)
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        changes = {name: value for name, value in values.items() if value is not getattr(at_home, name)}
+        return _defined, (module, name, changes)
+
+
+def _defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:
+    """Return the property that a module defines under a name, with changes."""
+    question: Property = getattr(import_module(module), name)
+    return replace(question, **changes) if changes else question
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -53,7 +53,7 @@ def _gap_of_rows(result: Run, names: Iterable[str], property_ids: Iterable[str])
 
 def _gap_of(row: Row, subject: Subject, question: Property, sampling: Sampling) -> str:
     source = sampling.source(question)
-    if question.applicable(subject.traits) or question.needs - subject.provides or source is None:
+    if question.refusal(subject.traits) or question.needs - subject.provides or source is None:
         return "" if row.verdict in _WITHOUT_CASES else f"{row.formulation} {row.property_id}: {row.verdict}"
     count = sum(isinstance(outcome, Outcome) for outcome in row.outcomes)
     planned = _count_planned(question, source, sampling, count)

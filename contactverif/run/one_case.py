@@ -53,7 +53,7 @@ def the_property(property_id: str) -> Property:
 
 def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
     """Judge a case; if the property does not apply to the formulation, return an outcome that says so."""
-    if reason := question.applicable(subject.traits):
+    if reason := question.refusal(subject.traits):
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
         return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")

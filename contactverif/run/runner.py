@@ -210,7 +210,7 @@ def _open(
         promise=question.promise(subject.traits),
         known=known,
     )
-    if reason := question.applicable(subject.traits):
+    if reason := question.refusal(subject.traits):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
         promise = row.promise if missing & STATED_PARTS else None

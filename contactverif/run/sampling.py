@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import cast
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import name_of_source
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
-from contactverif.contract.random_source import name_of_source
 from contactverif.run.driver import CaseSource
 from contactverif.run.one_thread import one_thread
 

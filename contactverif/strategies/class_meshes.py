@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.oracle.mesh_classes import is_of_class
 from contactverif.strategies.flat import Sides, uniform_penetrations
 from contactverif.strategies.given_interface import flat_cases, slave_direction

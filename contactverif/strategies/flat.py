@@ -17,8 +17,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles

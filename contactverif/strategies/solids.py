@@ -18,7 +18,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.random_source import random_source
+from contactverif.contract.cases import random_source
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import is_uniform, overhangs, two_blocks

@@ -19,8 +19,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, penalties, seeds, shuffles
 from contactverif.strategies.sketches import exact_turns

@@ -64,7 +64,7 @@ def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
 def property_page(question: Property) -> str:
     """Return the page of one property."""
     measure = question.measure.func if isinstance(question.measure, partial) else question.measure
-    parts = docstring_parts(measure)
+    parts = {"": ""} if question.question else docstring_parts(measure)
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     facts = [
@@ -94,12 +94,9 @@ def property_page(question: Property) -> str:
 
 
 def _answers(question: Property) -> list[str]:
-    """Return the paragraphs about question, reason, judgement and undecided cases that begin a property's file.
-
-    The file is the one that the entry point names: `measure` may be shared by several properties.
-    """
+    """Return the paragraphs about question, reason, judgement and undecided cases."""
     entry, *_ = entry_points(group="contactverif.properties", name=question.id)
-    text = inspect.getdoc(import_module(entry.module)) or ""
+    text = question.question or inspect.getdoc(import_module(entry.module)) or ""
     if "**Question.**" not in text:
         return []
     answers = []

@@ -24,9 +24,9 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.straight import cases_over_a_body

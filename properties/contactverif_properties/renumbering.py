@@ -23,9 +23,9 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.closed import closed_cases

@@ -36,10 +36,10 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact

@@ -26,10 +26,10 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import scene_of

@@ -26,9 +26,9 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.problems.stability_states import stability_states
 from contactverif_properties.shared.any_state import prepare_state

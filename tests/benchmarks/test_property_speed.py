@@ -24,7 +24,7 @@ N_DRAWN = 4  # The first cases are the simplest; the last of these is judged.
 def subject_for(question: Property) -> Subject:
     """Return the formulation that is judged by a property."""
     for subject in map(load_subject, FORMULATIONS):
-        if not question.applicable(subject.traits) and question.needs <= subject.provides:
+        if not question.refusal(subject.traits) and question.needs <= subject.provides:
             return subject
     raise AssertionError(f"{question.id} applies to none of {FORMULATIONS}")
 

@@ -149,7 +149,7 @@ def test_the_property_of_the_how_to_catches_a_formulation_that_is_wrong(tmp_path
     page = DOCS / "how-to" / "write-a-property.md"
     namespace: dict[str, object] = {}
     exec(compile(blocks("python", page.read_text(encoding="utf-8"))[0], str(page), "exec"), namespace)
-    question = namespace["FRICTIONLESS"]
+    question = namespace["frictionless"]
     assert isinstance(question, contactverif.Property)
 
     class Sticky:

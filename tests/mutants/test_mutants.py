@@ -88,7 +88,7 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> 
         question
         for question in properties()
         if question.promise(subject.traits) is True
-        and not question.applicable(subject.traits)
+        and not question.refusal(subject.traits)
         and (seed == 0 or not isinstance(question.cases(None), tuple))  # A finite list is the same for all seeds.
     ]
     for question in questions:

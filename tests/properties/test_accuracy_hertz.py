@@ -79,8 +79,8 @@ def test_half_of_a_balance_is_found_at_a_stiff_penalty() -> None:
 
 
 def test_what_has_no_solution_is_not_asked() -> None:
-    assert "no solution" in ACCURACY_HERTZ.applicable(load_subject("vts-ppt-lm").traits)
-    assert "barrier" in ACCURACY_HERTZ.applicable(with_promises(ClippedCells, enforcement="barrier").traits)
+    assert "no solution" in ACCURACY_HERTZ.refusal(load_subject("vts-ppt-lm").traits)
+    assert "barrier" in ACCURACY_HERTZ.refusal(with_promises(ClippedCells, enforcement="barrier").traits)
 
 
 def test_the_penalty_is_that_of_its_word() -> None:

@@ -76,7 +76,7 @@ def test_a_hard_case_asks_nothing_of_a_given_interface(property_id: str) -> None
 
 def test_a_barrier_is_not_asked_about_penetrations_and_touch() -> None:
     barrier = Traits(enforcement="barrier")
-    assert all(load_property(property_id).applicable(barrier) for property_id in HARD)
+    assert all(load_property(property_id).refusal(barrier) for property_id in HARD)
 
 
 # --- far from the origin ------------------------------------------------------------------------------------------

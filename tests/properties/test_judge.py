@@ -90,7 +90,7 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
     for question in load_properties():
         assert isinstance(question, Property)
         reasons = {
-            enforcement: question.applicable(replace(traits, enforcement=enforcement))
+            enforcement: question.refusal(replace(traits, enforcement=enforcement))
             for enforcement in ("penalty", "multiplier", "barrier")
         }
         assert "barrier" in reasons["barrier"]

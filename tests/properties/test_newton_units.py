@@ -88,5 +88,5 @@ def test_a_stiffness_with_a_unit_is_told_by_the_steps() -> None:
 
 
 def test_who_does_not_state_the_unit_of_its_penalty_is_not_asked() -> None:
-    assert "unit is unknown" in NEWTON_UNITS.applicable(Traits())
-    assert "not independent" in NEWTON_UNITS.applicable(load_subject("vts-ppt-lm").traits)
+    assert "unit is unknown" in NEWTON_UNITS.refusal(Traits())
+    assert "not independent" in NEWTON_UNITS.refusal(load_subject("vts-ppt-lm").traits)

@@ -53,7 +53,7 @@ def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id
 @pytest.mark.parametrize("property_id", IDS)
 def test_built_in_formulations_with_options_pass(name: str, property_id: str) -> None:
     subject, question = load_subject(name), load_property(property_id)
-    if not question.applicable(subject.traits):
+    if not question.refusal(subject.traits):
         assert {outcome_of(property_id, case, subject).verdict for case in cases(property_id)} == {Verdict.PASS}
 
 

@@ -34,10 +34,10 @@ def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
 
 
 def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
-    assert "not stated" in SCALING.applicable(Traits())
-    assert SCALING.applicable(Traits(penalty="nodal")) == ""
-    assert SCALING.applicable(Traits(penalty="nodal", enforcement="multiplier")) == ""
-    assert "barrier" in SCALING.applicable(Traits(penalty="nodal", enforcement="barrier"))
+    assert "not stated" in SCALING.refusal(Traits())
+    assert SCALING.refusal(Traits(penalty="nodal")) == ""
+    assert SCALING.refusal(Traits(penalty="nodal", enforcement="multiplier")) == ""
+    assert "barrier" in SCALING.refusal(Traits(penalty="nodal", enforcement="barrier"))
     result = run([subject(Springs)], [SCALING], examples=3, seed=1)
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
     assert result.promises_kept

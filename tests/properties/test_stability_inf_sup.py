@@ -65,5 +65,5 @@ def test_a_stranger_with_nodal_multipliers_has_the_constants_of_nts() -> None:
 
 
 def test_springs_are_not_asked() -> None:
-    assert QUESTION.applicable(load_subject("mortar").traits) == "the enforcement is by a penalty"
+    assert QUESTION.refusal(load_subject("mortar").traits) == "the enforcement is by a penalty"
     assert QUESTION.cases(COARSER) is None

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import strategies as st
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, Verdict
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run import driver
@@ -102,7 +102,7 @@ def test_a_strategy_has_its_stored_name_or_that_of_its_property(cases: Callable[
 
 def test_two_installed_strategies_never_have_the_same_name() -> None:
     questions = [question for question in load_properties() if isinstance(question, Property)]
-    functions = {(strategy_name(question), question.cases) for question in questions}
+    functions = {(strategy_name(question), getattr(question.cases, "make", question.cases)) for question in questions}
     assert len(functions) == len({name for name, _ in functions})
 
 

@@ -56,7 +56,7 @@ def count(key: str) -> list[str]:
     nearest, formulation = 0.0, ""
     accused: list[str] = []
     for subject in right_formulations():
-        if question.applicable(subject.traits) or question.needs - subject.provides:
+        if question.refusal(subject.traits) or question.needs - subject.provides:
             continue
         n_formulations += 1
         promised = question.promise(subject.traits) is True

@@ -15,8 +15,8 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
 

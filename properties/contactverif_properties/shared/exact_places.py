@@ -15,9 +15,9 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_points import (

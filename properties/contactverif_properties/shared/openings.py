@@ -9,8 +9,8 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.random_source import random_source
 from contactverif.strategies import flat_cases, general_cases
 
 CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.

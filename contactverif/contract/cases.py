@@ -1,0 +1,111 @@
+"""Where the cases of a property come from, with the stored name on which the drawn cases depend besides the seed.
+
+Rule for the next editor: a stored name never changes, wherever its function moves, or the same seed gives other cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from contactverif.contract.case import Case
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def no_cases(given: Any) -> None:
+    """Return None: there are no cases on an interface or a scene."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cases:
+    """Where the cases of a property come from: random ones, random ones of several kinds, or a list.
+
+    Call it with None for the property's own cases. Call it with an interface (or with the case of a scene, if the
+    property is about bodies) for cases there; None comes back if the property cannot be checked there.
+
+    Attributes
+    ----------
+    make : Callable[..., Any]
+        The function that makes the cases.
+    finite : bool
+        Whether they are a list, of which all are judged, whatever the number of examples.
+    on_given : Callable[[Any], Any]
+        Makes the cases on an interface or a scene, in place of the list.
+    """
+
+    make: Callable[..., Any]
+    finite: bool = False
+    on_given: Callable[[Any], Any] = no_cases
+
+    @classmethod
+    def random(cls, make: Callable[..., Any]) -> Cases:
+        """Return random cases.
+
+        Parameters
+        ----------
+        make : Callable[..., Any]
+            Takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, or None. Properties for
+            which the same function makes the cases are judged on the same ones, if it has a name (`random_source`).
+        """
+        return cls(make)
+
+    @classmethod
+    def by_kind(cls, make: Callable[..., Mapping[str, Any] | Any]) -> Cases:
+        """Return random cases of several kinds of situation, each with the same share.
+
+        Parameters
+        ----------
+        make : Callable[..., Mapping[str, Any] | Any]
+            As in `random`, but it returns {kind: strategy}.
+        """
+        return cls(make)
+
+    @classmethod
+    def listed(cls, make: Callable[[], tuple[Case, ...]], on_given: Callable[[Any], Any] = no_cases) -> Cases:
+        """Return a list of cases, each with a name of its own; tables and reports call it by that name.
+
+        Parameters
+        ----------
+        make : Callable[[], tuple[Case, ...]]
+            Returns the list.
+        on_given : Callable[[Any], Any]
+            Takes an interface or a scene, and returns a strategy, or None if there are no cases.
+        """
+        return cls(make, finite=True, on_given=on_given)
+
+    @property
+    def random_source(self) -> str:
+        """The stored name of the function, or an empty string."""
+        return name_of_source(self.make)
+
+    def __call__(self, given: Any) -> Any:
+        """Return the cases on what is given, which may be None."""
+        if not self.finite:
+            return self.make(given)
+        return self.make() if given is None else self.on_given(given)
+
+
+def random_source(name: str) -> Callable[[_Function], _Function]:
+    """Return a decorator that stores a name at a function that makes cases.
+
+    Properties with this function are judged on the same cases. A function without a stored name has the id of its
+    property instead.
+
+    Parameters
+    ----------
+    name : str
+        A name that no other function has.
+    """
+
+    def store(function: _Function) -> _Function:
+        function.__dict__["random_source"] = name
+        return function
+
+    return store
+
+
+def name_of_source(function: Callable[..., Any]) -> str:
+    """Return the stored name of a function, or an empty string."""
+    return str(getattr(function, "random_source", ""))
