@@ -47,13 +47,6 @@ class Couplings(NamedTuple):
 def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> sparse.csr_array:
     """Return the matrix whose pattern is the union of all couplings, with zeros as entries.
 
-    Parameters
-    ----------
-    n_nodes, n_multipliers : int
-        The number of nodes, with two unknowns each, and of multipliers behind them.
-    couplings : Couplings
-        Which nodes and multipliers feel which.
-
     Returns
     -------
     sparse.csr_array, shape (n_unknowns, n_unknowns)

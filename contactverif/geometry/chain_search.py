@@ -63,14 +63,9 @@ def is_next(slave: IntArray, before: int, segment: int) -> bool:
 def nearest_place_from(
     last: int, v: PointOnSegment, x: FloatArray, segments: IntArray, order: IntArray, boxes: FloatArray
 ) -> int:
-    """Return the place in the order of the tree of the nearest segment to a point; the segment is order[place].
+    """Return the place in `order` of the segment that `projection.nearest_segment` returns for a point.
 
-    Parameters
-    ----------
-    last : int
-        The place of any segment, best of one nearby; NO_PLACE if there is none.
-    v, x, segments, order, boxes : PointOnSegment, FloatArray, IntArray, IntArray, FloatArray
-        As for `projection.nearest_segment`, which defines the answer.
+    `last` is the place of any segment, best of one nearby; NO_PLACE if there is none.
     """
     if last == NO_PLACE:
         return nearest_place(v, x, segments, order, boxes)

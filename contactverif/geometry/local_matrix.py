@@ -44,17 +44,7 @@ class Share(NamedTuple):
 
 
 def share_couplings(n_numbers: int, nodes: NumberArray, starts: IntArray, parts: list[tuple[int, int]]) -> list[Share]:
-    """Divide couplings among threads. A row belongs to the first part that touches it.
-
-    Parameters
-    ----------
-    n_numbers : int
-        The number of nodes and multipliers.
-    nodes, starts : NumberArray, IntArray
-        As in `Couplings`.
-    parts : list[tuple[int, int]]
-        The couplings of each thread, from begin to end.
-    """
+    """Divide couplings among threads by `parts`, (begin, end) each; a row belongs to the first part that touches it."""
     if len(parts) == 1:
         return [Share(np.zeros(n_numbers, dtype=np.int32), 0, *parts[0], np.empty(0, dtype=np.int64))]
     begins = np.array([begin for begin, _ in parts] + [parts[-1][1]])

@@ -140,15 +140,9 @@ def distance_to_box(origin: Vector, p: Vector, box: FloatArray) -> float:
 def distance_to_segment(origin: Vector, p: Vector, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     """Return the squared distance to the closed segment 1 2, and the length by which the foot lies past its end.
 
-    All is measured from the nearer end of the segment. Where the foot lies at or past it, the distance is that to the
-    end node itself, so that the two segments at a vertex tie exactly.
-
-    Parameters
-    ----------
-    origin, p : Vector
-        A node near the point, and the vector from that node to the point.
-    x_1, x_2 : Vector
-        The nodes of the segment.
+    `p` is the vector from the node `origin` to the point. All is measured from the nearer end of the segment. Where the
+    foot lies at or past it, the distance is that to the end node itself, so that the two segments at a vertex tie
+    exactly.
     """
     length, t, n = frame(x_1, x_2)
     d = minus(p, minus(x_1, origin))

@@ -24,13 +24,7 @@ def split_range(n_items: int, threads: int) -> list[tuple[int, int]]:
 
 
 def run_in_threads(calls: list[Callable[[], None]]) -> None:
-    """Run calls side by side, the last one in the calling thread, and return when all have ended.
-
-    Raises
-    ------
-    BaseException
-        The first exception of a call, in their order, after all calls have ended.
-    """
+    """Run calls side by side, the last one in the calling thread, and return when all have ended."""
     errors: dict[int, BaseException] = {}
 
     def run(number: int) -> None:

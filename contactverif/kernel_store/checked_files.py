@@ -55,15 +55,7 @@ class CheckedFiles(IndexDataCacheFile):
 
 
 def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
-    """Return the function compiled by numba, with its machine code in a store that is checked.
-
-    Parameters
-    ----------
-    function : Callable[..., Any]
-        The Python function.
-    **options : Any
-        The options of `numba.njit`, but for `cache`.
-    """
+    """Return the function compiled by numba, with its machine code in a store that is checked."""
     try:
         dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # No folder can be written: neither that of the source nor the user's cache.

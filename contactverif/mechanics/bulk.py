@@ -41,23 +41,12 @@ class CondensedBody:
     """A body condensed onto its contact boundary. S q − g are the forces that contact must supply.
 
     `condense` makes one.
-
-    Attributes
-    ----------
-    body : Body
-        The body.
-    unknowns : IntArray, shape (n,)
-        The free components on the contact boundary: 2 × node + component, in the body's axes.
-    stiffness : FloatArray, shape (n, n)
-        The condensed stiffness S, symmetric, force per length.
-    load : FloatArray, shape (n,)
-        The condensed load g, a force, of nodal forces and of imposed displacements.
     """
 
     body: Body
-    unknowns: IntArray
-    stiffness: FloatArray
-    load: FloatArray
+    unknowns: IntArray  # (n,) The free components on the contact boundary: 2 × node + component, in the body's axes.
+    stiffness: FloatArray  # (n, n) The condensed stiffness S, symmetric, force per length.
+    load: FloatArray  # (n,) The condensed load g, a force, of nodal forces and of imposed displacements.
     _interior: IntArray
     _particular: FloatArray  # (2 n_nodes,): the displacements if all unknowns are 0.
     _influence: FloatArray  # (n_interior, n): the effect of the unknowns on the interior.
@@ -176,21 +165,6 @@ def condense(body: Body) -> CondensedBody:
 
     The answer is remembered, so that a body is condensed once. Bodies that differ in their loads, their imposed
     displacements or their place alone share one factorisation.
-
-    Parameters
-    ----------
-    body : Body
-        An elastic or a rigid body. A rigid one has no unknowns.
-
-    Returns
-    -------
-    CondensedBody
-        Stiffness and load on the contact boundary, and whatever is needed to recover the interior.
-
-    Raises
-    ------
-    MisuseError
-        If a part of the body is held neither by a support nor by the contact boundary.
     """
     imposed = body.imposed.reshape(-1)
     if body.rigid:
@@ -218,34 +192,17 @@ def condense(body: Body) -> CondensedBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Matrices:
-    """The matrices that follow from mesh, material and supports of an elastic body; loads have no part in them.
+    """The matrices that follow from mesh, material and supports of an elastic body; loads have no part in them."""
 
-    Attributes
-    ----------
-    unknowns, interior : IntArray, shapes (n,) and (n_interior,)
-        The free components on the contact boundary, and all others that are free.
-    whole : FloatArray or scipy.sparse array, shape (2 n_nodes, 2 n_nodes)
-        The stiffness matrix.
-    across : FloatArray or scipy.sparse array, shape (n_interior, n)
-        The part of it that couples the interior with the unknowns.
-    solve : Callable[[FloatArray], FloatArray]
-        Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
-    influence : FloatArray, shape (n_interior, n)
-        The effect of the unknowns on the interior.
-    condensed : FloatArray, shape (n, n)
-        The condensed stiffness, symmetric.
-    gradients : FloatArray, shape (n_cells, n_points, n_corners, 2)
-        The gradients of the shape functions.
-    """
-
-    unknowns: IntArray
+    unknowns: IntArray  # The free components on the contact boundary, and all others that are free.
     interior: IntArray
-    whole: Any
-    across: Any
+    whole: Any  # (2 n_nodes, 2 n_nodes) The stiffness matrix.
+    across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
+    # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
     solve: Callable[[FloatArray], FloatArray]
-    influence: FloatArray
-    condensed: FloatArray
-    gradients: FloatArray
+    influence: FloatArray  # (n_interior, n) The effect of the unknowns on the interior.
+    condensed: FloatArray  # (n, n) The condensed stiffness, symmetric.
+    gradients: FloatArray  # (n_cells, n_points, n_corners, 2) The gradients of the shape functions.
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,11 +272,6 @@ def loose_modes(body: Body) -> list[str]:
     """Return the rigid motions of a body that neither its supports nor frictionless contact resist, in words.
 
     Contact resists a motion only if the motion has a component along the normal of a contact edge.
-
-    Returns
-    -------
-    list[str]
-        Any of "move along its first axis", "move along its second axis" and "turn"; empty if the body is held.
     """
     nodes = body.nodes @ body.frame
     centre, size = nodes.mean(axis=0), np.ptp(nodes, axis=0).max()

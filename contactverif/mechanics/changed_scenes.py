@@ -29,24 +29,10 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
     A nodal force is multiplied by length × modulus, a pressure by the modulus, and the distributed stiffness ε̂ by
     modulus / length. The facts of the scene are left out.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    length : float
-        The factor of lengths, a power of two.
-    modulus : float
-        The factor of Young's modulus, a power of four: the square roots in the factors of a stiffness are exact then.
-
     Returns
     -------
     Scene
         The scene in the other units.
-
-    Raises
-    ------
-    MisuseError
-        If `length` is no power of two, or `modulus` no power of four.
 
     Examples
     --------
@@ -85,11 +71,6 @@ def snap(scene: Scene, spacing: float) -> Scene:
         The scene.
     spacing : float
         The spacing, a length and a power of two; far shorter than a cell, or cells become flat.
-
-    Returns
-    -------
-    Scene
-        A scene that `move` moves exactly.
     """
     bodies = tuple(replace(body, nodes=np.rint(body.nodes / spacing) * spacing) for body in scene.bodies)
     return replace(scene, bodies=bodies)
@@ -105,16 +86,6 @@ def move(scene: Scene, x: float, y: float) -> Scene:
         The scene.
     x, y : float
         The way, a length each.
-
-    Returns
-    -------
-    Scene
-        The scene in the other place.
-
-    Raises
-    ------
-    MisuseError
-        If a coordinate would be rounded. `snap` makes coordinates of fewer digits.
     """
     bodies = []
     for body in scene.bodies:

@@ -36,44 +36,16 @@ _BATCH = 64  # The number of states in one call, so that their contact points fi
 
 @dataclass(frozen=True, slots=True)
 class InfSup:
-    """The smallest eigenvalue of one mesh, by force rows or by gap rows, whichever is smaller.
+    """The smallest eigenvalue of one mesh, by force rows or by gap rows, whichever is smaller."""
 
-    Attributes
-    ----------
-    segment : float
-        The mean slave segment h, a length.
-    n_multipliers : int
-        The number of multipliers.
-    n_zero : int
-        The number of independent pressures that move nothing.
-    constant : float
-        The smallest β that is not 0, dimensionless; 0 if all are.
-    """
-
-    segment: float
+    segment: float  # The mean slave segment h, a length.
     n_multipliers: int
-    n_zero: int
-    constant: float
+    n_zero: int  # The number of independent pressures that move nothing.
+    constant: float  # The smallest β that is not 0, dimensionless; 0 if all are.
 
 
 def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bool) -> InfSup:
-    """Return the inf-sup constant of a formulation between two bodies that touch along a straight line.
-
-    Parameters
-    ----------
-    scene : Scene
-        Two bodies whose reference positions touch along a line in the direction of their first axis. Each is held
-        without the other.
-    formulation : CheckedFormulation
-        A formulation with multipliers.
-    nodal : bool
-        True if multipliers are nodal forces (trait `penalty="nodal"`), False if they are pressures.
-
-    Returns
-    -------
-    InfSup
-        The constant, in which E is that of the softer body, and the number of zero eigenvalues.
-    """
+    """Return the inf-sup constant of a formulation between two bodies that touch along a straight line."""
     interface = scene.interface
     forces = force_rows(scene, formulation)
     gaps = _rescale(interface, gap_rows(scene, formulation), forces)

@@ -26,22 +26,13 @@ RANK_ROUNDOFF = 8.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """The answer of a linear system.
+    """The answer of a linear system."""
 
-    Attributes
-    ----------
-    change : FloatArray | None, shape (n,)
-        The step; None if the matrix has no inverse in floats.
-    condition : float
-        An estimate of 1/cond of the matrix in single precision, rows and columns of multipliers scaled. It is 0 if the
-        matrix has no inverse, even if multipliers are not unique and there is a step all the same.
-    deficiency : int
-        The number of multipliers that are not unique.
-    """
-
-    change: FloatArray | None
+    change: FloatArray | None  # (n,) The step; None if the matrix has no inverse in floats.
+    # An estimate of 1/cond of the matrix in single precision, rows and columns of multipliers scaled. It is 0 if the
+    # matrix has no inverse, even if multipliers are not unique and there is a step all the same.
     condition: float
-    deficiency: int = 0
+    deficiency: int = 0  # The number of multipliers that are not unique.
 
 
 def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None = None) -> Step:
@@ -58,11 +49,6 @@ def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArr
     floor : FloatArray | None, shape (n,)
         The largest part of `right` that roundoff alone may cause; 0 by default. Constraints that depend on one another
         must not contradict one another by more.
-
-    Returns
-    -------
-    Step
-        The step with the condition of the matrix.
     """
     if n_positions == len(right):
         step, condition = _factorise(matrix, right)

@@ -369,20 +369,10 @@ def scene_of(case: Case) -> Scene:
     The last cases have their scenes still, with whatever is condensed of them. Any other case, such as a stored one,
     gives the same scene to the last bit.
 
-    Parameters
-    ----------
-    case : Case
-        A case that holds bodies.
-
     Returns
     -------
     Scene
         The scene; bodies that two cases share are two bodies here.
-
-    Raises
-    ------
-    MisuseError
-        If the case holds no bodies.
     """
     if (scene := _ORIGINS.find(case)) is not None:
         return scene

@@ -32,38 +32,22 @@ class System:
 
     S is the stiffness of the bodies, g their load, and R the contact forces on the unknowns. The scene's symbols are
     those of `contactverif.mechanics.scene`.
-
-    Attributes
-    ----------
-    scene : Scene
-        The bodies.
-    formulation : CheckedFormulation
-        The formulation with its penalty.
-    factor : float
-        The share of loads and imposed displacements.
-    use_tangent : bool
-        False differentiates the residual on the frozen pairing, even if the formulation has a tangent.
-    difference_step : float | None
-        The step of differences in positions, a length; None for the one that suits smooth residuals.
-    seconds : dict[str, float]
-        The processor's time spent in "pair", "residual", "tangent" and "solve" so far.
-    n_multipliers : int
-        The number of multipliers of the formulation on the scene's interface.
-    transformation : FloatArray or scipy.sparse array, shape (n_unknowns + n_multipliers, n)
-        The scene's transformation from unknowns to positions, with the multipliers behind both.
-    stiffness : FloatArray or scipy.sparse array, shape (n, n)
-        The scene's stiffness, 0 for multipliers.
     """
 
     scene: Scene
     formulation: CheckedFormulation
-    factor: float = 1.0
+    factor: float = 1.0  # The share of loads and imposed displacements.
+    # False differentiates the residual on the frozen pairing, even if the formulation has a tangent.
     use_tangent: bool = True
+    # The step of differences in positions, a length; None for the one that suits smooth residuals.
     difference_step: float | None = None
+    # The processor's time spent in "pair", "residual", "tangent" and "solve" so far.
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED_PARTS, 0.0))
-    n_multipliers: int = field(init=False)
+    n_multipliers: int = field(init=False)  # The number of multipliers of the formulation on the scene's interface.
+    # (n_unknowns + n_multipliers, n) The scene's transformation from unknowns to positions, with the multipliers
+    # behind both.
     transformation: Any = field(init=False)
-    stiffness: Any = field(init=False)
+    stiffness: Any = field(init=False)  # (n, n) The scene's stiffness, 0 for multipliers.
 
     def __post_init__(self) -> None:
         scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)

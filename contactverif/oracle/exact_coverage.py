@@ -15,18 +15,11 @@ from contactverif.oracle.exact_points import ExactPoints, Integers, Lattice, Rat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """The part of each slave segment that sees the master along the slave's normal.
+    """The part of each slave segment that sees the master along the slave's normal."""
 
-    Attributes
-    ----------
-    share : Ratios, shape (n_slave_segments,)
-        The covered share of the segment's length, from 0 to 1 where it is clear.
-    clear : BoolArray, shape (n_slave_segments,)
-        False where formulations may differ: master segments lie behind one another, or deeper or farther than two
-        lengths of both.
-    """
-
-    share: Ratios
+    share: Ratios  # (n_slave_segments,) The covered share of the segment's length, from 0 to 1 where it is clear.
+    # (n_slave_segments,) False where formulations may differ: master segments lie behind one another, or deeper or
+    # farther than two lengths of both.
     clear: BoolArray
 
     @classmethod

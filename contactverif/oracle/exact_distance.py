@@ -17,33 +17,15 @@ Point = tuple[int, int]
 
 
 class Reach(NamedTuple):
-    """The relation of a point (X, Y)/W to a segment, in integers of the lattice.
-
-    Attributes
-    ----------
-    segment : int
-        The number of the segment.
-    above : int
-        The square of the distance to the closed segment, times W² and `squared`.
-    squared : int
-        The square of the segment's length.
-    along : int
-        The place of the foot on the segment's line: ξ = along / (W × squared), unclipped.
-    across : int
-        The gap × length of the segment × W: positive on the right of the segment, negative on its left.
-    past : int
-        The length by which the foot lies at or past an end, times the segment's length and W; 0 inside.
-    end : int
-        The end that is nearest: 0 or 1, or −1 where the foot lies inside.
-    """
+    """The relation of a point (X, Y)/W to a segment, in integers of the lattice."""
 
     segment: int
-    above: int
-    squared: int
-    along: int
-    across: int
-    past: int
-    end: int
+    above: int  # The square of the distance to the closed segment, times W² and `squared`.
+    squared: int  # The square of the segment's length.
+    along: int  # The place of the foot on the segment's line: ξ = along / (W × squared), unclipped.
+    across: int  # The gap × length of the segment × W: positive on the right of the segment, negative on its left.
+    past: int  # The length by which the foot lies at or past an end, times the segment's length and W; 0 inside.
+    end: int  # The end that is nearest: 0 or 1, or −1 where the foot lies inside.
 
 
 def subtract(a: Point, b: Point) -> Point:
@@ -65,17 +47,6 @@ def reach(segment: int, first: Point, second: Point, point: Point, weight: int =
     """Return the relation of the point (X, Y)/W to a closed segment.
 
     Where the foot lies at or past an end, the distance is that to the end node.
-
-    Parameters
-    ----------
-    segment : int
-        The number of the segment.
-    first, second : Point
-        Its nodes on the lattice.
-    point : Point
-        X and Y.
-    weight : int
-        W > 0.
     """
     (ax, ay), (bx, by), (px, py) = first, second, point
     dx, dy, rx, ry = bx - ax, by - ay, px - weight * ax, py - weight * ay

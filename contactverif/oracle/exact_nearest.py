@@ -23,43 +23,25 @@ _DOUBT = 64 * UNIT_ROUNDOFF
 
 @dataclass(frozen=True, slots=True)
 class NearSegment:
-    """A segment at the smallest distance from a point.
+    """A segment at the smallest distance from a point."""
 
-    Attributes
-    ----------
-    segment : int
-        Its number.
-    xi : Fraction
-        The foot of the point on the segment's line: 0 at its first node, 1 at its second, unclipped.
-    squared_overshoot : Fraction
-        The square of the length by which the foot lies past the segment's end; 0 if it lies inside.
-    signed_squared_gap : Fraction
-        The square of the distance to the segment's line, negative on its left, where its body is.
-    foot : tuple[str, int]
-        The place of the nearest point: ("node", its number) or ("segment", its number). Two segments that meet at the
-        nearest node have the same foot.
-    """
-
-    segment: int
-    xi: Fraction
+    segment: int  # Its number.
+    xi: Fraction  # The foot of the point on the segment's line: 0 at its first node, 1 at its second, unclipped.
+    # The square of the length by which the foot lies past the segment's end; 0 if it lies inside.
     squared_overshoot: Fraction
+    # The square of the distance to the segment's line, negative on its left, where its body is.
     signed_squared_gap: Fraction
+    # The place of the nearest point: ("node", its number) or ("segment", its number). Two segments that meet at the
+    # nearest node have the same foot.
     foot: tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Nearest:
-    """The exact distance of a point from a surface, and where it is taken.
+    """The exact distance of a point from a surface, and where it is taken."""
 
-    Attributes
-    ----------
-    squared_distance : Fraction
-        The square of the distance to the nearest closed segment.
-    segments : tuple[NearSegment, ...]
-        All segments at this distance: the one with the smallest overshoot first, then by number.
-    """
-
-    squared_distance: Fraction
+    squared_distance: Fraction  # The square of the distance to the nearest closed segment.
+    # All segments at this distance: the one with the smallest overshoot first, then by number.
     segments: tuple[NearSegment, ...]
 
     @property
@@ -89,11 +71,6 @@ def nearest_segments(nodes: FloatArray, segments: IntArray, point: tuple[float, 
         The numbers of the first and the second node of each segment; the body is on its left.
     point : tuple[float, float]
         The point.
-
-    Returns
-    -------
-    Nearest
-        The squared distance, and the segments at this distance.
     """
     candidates = _candidates(nodes, segments, np.array(point))
     ends = segments[candidates]

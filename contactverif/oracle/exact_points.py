@@ -29,21 +29,11 @@ _SHIFT = 128  # The bits of a root behind the lattice's own.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lattice:
-    """The nodes of a state as integers.
+    """The nodes of a state as integers."""
 
-    Attributes
-    ----------
-    nodes : Integers, shape (n_nodes, 2)
-        Positions × `scale`.
-    scale : int
-        A power of two.
-    slave, master : IntArray, shape (n_segments, 2)
-        The nodes of the segments.
-    """
-
-    nodes: Integers
-    scale: int
-    slave: IntArray
+    nodes: Integers  # (n_nodes, 2) Positions × `scale`.
+    scale: int  # A power of two.
+    slave: IntArray  # (n_segments, 2) The nodes of the segments.
     master: IntArray
 
     @classmethod
@@ -56,21 +46,11 @@ class Lattice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactPoints:
-    """Points of slave segments: (X, Y)/W on the lattice.
+    """Points of slave segments: (X, Y)/W on the lattice."""
 
-    Attributes
-    ----------
-    place : Integers, shape (n_points, 2)
-        X and Y.
-    weight : Integers, shape (n_points,)
-        W > 0.
-    along : Integers, shape (n_points, 2)
-        The vector from the first to the second node of the slave segment of each point.
-    """
-
-    place: Integers
-    weight: Integers
-    along: Integers
+    place: Integers  # (n_points, 2) X and Y.
+    weight: Integers  # (n_points,) W > 0.
+    along: Integers  # (n_points, 2) The vector from the first to the second node of the slave segment of each point.
 
     @classmethod
     def at(cls, lattice: Lattice, slave_segment: IntArray, c: FloatArray) -> ExactPoints:
@@ -114,31 +94,20 @@ class Ratios:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The numbers that points see of one master segment each, by one of the two rules.
+    """The numbers that points see of one master segment each, by one of the two rules."""
 
-    Attributes
-    ----------
-    xi, gap : Ratios, shape (n_points,)
-        The foot, 0 at the first node of the segment and 1 at its second, unclipped; and the gap, a length, negative in
-        penetration.
-    normal : Ratios, shape (n_points, 2)
-        The unit normal out of the master.
-    lengths : FloatArray, shape (n_points,)
-        The length of the slave segment, plus that of the master segment, plus the distance of the point from the
-        master segment's first node: the numbers of which a gap is a difference.
-    slave_length, master_length : FloatArray, shape (n_points,)
-        The lengths of the slave segment and of the master segment.
-    cosine : FloatArray, shape (n_points,)
-        The cosine of the angle between the master segment and the direction that ξ is measured in: 1 for the closest
-        point. Along the slave's normal it is positive where the segments face each other.
-    """
-
+    # (n_points,) The foot, 0 at the first node of the segment and 1 at its second, unclipped; and the gap, a length,
+    # negative in penetration.
     xi: Ratios
     gap: Ratios
-    normal: Ratios
+    normal: Ratios  # (n_points, 2) The unit normal out of the master.
+    # (n_points,) The length of the slave segment, plus that of the master segment, plus the distance of the point from
+    # the master segment's first node: the numbers of which a gap is a difference.
     lengths: FloatArray
-    slave_length: FloatArray
+    slave_length: FloatArray  # (n_points,) The lengths of the slave segment and of the master segment.
     master_length: FloatArray
+    # (n_points,) The cosine of the angle between the master segment and the direction that ξ is measured in: 1 for the
+    # closest point. Along the slave's normal it is positive where the segments face each other.
     cosine: FloatArray
 
 

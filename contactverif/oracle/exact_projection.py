@@ -22,30 +22,15 @@ from contactverif.oracle.rationals import integers
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """The exact projection of a point of a slave segment onto the master.
+    """The exact projection of a point of a slave segment onto the master."""
 
-    Attributes
-    ----------
-    segment : int
-        The nearest master segment.
-    xi : Fraction
-        The foot on that segment: 0 at its first node, 1 at its second, unclipped.
-    squared_distance : Fraction
-        The square of the distance to the closed segment, a length squared.
-    signed_squared_gap : Fraction
-        The square of the distance to the segment's line, a length squared, negative in penetration.
-    tied : tuple[int, ...]
-        All segments at the same distance.
-    undecided : tuple[int, ...]
-        Those of the tied segments that have the same overshoot too; more than one is a kink.
-    """
-
-    segment: int
-    xi: Fraction
-    squared_distance: Fraction
+    segment: int  # The nearest master segment.
+    xi: Fraction  # The foot on that segment: 0 at its first node, 1 at its second, unclipped.
+    squared_distance: Fraction  # The square of the distance to the closed segment, a length squared.
+    # The square of the distance to the segment's line, a length squared, negative in penetration.
     signed_squared_gap: Fraction
-    tied: tuple[int, ...]
-    undecided: tuple[int, ...]
+    tied: tuple[int, ...]  # All segments at the same distance.
+    undecided: tuple[int, ...]  # Those of the tied segments that have the same overshoot too; more than one is a kink.
 
     @property
     def gap_sign(self) -> int:
@@ -70,11 +55,6 @@ def project_point(interface: Interface, z: FloatArray, slave_segment: int, c: fl
         The number of the slave segment.
     c : float | Fraction
         The place on it, from −1 at its first node to +1 at its second.
-
-    Returns
-    -------
-    Projection
-        The nearest segment and the place on it.
     """
     exact = _Exact(interface, z, [Fraction(c)])
     return exact.nearest(exact.point(slave_segment, Fraction(c)))

@@ -21,11 +21,6 @@ _SNAP = 1e-2  # Formulations may still see contact past a free end by this share
 def default_points(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Return contact points for plugins that name none: nodes, quarter points and middles of the slave segments.
 
-    Parameters
-    ----------
-    interface : Interface
-        The two meshes.
-
     Returns
     -------
     slave_segment : IntArray, shape (n_points,)

@@ -36,16 +36,6 @@ def is_of_kind(interface: Interface, z: FloatArray, kind: str, slave_segment: in
         The number of the slave segment that carries the point.
     c : float
         The place of the point on it, from −1 to 1.
-
-    Returns
-    -------
-    bool
-        True if it is of that kind; a projection may be of several.
-
-    Raises
-    ------
-    KeyError
-        If there is no such kind.
     """
     return KIND_TESTS[kind](_Probe(interface, z, slave_segment, c))
 

@@ -44,24 +44,12 @@ N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChenHisada:
-    """The formulation: nodal pressures −ε̂ g_i where g_i ≤ 0 and the foot is on the master.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Distributed stiffness ε̂.
-    quadrature : Quadrature
-        The points on a cell, and the configuration in which lengths are measured.
-    tau : float
-        The part of a master segment by which a node's foot may lie past its free end and still count.
-    """
+    """The formulation: nodal pressures −ε̂ g_i where g_i ≤ 0 and the foot is on the master."""
 
     traits: Traits
-    penalty: float
-    quadrature: Quadrature
-    tau: float
+    penalty: float  # Distributed stiffness ε̂.
+    quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
+    tau: float  # The part of a master segment by which a node's foot may lie past its free end and still count.
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, the nearest master segment of each slave node, and which slave nodes are in contact."""

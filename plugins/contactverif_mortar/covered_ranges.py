@@ -55,21 +55,12 @@ N_LOCAL = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ranges:
-    """The Gauss points of all covered ranges, in the order of the slave segments.
+    """The Gauss points of all covered ranges, in the order of the slave segments."""
 
-    Attributes
-    ----------
-    slave, master : IntArray, shape (n_points,)
-        The segment that carries the point, and the one that it sees.
-    slot : IntArray, shape (n_points,)
-        The number of the point in the quadrature rule.
-    low, high : IntArray, shape (n_points,)
-        The master nodes that cut the lower and the upper end of its range, −1 where the segment ends there.
-    """
-
-    slave: IntArray
+    slave: IntArray  # (n_points,) The segment that carries the point, and the one that it sees.
     master: IntArray
-    slot: IntArray
+    slot: IntArray  # (n_points,) The number of the point in the quadrature rule.
+    # (n_points,) The master nodes that cut the lower and the upper end of its range, −1 where the segment ends there.
     low: IntArray
     high: IntArray
 

@@ -89,23 +89,14 @@ class Rule(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """Pairs of a slave and a master segment, in the order of the slave segments.
+    """Pairs of a slave and a master segment, in the order of the slave segments."""
 
-    Attributes
-    ----------
-    slave, master : IntArray, shape (n_cells,)
-        The segments.
-    cut_low, cut_high : BoolArray, shape (n_cells,)
-        A master node cuts the lower end (the second node) and the upper end (the first node).
-    before, behind : IntArray, shape (n_slave_segments,)
-        The segments with which normals at the two ends are averaged, −1 for none.
-    """
-
-    slave: IntArray
+    slave: IntArray  # (n_cells,) The segments.
     master: IntArray
+    # (n_cells,) A master node cuts the lower end (the second node) and the upper end (the first node).
     cut_low: BoolArray
     cut_high: BoolArray
-    before: IntArray
+    before: IntArray  # (n_slave_segments,) The segments with which normals at the two ends are averaged, −1 for none.
     behind: IntArray
 
     @classmethod
@@ -165,19 +156,11 @@ class Cells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadrature:
-    """A quadrature rule for each cell.
+    """A quadrature rule for each cell."""
 
-    Attributes
-    ----------
-    places, weights : FloatArray, shape (n_q,)
-        Places on [−1, 1], and weights that add up to 1.
-    current : bool
-        Lengths are those of the current configuration; else those of the reference configuration.
-    """
-
-    places: FloatArray
+    places: FloatArray  # (n_q,) Places on [−1, 1], and weights that add up to 1.
     weights: FloatArray
-    current: bool
+    current: bool  # Lengths are those of the current configuration; else those of the reference configuration.
 
     @classmethod
     def gauss(cls, n: int, current: bool) -> Quadrature:

@@ -39,21 +39,11 @@ _SOURCES = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mortar:
-    """A mortar formulation by penalty: pressures −ε̂ G_j at slave nodes that are covered and have G_j ≤ 0.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Distributed stiffness ε̂.
-    weighting : Weighting
-        The shapes, the normals and the quadrature.
-    """
+    """A mortar formulation by penalty: pressures −ε̂ G_j at slave nodes that are covered and have G_j ≤ 0."""
 
     traits: Traits
-    penalty: float
-    weighting: Weighting
+    penalty: float  # Distributed stiffness ε̂.
+    weighting: Weighting  # The shapes, the normals and the quadrature.
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, and which slave nodes are in contact."""
@@ -108,21 +98,11 @@ class Mortar:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MortarMultipliers:
-    """A mortar formulation with a multiplier λ_j ≥ 0, a pressure, at each slave node.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Scale c of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
-    weighting : Weighting
-        The shapes, the normals and the quadrature.
-    """
+    """A mortar formulation with a multiplier λ_j ≥ 0, a pressure, at each slave node."""
 
     traits: Traits
-    penalty: float
-    weighting: Weighting
+    penalty: float  # Scale c of the decision that a node is active: it is covered and λ_j − c G_j ≥ 0.
+    weighting: Weighting  # The shapes, the normals and the quadrature.
 
     def n_multipliers(self, interface: Interface) -> int:
         """Return the number of multipliers: one at each slave node."""
@@ -195,11 +175,6 @@ def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segmen
 
     Its promises are those of `mortar`. The weighted gap of a node is the value of a linear fit to the gaps around it.
 
-    Parameters
-    ----------
-    penalty, area, normals : float or str
-        As for `mortar`.
-
     References
     ----------
     Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
@@ -232,11 +207,6 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
     """Mortar with a Lagrange multiplier, a pressure, at each slave node, and dual shapes.
 
     Its promises are those of `mortar_lm`.
-
-    Parameters
-    ----------
-    penalty, area, normals : float or str
-        As for `mortar_lm`.
 
     References
     ----------

@@ -22,18 +22,6 @@ from contactverif_mortar.node_groups import RowGroups
 class Factors(NamedTuple):
     """A tangent K = rest + leftᵀ diag(weights) right.
 
-    Attributes
-    ----------
-    rest : sparse.csr_array, shape (n_unknowns, n_unknowns)
-        The derivative at fixed pressures.
-    left : sparse.csr_array, shape (n_rows, n_unknowns)
-        The forces of a unit pressure, one row for each slave node. Dual shapes have two rows more for each slave
-        segment: the forces of a unit of the mean and of the variance of c on what is covered.
-    weights : FloatArray, shape (n_rows,)
-        The pressure for each unit of a row of `right`.
-    right : sparse.csr_array, shape (n_rows, n_unknowns)
-        The derivatives of the weighted gaps, and for dual shapes of mean and variance.
-
     Examples
     --------
     >>> import numpy as np
@@ -47,9 +35,12 @@ class Factors(NamedTuple):
     True
     """
 
-    rest: sparse.csr_array
+    rest: sparse.csr_array  # (n_unknowns, n_unknowns) The derivative at fixed pressures.
+    # (n_rows, n_unknowns) The forces of a unit pressure, one row for each slave node. Dual shapes have two rows more
+    # for each slave segment: the forces of a unit of the mean and of the variance of c on what is covered.
     left: sparse.csr_array
-    weights: FloatArray
+    weights: FloatArray  # (n_rows,) The pressure for each unit of a row of `right`.
+    # (n_rows, n_unknowns) The derivatives of the weighted gaps, and for dual shapes of mean and variance.
     right: sparse.csr_array
 
     def assemble(self) -> sparse.csr_array:
@@ -63,24 +54,13 @@ class Factors(NamedTuple):
 
 
 class NodeRows(NamedTuple):
-    """The forces of a mortar method, and the factors of its tangent on the groups of their rows.
+    """The forces of a mortar method, and the factors of its tangent on the groups of their rows."""
 
-    Attributes
-    ----------
-    forces : FloatArray, shape (n_unknowns,)
-        Internal forces at the given pressures.
-    rest : sparse.csr_array, shape (n_unknowns, n_unknowns)
-        The derivative at fixed pressures, in a pattern that the caller chose.
-    groups : RowGroups
-        The nodes of each row.
-    left, right : FloatArray, shape (2 n_members,)
-        The entries of both factors, two for each member of a group.
-    """
-
-    forces: FloatArray
+    forces: FloatArray  # (n_unknowns,) Internal forces at the given pressures.
+    # (n_unknowns, n_unknowns) The derivative at fixed pressures, in a pattern that the caller chose.
     rest: sparse.csr_array
-    groups: RowGroups
-    left: FloatArray
+    groups: RowGroups  # The nodes of each row.
+    left: FloatArray  # (2 n_members,) The entries of both factors, two for each member of a group.
     right: FloatArray
 
     def factors(self, weights: FloatArray) -> Factors:

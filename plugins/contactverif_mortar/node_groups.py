@@ -21,25 +21,14 @@ BYTES_OF_ENTRY = 12  # A float64 and an int32.
 
 
 class RowGroups(NamedTuple):
-    """The groups of all rows, and what they are made of.
+    """The groups of all rows, and what they are made of."""
 
-    Attributes
-    ----------
-    nodes : NumberArray, shape (n_members,)
-        The nodes of all groups, one group after the other, ascending in each.
-    starts : IntArray, shape (n_rows + 1,)
-        Where each group begins. First come the slave nodes, whose groups are empty unless they are active. For dual
-        shapes the slave segments come behind them, and once more.
-    local : NumberArray, shape (n_cells, n_local)
-        The nodes of each cell, or of each point.
-    first : IntArray, shape (n_slave_segments + 1,)
-        Where the cells of each slave segment begin.
-    """
-
-    nodes: NumberArray
+    nodes: NumberArray  # (n_members,) The nodes of all groups, one group after the other, ascending in each.
+    # (n_rows + 1,) Where each group begins. First come the slave nodes, whose groups are empty unless they are active.
+    # For dual shapes the slave segments come behind them, and once more.
     starts: IntArray
-    local: NumberArray
-    first: IntArray
+    local: NumberArray  # (n_cells, n_local) The nodes of each cell, or of each point.
+    first: IntArray  # (n_slave_segments + 1,) Where the cells of each slave segment begin.
 
     def pattern(self, first_row: int, end_row: int) -> Couplings:
         """Return the groups of some rows as the pattern of a matrix."""
@@ -86,11 +75,6 @@ def check_product(starts: IntArray) -> None:
     ----------
     starts : IntArray, shape (n_rows + 1,)
         Where the group of each slave node begins.
-
-    Raises
-    ------
-    MisuseError
-        If its entries take more than 32 GiB.
     """
     sizes = np.diff(starts)
     large = sizes[sizes > LARGE_GROUP].astype(np.float64)

@@ -46,37 +46,20 @@ ORIGIN, MEAN, KAPPA, VARIANCE, EXTENT, N_SHAPE = range(6)
 
 
 class Weights(NamedTuple):
-    """The integrals of the shapes of the slave nodes at one state, and the numbers of the shapes.
+    """The integrals of the shapes of the slave nodes at one state, and the numbers of the shapes."""
 
-    Attributes
-    ----------
-    areas, with_gap : FloatArray, shape (n_slave_nodes,)
-        ∫φ_j and ∫φ_j g.
-    shapes : FloatArray, shape (n_slave_segments, 5)
-        The numbers of the shapes on each segment; undefined where it has no cell.
-    """
-
-    areas: FloatArray
+    areas: FloatArray  # (n_slave_nodes,) ∫φ_j and ∫φ_j g.
     with_gap: FloatArray
+    # (n_slave_segments, 5) The numbers of the shapes on each segment; undefined where it has no cell.
     shapes: FloatArray
 
 
 class NodeState(NamedTuple):
-    """The slave nodes of a method at one state.
+    """The slave nodes of a method at one state."""
 
-    Attributes
-    ----------
-    pressure : FloatArray, shape (n_slave_nodes,)
-        The pressures p_j, zero where a node is not active.
-    weights : FloatArray, shape (n_slave_nodes,)
-        Δp_j for each unit of row j of `Factors.right`.
-    gaps, divisor : FloatArray, shape (n_slave_nodes,)
-        G_j and ∫φ_j, if that row is ΔG_j. Zero and one, if it is Δ∫φ_j g.
-    """
-
-    pressure: FloatArray
-    weights: FloatArray
-    gaps: FloatArray
+    pressure: FloatArray  # (n_slave_nodes,) The pressures p_j, zero where a node is not active.
+    weights: FloatArray  # (n_slave_nodes,) Δp_j for each unit of row j of `Factors.right`.
+    gaps: FloatArray  # (n_slave_nodes,) G_j and ∫φ_j, if that row is ΔG_j. Zero and one, if it is Δ∫φ_j g.
     divisor: FloatArray
 
 

@@ -26,29 +26,17 @@ from contactverif_mortar.integration_cells import GAP, WEIGHT, C
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shapes:
-    """The values of shapes at points of some states, and how they change.
+    """The values of shapes at points of some states, and how they change."""
 
-    Attributes
-    ----------
-    values : Array, shape (n_states, n_points, 2)
-        Values of the shapes of A and B, the nodes of the slave segment that carries the point.
-    slope : Array, shape (n_states, n_points)
-        Δ of the second shape for each unit of c; Δ of the first is the opposite.
-    by_mean, by_variance : Array, shape (n_states, n_points)
-        Δ of the second shape for each unit of c̄ and of v of the segment; zero for standard shapes.
-    centred, extent : Array, shape (n_states, n_points)
-        c − c̄, and ∫1 of the segment; zero for standard shapes.
-    variance : Array, shape (n_states, n_points)
-        The variance v of the segment; zero for standard shapes.
-    """
-
+    # (n_states, n_points, 2) Values of the shapes of A and B, the nodes of the slave segment that carries the point.
     values: Array
-    slope: Array
+    slope: Array  # (n_states, n_points) Δ of the second shape for each unit of c; Δ of the first is the opposite.
+    # (n_states, n_points) Δ of the second shape for each unit of c̄ and of v of the segment; zero for standard shapes.
     by_mean: Array
     by_variance: Array
-    centred: Array
+    centred: Array  # (n_states, n_points) c − c̄, and ∫1 of the segment; zero for standard shapes.
     extent: Array
-    variance: Array
+    variance: Array  # (n_states, n_points) The variance v of the segment; zero for standard shapes.
 
     @classmethod
     def standard(cls, points: Array) -> Shapes:

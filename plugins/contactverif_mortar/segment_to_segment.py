@@ -29,21 +29,11 @@ N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentToSegment:
-    """The formulation: pressure −ε̂ g at each Gauss point of a cell where g ≤ 0.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Distributed stiffness ε̂.
-    quadrature : Quadrature
-        The points on a cell, and the configuration in which lengths are measured.
-    """
+    """The formulation: pressure −ε̂ g at each Gauss point of a cell where g ≤ 0."""
 
     traits: Traits
-    penalty: float
-    quadrature: Quadrature
+    penalty: float  # Distributed stiffness ε̂.
+    quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, and which of their points are in contact (n_cells × 3, flat)."""

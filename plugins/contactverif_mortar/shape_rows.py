@@ -30,27 +30,13 @@ MakeGains = Callable[[int, int], FloatArray]  # From the first and the last of s
 
 
 class ShapedPoints(NamedTuple):
-    """The points of some cells at one state, and the slave nodes' shapes there.
+    """The points of some cells at one state, and the slave nodes' shapes there."""
 
-    Attributes
-    ----------
-    points : FloatArray, shape (n_points, 6)
-        The numbers of each point, as `Quadrature.points` gives them.
-    shapes : Shapes
-        The shapes, of one state.
-    segment : IntArray, shape (n_points,)
-        The slave segment of each point.
-    slave : IntArray, shape (n_slave_segments, 2)
-        The slave nodes of each segment.
-    make_gains : MakeGains
-        The Δ of the points of some cells, (n, 5, n_local, 2).
-    """
-
-    points: FloatArray
-    shapes: Shapes
-    segment: IntArray
-    slave: IntArray
-    make_gains: MakeGains
+    points: FloatArray  # (n_points, 6) The numbers of each point, as `Quadrature.points` gives them.
+    shapes: Shapes  # The shapes, of one state.
+    segment: IntArray  # (n_points,) The slave segment of each point.
+    slave: IntArray  # (n_slave_segments, 2) The slave nodes of each segment.
+    make_gains: MakeGains  # The Δ of the points of some cells, (n, 5, n_local, 2).
 
 
 def add_shaped_rows(

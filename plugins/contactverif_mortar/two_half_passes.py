@@ -61,21 +61,11 @@ class _HalfPass(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwoHalfPasses:
-    """The formulation.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Distributed stiffness ε̂.
-    rule : Quadrature
-        The points on a covered range, and the configuration in which lengths are measured.
-    """
+    """The formulation."""
 
     traits: Traits
-    penalty: float
-    rule: Quadrature
+    penalty: float  # Distributed stiffness ε̂.
+    rule: Quadrature  # The points on a covered range, and the configuration in which lengths are measured.
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find cells and ranges of both half passes, by the surface that is pushed, and the active nodes of both."""

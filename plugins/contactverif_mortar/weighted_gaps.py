@@ -62,33 +62,15 @@ StateWeights = Weights | WeightedState
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighted:
-    """The points of some cells at some states, the slave nodes' shapes there, and weighted gaps.
-
-    Attributes
-    ----------
-    cells : Cells
-        The cells.
-    points : Array, shape (n_states, n_points, 6)
-        The points of `Quadrature.points`.
-    shapes : Shapes
-        The shapes at the points.
-    ends : IntArray, shape (n_points, 2)
-        The slave nodes of each point.
-    segment : IntArray, shape (n_points,)
-        The slave segment of each point.
-    nodes : NumberArray, shape (n_cells, n_local)
-        The nodes of `Cells.local_nodes`.
-    areas, with_gap : Array, shape (n_states, n_slave_nodes)
-        ∫φ_j and ∫φ_j g.
-    """
+    """The points of some cells at some states, the slave nodes' shapes there, and weighted gaps."""
 
     cells: Cells
-    points: Array
+    points: Array  # (n_states, n_points, 6) The points of `Quadrature.points`.
     shapes: Shapes
-    ends: IntArray
-    segment: IntArray
-    nodes: NumberArray
-    areas: Array
+    ends: IntArray  # (n_points, 2) The slave nodes of each point.
+    segment: IntArray  # (n_points,) The slave segment of each point.
+    nodes: NumberArray  # (n_cells, n_local)
+    areas: Array  # (n_states, n_slave_nodes) ∫φ_j and ∫φ_j g.
     with_gap: Array
 
     def one_state(self) -> WeightedState:
@@ -102,21 +84,11 @@ class Weighted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighting:
-    """A way to weight gaps and to interpolate pressures.
+    """A way to weight gaps and to interpolate pressures."""
 
-    Attributes
-    ----------
-    averaged : bool
-        Normals are averaged at the slave nodes; else they are those of the segments.
-    dual : bool
-        Shapes are biorthogonal; else they are standard.
-    quadrature : Quadrature
-        The points on a cell, and the configuration in which lengths are measured.
-    """
-
-    averaged: bool
-    dual: bool
-    quadrature: Quadrature
+    averaged: bool  # Normals are averaged at the slave nodes; else they are those of the segments.
+    dual: bool  # Shapes are biorthogonal; else they are standard.
+    quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
 
     def at(self, interface: Interface, cells: Cells, x: Array) -> Weighted:
         """Compute points, shapes and weighted gaps on some cells at the positions x (n_states, n_nodes, 2)."""
@@ -158,13 +130,7 @@ class Weighting:
         x: FloatArray,
         state: NodeState,
     ) -> NodeRows:
-        """Compute forces and the assembled tangent, which is the `rest` of the result, at a state of the slave nodes.
-
-        Raises
-        ------
-        MisuseError
-            If the assembled tangent would not fit into memory.
-        """
+        """Compute forces and the assembled tangent, which is the `rest` of the result."""
         n_nodes = len(active)
 
         def choose_pattern(groups: RowGroups) -> Couplings:

@@ -83,38 +83,19 @@ _PRINTED = Traits(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchTestPassing:
-    """A VTS-PPT formulation.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Distributed stiffness ε̂; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
-    n : int
-        Number of virtual slave nodes on a slave segment.
-    transmission : int
-        `box3.PRINTED` or `box3.BALANCED`.
-    consistent : bool
-        The tangent is exact; else it is that of VTS-ME.
-    current_area : bool
-        Areas of competence are measured in the current configuration; else in the reference configuration.
-    free_end : int
-        `walk.TRUNCATE`, `walk.EXTEND` or `walk.COVER`.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-    threads : int
-        How many threads share the pairing and the tangent of a large interface; the answers have the same bits.
-    """
+    """A VTS-PPT formulation."""
 
     traits: Traits
+    # Distributed stiffness ε̂; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
     penalty: float
-    n: int
-    transmission: int
-    consistent: bool
+    n: int  # Number of virtual slave nodes on a slave segment.
+    transmission: int  # `box3.PRINTED` or `box3.BALANCED`.
+    consistent: bool  # The tangent is exact; else it is that of VTS-ME.
+    # Areas of competence are measured in the current configuration; else in the reference configuration.
     current_area: bool
-    free_end: int
-    tau: float
+    free_end: int  # `walk.TRUNCATE`, `walk.EXTEND` or `walk.COVER`.
+    tau: float  # The part of a master segment by which a foot may lie past its free end and still count.
+    # How many threads share the pairing and the tangent of a large interface; the answers have the same bits.
     threads: int
 
     def n_multipliers(self, interface: Interface, /) -> int:
@@ -277,11 +258,6 @@ def vts_ppt_basic(
     The forces and their promises are those of `vts_ppt`. The tangent is promised to be approximate: it treats each
     virtual slave node as if it pressed on one master segment only.
 
-    Parameters
-    ----------
-    penalty, n, free_end, tau, threads : float or int or str
-        As for `vts_ppt`.
-
     References
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
@@ -300,15 +276,6 @@ def vts_ppt_balanced(
     The master nodes share the force of the virtual slave node in the proportions of Box 3. So force and moment are
     conserved, and the flat patch test passes as with `vts_ppt`. With "cover", the default, it also covers an overhang;
     with another `free_end` an overhang breaks the balance, and nothing is promised of it.
-
-    Parameters
-    ----------
-    penalty, n : float or int
-        As for `vts_ppt`.
-    area : str
-        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    free_end, tau, threads : str or float or int
-        As for `vts_ppt`; `free_end` is "cover" by default.
 
     References
     ----------

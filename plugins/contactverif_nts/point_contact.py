@@ -50,31 +50,15 @@ FEW_POINTS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointContact:
-    """A formulation that is a list of points on slave segments.
-
-    Attributes
-    ----------
-    traits : Traits
-        The promises.
-    penalty : float
-        Stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
-    c, weight : FloatArray, shape (n_slots,)
-        Places on a slave segment in [−1, 1], and their shares of its length.
-    at_nodes : bool
-        The points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
-    area_from : int
-        `eq6.NODAL`, `eq6.CURRENT` or `eq6.REFERENCE`.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-    """
+    """A formulation that is a list of points on slave segments."""
 
     traits: Traits
-    penalty: float
-    c: FloatArray
+    penalty: float  # Stiffness; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
+    c: FloatArray  # (n_slots,) Places on a slave segment in [−1, 1], and their shares of its length.
     weight: FloatArray
-    at_nodes: bool
-    area_from: int
-    tau: float
+    at_nodes: bool  # The points are the slave nodes, each once: slot 0 begins its segment, slot 1 ends it.
+    area_from: int  # `eq6.NODAL`, `eq6.CURRENT` or `eq6.REFERENCE`.
+    tau: float  # The part of a master segment by which a foot may lie past its free end and still count.
 
     def n_multipliers(self, interface: Interface, /) -> int:
         """Return the number of multipliers: one for each point, in their order, or 0 for a penalty."""

@@ -31,21 +31,12 @@ _EXCHANGED = "-swapped"  # The end of the name of a flat case whose slave and ma
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pass:
-    """One of the two passes.
+    """One of the two passes."""
 
-    Attributes
-    ----------
-    interface : Interface
-        The interface with the roles of this pass.
-    places : IntArray, shape (n_unknowns + n_multipliers,)
-        Where the unknowns of this pass are in z; only its own multipliers count.
-    name : str
-        The prefix of its names in a pairing.
-    """
-
-    interface: Interface
+    interface: Interface  # The interface with the roles of this pass.
+    # (n_unknowns + n_multipliers,) Where the unknowns of this pass are in z; only its own multipliers count.
     places: IntArray
-    name: str
+    name: str  # The prefix of its names in a pairing.
 
     def part(self, pairing: Pairing | None) -> Pairing | None:
         """Return the part of a pairing of both passes that belongs to this one."""
@@ -135,13 +126,6 @@ def two_pass(*, penalty: float, inner: Callable[..., Any]) -> TwoPass:
 
     With a penalty two passes fail the flat patch test (case A1): springs on both sides give twice the pressure. With
     nodal multipliers that balance force and moment they pass it. All other promises are those of the formulation.
-
-    Parameters
-    ----------
-    penalty : float
-        The penalty of both passes, of the formulation's own kind.
-    inner : Callable[..., Any]
-        The factory `make(*, penalty)` of the formulation.
 
     References
     ----------
