@@ -75,7 +75,8 @@ ROOMS = {
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
-        (*BELOW_RUN, "foreign_files", "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis")
+        (*BELOW_RUN, "foreign_files", "geometry", "isolation", "run", *REPORTS),
+        ("numpy", "scipy", "hypothesis", "msgspec"),
     ),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(

@@ -162,11 +162,11 @@ def _write(
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
-        from contactverif.studies.bench.journal import journal_of
+        from contactverif.run.journal import journal_folder, remove_journal
         from contactverif_reports.netcdf.bench_file import write_bench
 
         write_bench(results, files.paths[REPORT])
-        journal_of(files.paths[REPORT]).unlink(missing_ok=True)
+        remove_journal(journal_folder(files.paths[REPORT]))
     if folder is not None:
         from contactverif_reports.draw.bench_figures import draw_bench
 

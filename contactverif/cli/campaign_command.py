@@ -52,7 +52,7 @@ def campaign(
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
       contactverif merge runs --out nts-ar.nc
     """
-    from contactverif.run.journal_folder import hold_journal
+    from contactverif.run.journal import hold_journal
     from contactverif.run.shards import Shard, open_shard
     from contactverif_reports.files import made_folder
 

@@ -58,7 +58,7 @@ def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
 
 def end_journal(journal: Journal, *, complete: bool) -> None:
     """Remove the journal once the files are complete."""
-    from contactverif.run.journal_folder import remove_journal
+    from contactverif.run.journal import remove_journal
 
     if journal.trouble:
         _warn(f"the journal could not be written to its end: {journal.trouble}")

@@ -122,7 +122,7 @@ class VerifyJob:
     @contextmanager
     def journal(self) -> Iterator[Journal]:
         """Open a block with the journal of the run. In it no other process goes on with the same journal."""
-        from contactverif.run.journal_folder import (
+        from contactverif.run.journal import (
             begin_journal,
             hold_journal,
             journal_folder,
@@ -202,7 +202,8 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
     MisuseError
         If there is no such journal, versions differ, or there are other options.
     """
-    from contactverif.run.journal_folder import journal_folder, read_plan
+    from contactverif.run.journal import journal_folder
+    from contactverif.run.run_journal import read_plan
 
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
@@ -256,7 +257,7 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     """
     import msgspec
 
-    from contactverif.run.journal_folder import check_versions
+    from contactverif.run.run_journal import check_versions
 
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")

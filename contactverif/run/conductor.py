@@ -17,7 +17,6 @@ from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
 from contactverif.run.driver import BLOCK, SHRINK_CALLS, draw_case, draw_cases
-from contactverif.run.journal_records import WITNESS, BlockRecord
 from contactverif.run.open_row import OpenRow
 from contactverif.run.outcome_store import WHOLE
 from contactverif.run.packing import CaseChunk
@@ -33,7 +32,7 @@ from contactverif.run.pieces import (
     needed_parts,
     shrink_case,
 )
-from contactverif.run.run_journal import Journal
+from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
 from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress, Reporter, Task, TaskQueue
 from contactverif.run.workers import Team

@@ -42,7 +42,7 @@ class OutcomeForm(NamedTuple):
         return _ALWAYS + len(self.parameters) + 2 * len(self.values) + len(self.details) + sum(lengths)
 
 
-def take_apart(outcome: Outcome) -> tuple[OutcomeForm, list[float]]:
+def encode(outcome: Outcome) -> tuple[OutcomeForm, list[float]]:
     """Return the form of an outcome and its numbers; of its case only the summary stays."""
     summary, measurement = outcome.summary, outcome.measurement
     sizes = [float(summary.n_slave_segments), float(summary.n_master_segments)]
@@ -78,8 +78,8 @@ def take_apart(outcome: Outcome) -> tuple[OutcomeForm, list[float]]:
     return form, numbers
 
 
-def put_together(form: OutcomeForm, numbers: Sequence[float]) -> Outcome:
-    """Return the outcome that `take_apart` made a form and numbers of."""
+def decode(form: OutcomeForm, numbers: Sequence[float]) -> Outcome:
+    """Return the outcome that `encode` made a form and numbers of."""
     rest = iter(numbers)
 
     def read_named(names: Sequence[str]) -> dict[str, float]:

@@ -13,7 +13,7 @@ from typing import overload
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Verdict
-from contactverif.run.outcome_forms import OutcomeForm, put_together, take_apart
+from contactverif.run.outcome_forms import OutcomeForm, decode, encode
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.
@@ -60,7 +60,7 @@ class OutcomeStore(Sequence[Outcome]):
             self._form_of.append(-1)
             self._starts.append(len(self._numbers))
             return
-        form, numbers = take_apart(outcome)
+        form, numbers = encode(outcome)
         place = self._numbers_of_forms.setdefault(form, len(self._forms))
         if place == len(self._forms):
             self._forms.append(form)
@@ -85,7 +85,7 @@ class OutcomeStore(Sequence[Outcome]):
             return self._whole[number]
         start = self._starts[number]
         end = self._starts[number + 1] if number + 1 < len(self) else len(self._numbers)
-        return put_together(self._forms[self._form_of[number]], self._numbers[start:end].tolist())
+        return decode(self._forms[self._form_of[number]], self._numbers[start:end].tolist())
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[number] for number in range(len(self)))

@@ -1,165 +1,273 @@
-"""The journal of a run: what is to be judged, and every outcome as it comes, so that a run that was killed goes on.
+"""The journal of a run: its plan and every outcome as it comes, so that no case is judged twice.
 
-A journal is a folder. Its `header` is the plan: what is judged, and with which versions. Beside it each process that
-judges has a file of its own (`journal_records.py`). A finished shard of a campaign has a file `done`.
-
-Rules for the next editor: nothing that stands in a journal is believed before it is checked, and an outcome that cannot
-be read is judged again. The files of an earlier process are read, and never written.
+An outcome stands there as it does in memory: its form, once in a file, and its numbers. Nothing in a journal is
+believed before it is checked; an outcome that cannot be read is judged again. A change of a record is a new `FORMAT`.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from secrets import token_hex
-from typing import Any
+from typing import IO, Any
 
 import msgspec
 
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome
-from contactverif.run.journal_records import FORMAT, BlockRecord, RecordWriter
-from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.journal import RecordFile, decoded, read_header, read_message, read_messages, record_files
+from contactverif.run.outcome_forms import OutcomeForm, decode, encode
 
-_LEAST_ROOM = 10_000  # A finite list may have this many cases.
+FORMAT = 1
+WITNESS = -1  # The number of the outcome of a row's witness.
+_MOST_FORMS = 10_000  # The most forms that a process remembers.
 _MOST_WRITERS = 4  # The most journals that a process has open for writing.
+_OPEN_FILES = 100  # The most files that are open for reading.
+_FILE_BITS = 40  # A place is the number of its file, then this many bits for the byte.
+_LEAST_ROOM = 10_000  # A finite list may have this many cases.
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):
-    """The plan of a run, as the header of its journal has it.
+    """The plan of a run, the header of its journal. A row is a formulation and a property, as on the command line."""
 
-    Attributes
-    ----------
-    command : str
-        The command that judges.
-    options : dict[str, Any]
-        The options of the command.
-    folder : str
-        The working folder of the command, to which names of files are relative.
-    versions : dict[str, str]
-        {library or package: version or digest}.
-    formulations, properties : tuple[str, ...]
-        The names on the command line. A row of the plan is a formulation and a property.
-    profile : str
-        The name of the profile.
-    examples, seed : int
-        The number of cases of each property, and their seed.
-    format : int
-        The version of the journal's format.
+    command: str = ""
+    options: dict[str, Any] = {}
+    folder: str = ""  # The working folder of the command, to which names of files are relative.
+    versions: dict[str, str] = {}  # {library or package: version or digest}.
+    formulations: tuple[str, ...] = ()
+    properties: tuple[str, ...] = ()
+    profile: str = ""
+    examples: int = 0
+    seed: int = 0
+    format: int = FORMAT
+
+
+class FormRecord(msgspec.Struct, frozen=True, array_like=True, tag="form"):
+    """The form of outcomes that stand behind it in the same file."""
+
+    form: OutcomeForm
+
+
+class OutcomeRecord(msgspec.Struct, frozen=True, array_like=True, tag="outcome"):
+    """The outcome of one case."""
+
+    row: int  # Its number in the plan.
+    number: int  # The number of the case in the row; `WITNESS` for its witness.
+    form: int  # The place of the form in the file, in bytes.
+    numbers: bytes  # As little-endian float64.
+
+
+class BlockRecord(msgspec.Struct, frozen=True, array_like=True, tag="block"):
+    """A block of cases that was drawn."""
+
+    group: str  # The name of the cases' source and seed.
+    number: int
+    count: int  # The number of its cases.
+    exhausted: bool  # The strategy has no other cases.
+    last: bool  # No further block follows.
+
+
+Record = FormRecord | OutcomeRecord | BlockRecord
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=str)  # Words of a property may be of a type of their own.
+_DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Record)
+
+
+class OutcomeFile:
+    """The file in which this process notes outcomes and blocks."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = RecordFile(folder)
+        self._forms: dict[OutcomeForm, int] = {}
+
+    def add_outcome(self, row: int, number: int, outcome: Outcome) -> None:
+        """Append the outcome of a case."""
+        form, numbers = encode(outcome)
+        if form not in self._forms:
+            if len(self._forms) >= _MOST_FORMS:
+                self._forms.clear()
+            place = self.file.append(_form_message(form))
+            if place is None:
+                return
+            self._forms[form] = place
+        record = OutcomeRecord(row, number, self._forms[form], array("d", numbers).tobytes())
+        self.file.append(_ENCODER.encode(record))
+
+    def add_block(self, block: BlockRecord) -> None:
+        """Append a block that was drawn."""
+        self.file.append(_ENCODER.encode(block))
+
+
+def _form_message(form: OutcomeForm) -> bytes:
+    try:
+        return _ENCODER.encode(FormRecord(form))
+    except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
+        return _ENCODER.encode(("form", _writable(msgspec.to_builtins(form))))
+
+
+def _writable(item: Any) -> Any:
+    """Return words and tuples of words in which what is no character is spelled out."""
+    if isinstance(item, str):
+        return item.encode("utf-8", "backslashreplace").decode()
+    return [_writable(part) for part in item] if isinstance(item, list | tuple) else item
+
+
+class KnownOutcomes:
+    """The outcomes and the blocks in the files of some journals. Of an outcome only its place is in memory.
+
+    A plan has `n_rows` rows, and cases with the number `room` or a larger one are not believed.
     """
 
-    command: str
-    options: dict[str, Any]
-    folder: str
-    versions: dict[str, str]
-    formulations: tuple[str, ...]
-    properties: tuple[str, ...]
-    profile: str
-    examples: int
-    seed: int
-    format: int = FORMAT
+    def __init__(self, folders: Sequence[Path], n_rows: int, room: int) -> None:
+        self.blocks: dict[tuple[str, int], BlockRecord] = {}  # By group and number.
+        self.n_outcomes = 0  # The number of different cases that are judged, witnesses included.
+        self.n_twice = 0  # The number of further outcomes of the same cases.
+        self._paths = [path for folder in folders for path in record_files(folder)]
+        self._places = [array("q") for _ in range(n_rows)]  # One more than the place, or 0; the witness comes first.
+        self._room = room
+        self._files: dict[int, IO[bytes]] = {}
+        self._form = lru_cache(_MOST_FORMS)(self._read_form)
+        for number, path in enumerate(self._paths):
+            self._read_file(path, number << _FILE_BITS)
+
+    def outcome(self, row: int, number: int) -> Outcome | None:
+        """Return the outcome of a case of a row; None if it is not known."""
+        places = self._places[row]
+        slot = number - WITNESS
+        if slot >= len(places) or not places[slot]:
+            return None
+        file, place = divmod(places[slot] - 1, 1 << _FILE_BITS)
+        record = self._read(file, place)
+        form = self._form(file, record.form) if isinstance(record, OutcomeRecord) else None
+        if form is None or not isinstance(record, OutcomeRecord) or (record.row, record.number) != (row, number):
+            return None
+        return _outcome_of(record, form)
+
+    def close(self) -> None:
+        """Close the files."""
+        while self._files:
+            self._files.popitem()[1].close()
+
+    def _read_file(self, path: Path, start: int) -> None:
+        """Note the place of each outcome of a file, up to the first record that is damaged."""
+        for place, message in read_messages(path):
+            record = decoded(message, _DECODER)
+            if record is None:
+                return
+            if isinstance(record, OutcomeRecord):
+                self._add(record, start | place)
+            elif isinstance(record, BlockRecord) and record.number >= 0 and 0 <= record.count < self._room:
+                self.blocks[record.group, record.number] = record
+
+    def _add(self, record: OutcomeRecord, place: int) -> None:
+        if not (0 <= record.row < len(self._places) and WITNESS <= record.number < self._room):
+            return
+        places, slot = self._places[record.row], record.number - WITNESS
+        if slot >= len(places):
+            places.extend([0] * (slot + 1 - len(places)))
+        self.n_twice += places[slot] != 0
+        self.n_outcomes += places[slot] == 0
+        places[slot] = place + 1
+
+    def _read(self, file: int, place: int) -> Record | None:
+        if file not in self._files:
+            if len(self._files) >= _OPEN_FILES:
+                self._files.pop(next(iter(self._files))).close()
+            self._files[file] = self._paths[file].open("rb")
+        message = read_message(self._files[file], place)
+        return None if message is None else decoded(message, _DECODER)
+
+    def _read_form(self, file: int, place: int) -> OutcomeForm | None:
+        record = self._read(file, place)
+        return record.form if isinstance(record, FormRecord) else None
+
+
+def _outcome_of(record: OutcomeRecord, form: OutcomeForm) -> Outcome | None:
+    """Return the outcome of a record and its form; None if they do not belong together."""
+    if len(record.numbers) % array("d").itemsize:
+        return None
+    numbers = array("d", record.numbers)
+    try:
+        return decode(form, numbers.tolist()) if form.n_numbers == len(numbers) else None
+    except (ValueError, OverflowError):  # Such as NaN segments.
+        return None
 
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """The place in a journal where the outcomes of some cases go. It travels to the process that judges them.
+    """The place in a journal where the outcomes of some cases go. It travels to the process that judges them."""
 
-    Attributes
-    ----------
-    folder : str
-        The folder of the journal; empty if there is none.
-    session : str
-        A word for the process that began or resumed the run.
-    row, first : int
-        The numbers of the row, and of the first of the cases.
-    """
-
-    folder: str
-    session: str
+    folder: str  # Empty if there is no journal.
+    session: str  # A word for the process that began or resumed the run.
     row: int
-    first: int
+    first: int  # The number of the first of the cases.
 
     def add(self, place: int, outcome: Outcome) -> None:
         """Append the outcome of the case at a place behind the first."""
         if self.folder:
-            _writer(self.folder, self.session).add_outcome(self.row, self.first + place, outcome)
+            _file_of(self.folder, self.session).add_outcome(self.row, self.first + place, outcome)
 
     @property
     def trouble(self) -> str:
         """The reason why this process could not write; empty if it could."""
-        return _writer(self.folder, self.session).trouble if self.folder else ""
+        return _file_of(self.folder, self.session).file.trouble if self.folder else ""
 
 
-_writers: dict[tuple[str, str, int], RecordWriter] = {}
+_files_of_process: dict[tuple[str, str, int], OutcomeFile] = {}
 
 
-def _writer(folder: str, session: str) -> RecordWriter:
+def _file_of(folder: str, session: str) -> OutcomeFile:
     """Return the file of this process. A process that was forked has another one than its parent."""
     key = folder, session, os.getpid()
-    if key not in _writers:
-        while len(_writers) >= _MOST_WRITERS:
-            _writers.pop(next(iter(_writers))).close()
-        _writers[key] = RecordWriter(Path(folder))
-    return _writers[key]
+    if key not in _files_of_process:
+        while len(_files_of_process) >= _MOST_WRITERS:
+            _files_of_process.pop(next(iter(_files_of_process))).file.close()
+        _files_of_process[key] = OutcomeFile(Path(folder))
+    return _files_of_process[key]
 
 
 class Journal:
-    """The journal of a run that is going on: what is known from earlier processes, and the place for what comes.
+    """What is known of a run from earlier processes (`sources`), and the folder for what comes; None to keep nothing.
 
-    Parameters
-    ----------
-    plan : Plan
-        The plan.
-    folder : Path | None
-        The folder that is written to; None to write nothing.
-    sources : Sequence[Path]
-        The folders that are read.
-
-    Attributes
-    ----------
-    plan : Plan
-        The plan.
-    folder : Path | None
-        The folder that is written to.
-    trouble : str
-        What kept a process from writing; empty if nothing did.
+    `trouble` is the first thing that kept a process from writing; empty if nothing did.
     """
 
-    def __init__(self, plan: Plan, folder: Path | None = None, sources: Sequence[Path] = ()) -> None:
-        self.plan, self.folder = plan, folder
+    def __init__(self, plan: Plan | None = None, folder: Path | None = None, sources: Sequence[Path] = ()) -> None:
+        plan = plan or Plan()
+        self.folder = folder
         self.trouble = ""
         self._session = token_hex(4)
         names = [(name, id_) for name in plan.formulations for id_ in plan.properties]
         self._rows = {key: number for number, key in enumerate(names)}
-        self._known = KnownOutcomes(sources, len(names), max(_LEAST_ROOM, 2 * plan.examples))
-
-    @property
-    def known(self) -> KnownOutcomes:
-        """The outcomes of earlier processes."""
-        return self._known
+        self.known = KnownOutcomes(sources, len(names), max(_LEAST_ROOM, 2 * plan.examples))
 
     def notes(self, formulation: str, property_id: str, first: int) -> Notes:
         """Return the place for the outcomes of some cases of a row; `WITNESS` is the number of its witness."""
-        folder = "" if self.folder is None else str(self.folder)
-        return Notes(folder, self._session, self._rows[formulation, property_id], first)
+        if self.folder is None:
+            return Notes("", "", 0, first)
+        return Notes(str(self.folder), self._session, self._rows[formulation, property_id], first)
 
     def outcomes(self, formulation: str, property_id: str, first: int, count: int) -> dict[int, Outcome]:
         """Return {place behind the first: outcome} of those of some cases of a row that are judged already."""
-        row = self._rows[formulation, property_id]
-        earlier = ((place, self._known.outcome(row, first + place)) for place in range(count))
+        row = self._rows.get((formulation, property_id))
+        if row is None:
+            return {}
+        earlier = ((place, self.known.outcome(row, first + place)) for place in range(count))
         return {place: outcome for place, outcome in earlier if outcome is not None}
 
     def block(self, group: str, number: int) -> BlockRecord | None:
         """Return what is known of a block of cases; None if it was not drawn."""
-        return self._known.blocks.get((group, number))
+        return self.known.blocks.get((group, number))
 
     def add_block(self, block: BlockRecord) -> None:
         """Note that a block was drawn."""
-        if self.folder is not None and (block.group, block.number) not in self._known.blocks:
-            writer = _writer(str(self.folder), self._session)
+        if self.folder is not None and (block.group, block.number) not in self.known.blocks:
+            writer = _file_of(str(self.folder), self._session)
             writer.add_block(block)
-            self.note_trouble(writer.trouble)
+            self.note_trouble(writer.file.trouble)
 
     def note_trouble(self, trouble: str) -> None:
         """Keep the first reason why something could not be written."""
@@ -167,28 +275,25 @@ class Journal:
 
     def close(self) -> None:
         """Close all files, and let the operating system write that of this process to the disk."""
-        self._known.close()
-        if self.folder is not None and (writer := _writers.pop((str(self.folder), self._session, os.getpid()), None)):
-            writer.sync()
-            self.note_trouble(writer.trouble)
-            writer.close()
+        self.known.close()
+        key = str(self.folder), self._session, os.getpid()
+        if self.folder is not None and (writer := _files_of_process.pop(key, None)):
+            writer.file.sync()
+            self.note_trouble(writer.file.trouble)
+            writer.file.close()
 
 
-NO_PLAN = Plan(
-    command="", options={}, folder="", versions={}, formulations=(), properties=(), profile="", examples=0, seed=0
-)
+def read_plan(folder: Path, argument: str) -> Plan:
+    """Return the plan of a journal of a run, one of this format."""
+    plan = read_header(folder, Plan, argument)
+    if plan.format != FORMAT:
+        raise MisuseError(argument, f"{folder.name} with format {plan.format}", f"a journal of format {FORMAT}")
+    return plan
 
 
-class NoJournal(Journal):
-    """The journal of a run that keeps none."""
-
-    def __init__(self) -> None:
-        super().__init__(NO_PLAN)
-
-    def notes(self, formulation: str, property_id: str, first: int) -> Notes:
-        """Return a place where nothing is written."""
-        return Notes("", "", 0, first)
-
-    def outcomes(self, formulation: str, property_id: str, first: int, count: int) -> dict[int, Outcome]:
-        """Return nothing: no case is judged already."""
-        return {}
+def check_versions(journal: Mapping[str, str], here: Mapping[str, str], argument: str) -> None:
+    """Check that a run goes on with what it began with; the message names the first version or digest that differs."""
+    for name in sorted({*journal, *here}):
+        if journal.get(name) != here.get(name):
+            versions = f"{journal.get(name, 'nothing')} in the journal and {here.get(name, 'nothing')} here"
+            raise MisuseError(argument, f"{name.replace('_', ' ')}: {versions}", "the same, or a new run")

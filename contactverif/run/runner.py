@@ -31,7 +31,7 @@ from contactverif.run.judging import judge_case
 from contactverif.run.open_row import OpenRow
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.run_journal import Journal, NoJournal
+from contactverif.run.run_journal import Journal
 from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress
 from contactverif.run.witnesses import find_witness
@@ -126,7 +126,7 @@ def run(
         scene=scene,
     )
     rows = open_rows(loaded, questions, sampling, known)
-    journal = journal or NoJournal()
+    journal = journal or Journal()
     conductor = Conductor(sampling, Team(executor), progress or (lambda _: None), journal)
     make_run = partial(_make_run, conductor, rows, (*subjects, *properties), resolved)
     try:

@@ -22,12 +22,11 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.run.conductor import Conductor, block_name, groups_of
 from contactverif.run.driver import BLOCK, draws_blocks, number_of_blocks
-from contactverif.run.journal_folder import begin_journal, check_versions, read_plan, read_record, write_record
-from contactverif.run.journal_records import WITNESS, BlockRecord
+from contactverif.run.journal import begin_journal, read_record, write_record
 from contactverif.run.open_row import OpenRow
 from contactverif.run.packing import CaseChunk
 from contactverif.run.pieces import LIST_CHUNK, DrawnCases, JudgedCases, in_chunks
-from contactverif.run.run_journal import Journal, Plan
+from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Plan, check_versions, read_plan
 from contactverif.run.runner import check_once, open_rows
 from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress, Task

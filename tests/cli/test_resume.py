@@ -13,9 +13,8 @@ from asking import Ask, asking
 from fresh_process import MAIN, PYTHON
 from lossy_store import lose_one_outcome
 
-from contactverif.run.journal_folder import begin_journal, journal_folder
-from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.run_journal import NO_PLAN
+from contactverif.run.journal import begin_journal, journal_folder
+from contactverif.run.run_journal import KnownOutcomes, Plan
 from contactverif_reports.netcdf.differences import same_data
 
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
@@ -124,7 +123,7 @@ def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_pa
     answer = ask("verify", "--resume", unbroken)
     assert answer.status == 2
     assert "which is complete" in answer.err
-    begin_journal(journal_folder(tmp_path / "r.nc"), NO_PLAN, [])
+    begin_journal(journal_folder(tmp_path / "r.nc"), Plan(), [])
     answer = ask("verify", "nts", "--resume", tmp_path / "r.nc")
     assert answer.status == 2
     assert "names beside it; needed --jobs at most" in answer.err

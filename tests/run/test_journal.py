@@ -20,27 +20,24 @@ from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
 from contactverif.run import pieces
 from contactverif.run.completeness import find_gap
-from contactverif.run.journal_folder import (
-    begin_journal,
-    check_versions,
-    hold_journal,
-    journal_folder,
-    read_plan,
-    remove_journal,
-)
-from contactverif.run.journal_records import BlockRecord, RecordWriter, read_records
-from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.journal import begin_journal, hold_journal, journal_folder, read_messages, remove_journal
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.run_journal import NO_PLAN, Journal
+from contactverif.run.run_journal import (
+    BlockRecord,
+    Journal,
+    KnownOutcomes,
+    OutcomeFile,
+    Plan,
+    check_versions,
+    read_plan,
+)
 from contactverif.run.runner import Progress, RunStopped, run
 from contactverif.run.sampling import Sampling
 
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
 EXAMPLES = 30
-PLAN = msgspec.structs.replace(
-    NO_PLAN, formulations=NAMES, properties=PROPERTY_IDS, examples=EXAMPLES, seed=3, versions={"numpy_version": "2"}
-)
+PLAN = Plan(formulations=NAMES, properties=PROPERTY_IDS, examples=EXAMPLES, seed=3, versions={"numpy_version": "2"})
 
 
 def judge(journal: Journal | None) -> Run:
@@ -75,12 +72,12 @@ def outcome(number: float) -> Outcome:
 
 
 def test_what_is_read_is_what_was_noted(tmp_path: Path) -> None:
-    writer = RecordWriter(tmp_path)
+    writer = OutcomeFile(tmp_path)
     for number in range(5):
         writer.add_outcome(1, number - 1, outcome(number / 3))
     block = BlockRecord("7/cases", 2, 500, False, True)
     writer.add_block(block)
-    writer.close()
+    writer.file.close()
     known = KnownOutcomes([tmp_path], 2, 1000)
     assert [repr(known.outcome(1, number - 1)) for number in range(5)] == [repr(outcome(n / 3)) for n in range(5)]
     assert known.outcome(0, 0) is None
@@ -91,21 +88,21 @@ def test_what_is_read_is_what_was_noted(tmp_path: Path) -> None:
 
 
 def test_a_number_of_numpy_among_the_words_is_taken_for_what_it_is(tmp_path: Path) -> None:
-    writer = RecordWriter(tmp_path)
+    writer = OutcomeFile(tmp_path)
     whole = outcome(1.0)
     assert whole.measurement is not None
     measured = replace(whole.measurement, idle=np.True_, place=np.str_("row 3"))
     writer.add_outcome(0, 0, replace(whole, measurement=measured, breach=np.True_))
-    writer.close()
+    writer.file.close()
     known = KnownOutcomes([tmp_path], 1, 100)
     assert repr(known.outcome(0, 0)) == repr(whole)
     known.close()
 
 
 def test_half_a_character_in_the_words_of_a_plugin_is_spelled_out(tmp_path: Path) -> None:
-    writer = RecordWriter(tmp_path)
+    writer = OutcomeFile(tmp_path)
     writer.add_outcome(0, 0, replace(outcome(1.0), reason="\ud800"))
-    writer.close()
+    writer.file.close()
     known = KnownOutcomes([tmp_path], 1, 100)
     stored = known.outcome(0, 0)
     known.close()
@@ -114,13 +111,13 @@ def test_half_a_character_in_the_words_of_a_plugin_is_spelled_out(tmp_path: Path
 
 
 def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
-    writer = RecordWriter(tmp_path)
+    writer = OutcomeFile(tmp_path)
     for number in range(20):
         writer.add_outcome(0, number, outcome(float(number)))
-    writer.close()
+    writer.file.close()
     (path,) = tmp_path.glob("*.outcomes")
     data = path.read_bytes()
-    places = [place for place, _ in read_records(path)]
+    places = [place for place, _ in read_messages(path)]
     chance = random.Random(1)
     for _ in range(200):
         byte = chance.randrange(len(data))
@@ -129,7 +126,7 @@ def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
             damaged[byte] ^= 1 << chance.randrange(8)
         path.write_bytes(damaged)
         whole = sum(end <= byte for end in [*places[1:], len(data)])
-        assert [place for place, _ in read_records(path)] == places[:whole]
+        assert [place for place, _ in read_messages(path)] == places[:whole]
         known = KnownOutcomes([tmp_path], 1, 100)
         stored = [known.outcome(0, number) for number in range(20)]
         known.close()
@@ -138,10 +135,10 @@ def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
 
 
 def test_a_record_that_lies_is_not_believed(tmp_path: Path) -> None:
-    writer = RecordWriter(tmp_path)
+    writer = OutcomeFile(tmp_path)
     for row, number in ((0, 0), (5, 0), (-1, 0), (0, 10**9), (0, -7)):
         writer.add_outcome(row, number, outcome(1.0))
-    writer.close()
+    writer.file.close()
     known = KnownOutcomes([tmp_path], 2, 100)
     known.close()
     assert known.n_outcomes == 1

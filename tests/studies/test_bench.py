@@ -7,9 +7,12 @@ import os
 import signal
 import subprocess
 import time
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 import xarray as xr
@@ -22,12 +25,13 @@ from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.accuracy import solve_in_tries
 from contactverif.problems.hertz_errors import HertzStudy, hertz_errors
+from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
 from contactverif.run.registry import load_formulation
+from contactverif.studies.bench.bench_journal import Header, Journal
 from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
 from contactverif.studies.bench.bench_scenes import make_task
 from contactverif.studies.bench.bench_study import run_bench
-from contactverif.studies.bench.cell_runs import run_cell
-from contactverif.studies.bench.journal import Journal, journal_of
+from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
 
 WAVY = Cell("wavy", 1, 30.0)
@@ -156,29 +160,50 @@ def test_random_scenes_are_the_same_for_the_same_seed() -> None:
     assert scenes[0].interface.nodes.tolist() != scenes[2].interface.nodes.tolist()
 
 
-def test_a_torn_line_is_cut_off_and_another_plan_is_refused(tmp_path: Path) -> None:
-    output = tmp_path / "a.nc"
-    Journal(output, {"plan": 1}).add(0, {"x": 1.5})
-    path = journal_of(output)
-    whole = path.read_bytes()
-    path.write_bytes(whole + b'{"cell": 1, "rec')
-    journal = Journal(output, {"plan": 1})
-    assert journal.finished == {0: {"x": 1.5}}
-    assert path.read_bytes() == whole
-    journal.add(1, {"x": 2})
-    assert [json.loads(line) for line in path.read_text().splitlines()][-1] == {"cell": 1, "record": {"x": 2}}
-    with pytest.raises(MisuseError, match="the journal of another bench"):
-        Journal(output, {"plan": 2})
+HEADER = Header(make_plan(["wavy"], quick=True), ("a",), {"numpy_version": "2"})
+RECORD = CellRecord(4, 10, [0.5], {"a": RunRecord(0, "", {"error": np.float64(1.5)}, {"steps": 3}, {"all": [0.25]})})
 
 
-@pytest.mark.parametrize("line", ["{", "[]", '{"cell": 0}', '{"cell": "x", "record": {}}', "[" * 100000, "\xff\x00"])
-def test_a_damaged_journal_is_one_line(tmp_path: Path, line: str) -> None:
+def note(output: Path, *cells: tuple[int, CellRecord]) -> None:
+    """Append finished cells to the journal of an output file."""
+    with closing(Journal(output, HEADER)) as journal:
+        for number, record in cells:
+            journal.add(number, record)
+
+
+def finished(output: Path, header: Header = HEADER) -> dict[int, CellRecord]:
+    with closing(Journal(output, header)) as journal:
+        return journal.finished
+
+
+def test_a_torn_record_is_left_out_and_another_plan_is_refused(tmp_path: Path) -> None:
     output = tmp_path / "a.nc"
-    Journal(output, {"plan": 1})
-    with journal_of(output).open("a", encoding="latin-1") as file:
-        file.write(line + "\n")
-    with pytest.raises(MisuseError, match=r"--out: found .*a.nc.journal, which is damaged \(\w+\); needed"):
-        Journal(output, {"plan": 1})
+    note(output, (0, RECORD), (2, RECORD))
+    (path,) = record_files(tmp_path / "a.nc.journal")
+    path.write_bytes(path.read_bytes()[:-1])
+    assert finished(output) == {0: RECORD}
+    note(output, (1, RECORD))
+    assert finished(output) == {0: RECORD, 1: RECORD}
+    for other in ({"formulations": ("b",)}, {"versions": {}}):
+        with pytest.raises(MisuseError, match="the journal of another bench"):
+            Journal(output, msgspec.structs.replace(HEADER, **other))
+
+
+@pytest.mark.parametrize("message", [b"\xff", b"\x90", msgspec.msgpack.encode({"number": "x", "record": {}})])
+def test_a_record_that_is_none_is_not_believed(tmp_path: Path, message: bytes) -> None:
+    output = tmp_path / "a.nc"
+    note(output, (0, RECORD), (1, replace(RECORD, runs={"b": RunRecord()})))
+    with closing(RecordFile(tmp_path / "a.nc.journal")) as file:
+        file.append(message)
+    assert finished(output) == {0: RECORD}
+
+
+@pytest.mark.parametrize("header", [b"", b"{", b"\xff" * 100])
+def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
+    finished(tmp_path / "a.nc")
+    (tmp_path / "a.nc.journal" / "header").write_bytes(header)
+    with pytest.raises(MisuseError, match=r"--out: found a.nc.journal with a damaged header; needed an undamaged"):
+        Journal(tmp_path / "a.nc", HEADER)
 
 
 @pytest.mark.parametrize(
@@ -200,21 +225,21 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
     arguments = [*MAIN, *ARGUMENTS, "--quick", "--out"]
     killed, unbroken = tmp_path / "killed.nc", tmp_path / "unbroken.nc"
     process = subprocess.Popen([*arguments, str(killed)], env=environment, stdout=subprocess.DEVNULL)
-    journal, deadline = journal_of(killed), time.monotonic() + 120
-    while not (journal.exists() and len(journal.read_text().splitlines()) >= 2):  # The plan, and one finished cell.
+    journal, deadline = journal_folder(killed), time.monotonic() + 120
+    while not any(path.stat().st_size for path in record_files(journal)):  # One finished cell.
         assert process.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.005)
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     assert not killed.exists()
-    first = journal.read_text().splitlines()[1]
+    [(_, first)] = [*read_messages(record_files(journal)[0])][:1]
     for target in (killed, unbroken):
         subprocess.run([*arguments, str(target)], env=environment, check=True, stdout=subprocess.DEVNULL)
     assert not journal.exists()
     with xr.open_datatree(killed, engine="netcdf4") as resumed, xr.open_datatree(unbroken, engine="netcdf4") as other:
         xr.testing.assert_identical(resumed.to_dataset().drop_attrs(), other.to_dataset().drop_attrs())
         assert resumed["timing/seconds"].shape == other["timing/seconds"].shape
-        record = json.loads(first)["record"]
+        record = msgspec.msgpack.decode(first)["record"]
         stored = resumed["timing/yardstick_seconds"].values[0].tolist()
     assert stored == record["yardstick"]  # What was measured before the kill was not measured again.

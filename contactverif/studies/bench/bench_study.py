@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from contextlib import ExitStack, closing
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.run.provenance import collect_provenance
+from contactverif.studies.bench.bench_journal import Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
-from contactverif.studies.bench.journal import Journal
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
 
 Progress = Callable[
@@ -41,7 +41,7 @@ def run_bench(
         The cells and the number of repeats.
     output : Path | None
         The file that the results go to. A journal beside it keeps what is finished; a bench that was killed goes on
-        with the same plan. Whoever writes the file removes the journal. None keeps no journal.
+        with the same plan. The caller that writes the file removes the journal. None keeps no journal.
     progress : Callable[[str, int, int], None] | None
         A function that is called before every cell and at the end.
 
@@ -61,8 +61,10 @@ def run_bench(
     provenance = collect_provenance(profile="", examples=0, seed=plan.seed)
     del provenance["profile"], provenance["examples"]  # A bench has neither.
     names = [subject.name for subject in loaded]
-    journal = Journal(output, _describe(plan, names, provenance)) if output else None
-    records = _run_cells(loaded, plan, journal, progress or _show_nothing)
+    with ExitStack() as stack:
+        header = Header.of(plan, names, provenance)
+        journal = stack.enter_context(closing(Journal(output, header))) if output else None
+        records = _run_cells(loaded, plan, journal, progress or _show_nothing)
     not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)}
     return collect_results(names, plan, records, not_loaded, provenance)
 
@@ -79,28 +81,13 @@ def _run_cells(
     for number, cell in enumerate(plan.cells):
         progress(f"{cell.scene}, mesh {cell.mesh}, penalty {cell.stiffness:g}", number, len(plan.cells))
         if journal is not None and number in journal.finished:
-            records.append(_stored_record(journal, number))
+            records.append(journal.finished[number])
             continue
         records.append(run_cell(cell, loaded, plan.repeats, plan.seed))
         if journal is not None:
-            journal.add(number, records[-1].as_dict())
+            journal.add(number, records[-1])
     progress("writing", len(plan.cells), len(plan.cells))
     return records
-
-
-def _stored_record(journal: Journal, number: int) -> CellRecord:
-    """Return the record of a cell that the journal holds.
-
-    Raises
-    ------
-    MisuseError
-        If it is none.
-    """
-    try:
-        return CellRecord.from_dict(journal.finished[number])
-    except (AttributeError, KeyError, TypeError) as error:
-        damage = f"{journal.path}, which is damaged ({type(error).__name__} in cell {number})"
-        raise MisuseError("--out", damage, "an undamaged journal, another name, or no such file") from error
 
 
 def collect_results(
@@ -157,9 +144,3 @@ def _list_remarks(names: Sequence[str], rows: list[list[RunRecord]]) -> dict[tup
 def _array(rows: list[list[RunRecord]], entry: Callable[[RunRecord], Any], dtype: type) -> Any:
     """Return an array (n_formulations, n_cells, …) of what `entry` gives for each run."""
     return np.array([[entry(run) for run in row] for row in rows], dtype)
-
-
-def _describe(plan: BenchPlan, names: list[str], provenance: dict[str, str]) -> dict[str, Any]:
-    """Return what must agree before a killed bench goes on."""
-    versions = {name: value for name, value in provenance.items() if name.endswith("_version") or name == "commit"}
-    return {"plan": asdict(plan), "formulations": names, "versions": versions}

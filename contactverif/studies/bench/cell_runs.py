@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from time import process_time
-from typing import Any
 
 import numpy as np
 
@@ -58,7 +57,7 @@ class RunRecord:
 
 @dataclass(slots=True)
 class CellRecord:
-    """All formulations in one cell; `as_dict` is what the journal keeps.
+    """All formulations in one cell, as the journal keeps it.
 
     Attributes
     ----------
@@ -74,16 +73,6 @@ class CellRecord:
     unknowns: int
     yardstick: list[float]
     runs: dict[str, RunRecord]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the record as plain lists, numbers and words."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> CellRecord:
-        """Return the record that `as_dict` wrote."""
-        runs = {name: RunRecord(**run) for name, run in plain["runs"].items()}
-        return cls(plain["segments"], plain["unknowns"], plain["yardstick"], runs)
 
 
 def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -> CellRecord:

@@ -1,0 +1,253 @@
+"""The journal of a run or a bench: a folder beside its output file, from which a killed process goes on.
+
+A journal has a `header`, the plan, and a file of records for each process that writes, so that no lock is needed. A
+record is eight bytes (its length and its CRC-32) and a message of MessagePack, decoded by a schema: a journal may come
+from a stranger. At every moment, even if the process is killed, the folder has its whole header, or it is not there.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import struct
+import zlib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from secrets import token_hex
+from typing import IO, TypeVar
+
+import msgspec
+
+from contactverif.contract.errors import MisuseError
+
+SUFFIX = ".journal"
+RECORDS = ".outcomes"
+_HEADER = "header"
+_EARLIER = "earlier"
+_FRAME = struct.Struct("<II")
+_LARGEST = 2**26  # The largest record, in bytes.
+_Record = TypeVar("_Record", bound=msgspec.Struct)
+
+
+class RecordFile:
+    """A new file of records in a journal, for this process alone. After the first error of the disk it writes no more.
+
+    `trouble` says what went wrong; it is empty if nothing did.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.trouble = ""
+        self._end = 0
+        self._file: IO[bytes] | None = None
+        try:
+            self._file = (folder / f"{os.getpid()}-{token_hex(4)}{RECORDS}").open("xb", buffering=0)
+        except OSError as error:
+            self._stop(error)
+
+    def append(self, message: bytes) -> int | None:
+        """Append a record, and return its place in bytes; None if it does not stand there whole.
+
+        It goes to the operating system at once: a process that is killed loses none.
+        """
+        if self._file is None or len(message) > _LARGEST:
+            return None
+        place, data = self._end, _framed(message)
+        try:
+            written = self._file.write(data)
+            if written < len(data):  # The next attempt says what is wrong.
+                self._file.write(data[written:])
+                raise OSError("the disk took only a part of a record")
+        except OSError as error:
+            self._stop(error)
+            return None
+        self._end += len(data)
+        return place
+
+    def sync(self) -> None:
+        """Let the operating system write the file to the disk."""
+        if self._file is not None:
+            try:
+                os.fsync(self._file.fileno())
+            except OSError as error:
+                self._stop(error)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _stop(self, error: OSError) -> None:
+        """Note the error, and leave the file with whole records."""
+        self.trouble = error.strerror or str(error)
+        if self._file is not None:
+            with suppress(OSError):  # The reader cuts off what is not whole.
+                os.ftruncate(self._file.fileno(), self._end)
+            self.close()
+
+
+def record_files(folder: Path) -> list[Path]:
+    """Return the files of records of a journal."""
+    return sorted(folder.glob(f"*{RECORDS}"))
+
+
+def read_messages(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield (place in bytes, message) of each whole record, up to the first that is damaged."""
+    with open(path, "rb") as file:
+        place = 0
+        while (message := read_message(file, place)) is not None:
+            yield place, message
+            place = file.tell()
+
+
+def read_message(file: IO[bytes], place: int) -> bytes | None:
+    """Return the message of the record at a place; None if it is not whole, or there is none."""
+    if place < 0:
+        return None
+    file.seek(place)
+    head = file.read(_FRAME.size)
+    if len(head) < _FRAME.size:
+        return None
+    length, checksum = _FRAME.unpack(head)
+    message = file.read(length) if length <= _LARGEST else b""
+    return message if len(message) == length and zlib.crc32(message) == checksum else None
+
+
+def write_record(path: Path, record: msgspec.Struct) -> None:
+    """Write a file with one record, whole and on the disk."""
+    part = path.with_name(f".{path.name}.part")
+    with open(part, "wb") as file:
+        file.write(_framed(msgspec.msgpack.encode(record)))
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(part, path)
+
+
+def read_record(path: Path, kind: type[_Record]) -> _Record | None:
+    """Return the one record of a file; None if it is damaged. Without such a file there is an `OSError`."""
+    with open(path, "rb") as file:
+        message = read_message(file, 0)
+        if message is None or file.read(1):
+            return None
+    return decoded(message, msgspec.msgpack.Decoder(kind))
+
+
+def decoded(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Record | None:
+    """Return the record of a message; None if it is none of these."""
+    try:
+        return decoder.decode(message)
+    except (msgspec.MsgspecError, ValueError, RecursionError):
+        return None
+
+
+def _framed(message: bytes) -> bytes:
+    return _FRAME.pack(len(message), zlib.crc32(message)) + message
+
+
+def journal_folder(output: Path, argument: str = "--out") -> Path:
+    """Return the folder of the journal of an output file; of a link, that beside the file itself."""
+    try:
+        output.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise MisuseError(argument, f"{output.name}, a link that leads to itself", "another name") from None
+    target = output.resolve()
+    return target.with_name(target.name + SUFFIX)
+
+
+def begin_journal(folder: Path, plan: msgspec.Struct, outputs: Iterable[Path], argument: str = "--out") -> str:
+    """Make a new journal, and move the output files of an earlier run into it.
+
+    A journal that is there is set aside; the name of its folder is returned, which is empty if there was none. It must
+    belong to no run that is going on.
+    """
+    aside = _aside(folder)
+    had_one = folder.exists() or folder.is_symlink()
+    try:
+        if had_one:
+            with hold_journal(folder, argument):
+                shutil.rmtree(aside, ignore_errors=True)
+                os.replace(folder, aside)
+        part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir()
+        write_record(part / _HEADER, plan)
+        os.replace(part, folder)
+        for path in aside.glob(f"{_EARLIER}.*"):
+            os.replace(path, folder / path.name)
+        keep_earlier(folder, outputs)
+    except OSError as error:
+        needed = "a folder that may be written to, and a disk that is not full"
+        raise MisuseError(argument, f"{folder.name}: {error.strerror}", needed) from error
+    return aside.name if had_one else ""
+
+
+def keep_earlier(folder: Path, outputs: Iterable[Path]) -> None:
+    """Move the output files of an earlier run into the journal, so that they are not taken for those of this run."""
+    for output in outputs:
+        target = output.resolve()
+        if target.exists():
+            os.replace(target, folder / f"{_EARLIER}{target.suffix}")
+
+
+def withdraw_journal(folder: Path, outputs: Iterable[Path]) -> None:
+    """Take back what `begin_journal` did, if nothing was judged: the command line was wrong, as it turned out."""
+    if any(path.stat().st_size for path in record_files(folder)):
+        return
+    for output in outputs:
+        target = output.resolve()
+        earlier = folder / f"{_EARLIER}{target.suffix}"
+        if earlier.exists() and not target.exists():
+            os.replace(earlier, target)
+    shutil.rmtree(folder, ignore_errors=True)
+    if _aside(folder).exists():
+        os.replace(_aside(folder), folder)
+
+
+def remove_journal(folder: Path) -> None:
+    """Remove a journal whose output is complete, with what it kept of earlier runs."""
+    for path in (folder, _aside(folder)):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _aside(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}.{_EARLIER}")
+
+
+@contextmanager
+def hold_journal(folder: Path, argument: str) -> Iterator[None]:
+    """Open a block in which no other process goes on with this journal, where the file system has locks.
+
+    The lock ends with the process, whatever ends that.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows has none.
+        yield
+        return
+    try:
+        file = (folder / _HEADER).open("rb")
+    except OSError:
+        raise MisuseError(argument, f"{folder.name}, which is no journal of a run", "another name") from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            needed = "its end, or another name"
+            raise MisuseError(argument, f"{folder.name}, of a run that is going on", needed) from None
+        except OSError:
+            pass
+        yield
+
+
+def read_header(folder: Path, kind: type[_Record], argument: str) -> _Record:
+    """Return the plan of a journal."""
+    try:
+        plan = read_record(folder / _HEADER, kind)
+    except OSError:
+        raise MisuseError(argument, f"no journal {folder.name}", "that of a run that was stopped") from None
+    if plan is None:
+        raise MisuseError(argument, f"{folder.name} with a damaged header", "an undamaged journal, or another name")
+    return plan

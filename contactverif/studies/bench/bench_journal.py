@@ -1,0 +1,78 @@
+"""The journal of a bench: every finished cell, on the disk before the next one begins, so that a killed bench goes on.
+
+A journal of another plan is refused, and never overwritten. A cell whose record is damaged is run again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from contactverif.contract.errors import MisuseError
+from contactverif.run.journal import (
+    RecordFile,
+    begin_journal,
+    decoded,
+    journal_folder,
+    read_header,
+    read_messages,
+    record_files,
+)
+from contactverif.studies.bench.bench_plan import BenchPlan
+from contactverif.studies.bench.cell_runs import CellRecord
+
+
+class Header(msgspec.Struct, frozen=True):
+    """What must agree before a killed bench goes on."""
+
+    bench: BenchPlan
+    formulations: tuple[str, ...]
+    versions: dict[str, str]
+
+    @classmethod
+    def of(cls, plan: BenchPlan, names: Sequence[str], provenance: Mapping[str, str]) -> Header:
+        """Return the header of a bench of some formulations, with the versions of its provenance."""
+        versions = {key: fact for key, fact in provenance.items() if key.endswith("_version") or key == "commit"}
+        return cls(plan, tuple(names), versions)
+
+
+class FinishedCell(msgspec.Struct, frozen=True):
+    """The record of a cell that is finished."""
+
+    number: int
+    record: CellRecord
+
+
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=float)  # Numbers of numpy are numbers of a type of their own.
+_DECODER = msgspec.msgpack.Decoder(FinishedCell)
+
+
+class Journal:
+    """The journal of one output file. `finished` has the records of the cells that are finished, by number."""
+
+    def __init__(self, output: Path, header: Header) -> None:
+        folder = journal_folder(output)
+        self.finished: dict[int, CellRecord] = {}
+        if not folder.exists():
+            begin_journal(folder, header, ())
+        elif read_header(folder, Header, "--out") != header:
+            needed = "the same command and version, or another name, or no such folder"
+            raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
+        for path in record_files(folder):
+            for _, message in read_messages(path):
+                cell = decoded(message, _DECODER)
+                if cell is not None and cell.record.runs.keys() == {*header.formulations}:
+                    self.finished[cell.number] = cell.record
+        self._file = RecordFile(folder)
+
+    def add(self, number: int, record: CellRecord) -> None:
+        """Append the record of a cell that is finished."""
+        self._file.append(_ENCODER.encode(FinishedCell(number, record)))
+        self._file.sync()
+        self.finished[number] = record
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
