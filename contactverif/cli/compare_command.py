@@ -106,11 +106,11 @@ def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
     if resume is None and not any(typed.names[:1]):
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
     job = new_job(typed, command=COMPARE) if resume is None else resumed_job(resume, typed, COMPARE)
-    from contactverif.cli.formulation_comparison import compare_formulations, load_contest
+    from contactverif.cli.formulation_comparison import compare_formulations, load_plan
 
     reference, *candidates = job.options.names
-    contest = load_contest(candidates, reference, job.options.properties, job.options.isolation.limits())
-    return compare_formulations(contest, job)
+    plan = load_plan(candidates, reference, job.options.properties, job.options.isolation.limits())
+    return compare_formulations(plan, job)
 
 
 def _compare_reports(reports: Sequence[Path], globs: Sequence[str], out: Sequence[Path] | None) -> bool:

@@ -1,7 +1,4 @@
-"""The tables of a comparison of formulations: results, errors, Newton iterations and cost, then the meshes.
-
-Rule for the next editor: where a table is too wide, only its first column gives way. A number that is cut off is wrong.
-"""
+"""The tables of a comparison of formulations: results, errors, Newton iterations and cost, then the meshes."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from contactverif.cli.console import plain_table, result_text
+from contactverif.cli.console import add_groups, indent_below, plain_table, result_text
 from contactverif.cli.run_tables import conclusion, headline
 from contactverif.contract.property import Outcome
 from contactverif.studies.comparison_study import Study
@@ -52,8 +49,7 @@ class SideBySide:
 
 def results_table(comparison: Comparison) -> Table:
     """Return a line for each property and a column for each formulation, with a mark where verdicts differ."""
-    table = plain_table(f"results ({DIFFERS}: not that of {comparison.reference})")
-    table.add_column("property", no_wrap=True)
+    table = plain_table(f"results ({DIFFERS}: not that of {comparison.reference})", words=("property",))
     for name in comparison.formulations:
         table.add_column(name, overflow="fold")
     for property_id in comparison.properties:
@@ -73,118 +69,76 @@ def _result(cell: Cell | None, reference: Cell | None) -> Text:
 def errors_table(comparison: Comparison, *, with_worst: bool = True, with_counts: bool = True) -> Table:
     """Return the errors over their tolerances, and each formulation beside the reference case by case.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The numbers.
-    with_worst : bool
-        Add the worst number in its own unit, for which there is no room in 80 columns.
-    with_counts : bool
-        Add the numbers of cases that are better, equal and worse.
+    The worst number in its own unit has no room in 80 columns.
     """
+
+    def cells(cell: Cell) -> list[str]:
+        paired = comparison.paired.get((cell.formulation, cell.property_id))
+        beside = [""] * 4
+        if paired is not None:
+            beside = [number(paired.ratio), *map(str, (paired.better, paired.equal, paired.worse))]
+        worst = f"{number(cell.closest.value)} {cell.closest.quantity.name}" if cell.closest is not None else ""
+        numbers = [number(cell.median), number(cell.worst), *beside[: 4 if with_counts else 1]]
+        return [f"  {cell.formulation}", *numbers, *([worst] if with_worst else [])]
+
     title = f"error over tolerance, above 1 fails; ratio and numbers of cases beside {comparison.reference}"
     columns = ("median", "worst", "ratio", *(("better", "equal", "worse") if with_counts else ()))
-    table = _numbers_table(title, columns)
+    table = plain_table(title, "", width=NAME_WIDTH, numbers=columns, dense=not with_worst)
     if with_worst:
         table.add_column("worst number", no_wrap=True, overflow="ellipsis")
-    else:
-        table.padding = (0, 1, 0, 0)
-    for property_id in comparison.properties:
-        keys = [(name, property_id) for name in comparison.formulations]
-        cells = [comparison.cells[key] for key in keys if key in comparison.cells]
-        measured = [cell for cell in cells if not isnan(cell.worst)]
-        if measured:
-            table.add_row(Text(property_id, style="bold"))
-        for cell in measured:
-            table.add_row(*_errors(cell, comparison, with_counts=with_counts), *([_worst(cell)] if with_worst else []))
+    keys = [(name, property_id) for property_id in comparison.properties for name in comparison.formulations]
+    measured = [comparison.cells[key] for key in keys if key in comparison.cells]
+    add_groups(table, [cell for cell in measured if not isnan(cell.worst)], lambda cell: cell.property_id, cells)
     return table
-
-
-def _errors(cell: Cell, comparison: Comparison, *, with_counts: bool) -> list[str]:
-    """Return name, median, worst, ratio and counts of one formulation."""
-    paired = comparison.paired.get((cell.formulation, cell.property_id))
-    beside = [""] * 4
-    if paired is not None:
-        beside = [number(paired.ratio), str(paired.better), str(paired.equal), str(paired.worse)]
-    return [f"  {cell.formulation}", number(cell.median), number(cell.worst), *beside[: 4 if with_counts else 1]]
-
-
-def _worst(cell: Cell) -> str:
-    return f"{number(cell.closest.value)} {cell.closest.quantity.name}" if cell.closest is not None else ""
 
 
 def iterations_table(comparison: Comparison, *, with_counts: bool = True) -> Table:
     """Return Newton's iterations for each property that solves, and beside the reference where both converged."""
+
+    def cells(line: Iterations) -> list[str]:
+        is_reference = line.formulation == comparison.reference
+        counts = [""] * 3 if is_reference else [str(line.fewer), str(line.same), str(line.more)]
+        order = "" if isnan(line.order) else number(line.order)
+        numbers = [f"{line.converged}/{line.solved}", number(line.median), number(line.most)]
+        return [f"  {line.formulation}", *numbers, *(counts if with_counts else []), order]
+
     title = f"Newton iterations where it converged; numbers of cases beside {comparison.reference}"
     columns = ("converged", "median", "most", *(("fewer", "same", "more") if with_counts else ()), "order")
-    table = _numbers_table(title, columns)
-    before = None
-    for line in comparison.iterations:
-        if line.title != before:
-            table.add_row(Text(line.title, style="bold"))
-        before = line.title
-        counts = _counts(line, comparison.reference) if with_counts else []
-        order = "" if isnan(line.order) else number(line.order)
-        converged = f"{line.converged}/{line.solved}"
-        table.add_row(f"  {line.formulation}", converged, number(line.median), number(line.most), *counts, order)
+    table = plain_table(title, "", width=NAME_WIDTH, numbers=columns)
+    add_groups(table, comparison.iterations, lambda line: line.title, cells)
     return table
-
-
-def _counts(line: Iterations, reference: str) -> list[str]:
-    """Return the counts against the reference; nothing for the reference itself."""
-    if line.formulation == reference:
-        return ["", "", ""]
-    return [str(line.fewer), str(line.same), str(line.more)]
 
 
 def cost_table(study: Study, *, with_parts: bool = True) -> Table:
     """Return the time of an evaluation on shared states, in turns."""
     parts, reference = PARTS if with_parts else (), study.comparison.reference
-    title = f"time of one evaluation, µs, in turns on a flat interface; ratio to {reference}"
-    table = _numbers_table(title, (*parts, "all", "a segment", "ratio"))
     totals = {cost.n_segments: cost.total for cost in study.costs if cost.formulation == reference}
-    before = 0
-    for cost in study.costs:
-        if cost.n_segments != before:
-            table.add_row(Text(f"{cost.n_segments} slave segments", style="bold"))
-        before = cost.n_segments
-        times = ["–"] * (len(parts) + 3) if cost.failed else _times(cost, parts, totals[cost.n_segments])
-        table.add_row(f"  {cost.formulation}", *times)
-    return table
 
+    def cells(cost: Cost) -> list[str]:
+        if cost.failed:
+            return [f"  {cost.formulation}", *["–"] * (len(parts) + 3)]
+        ratio = cost.total / totals[cost.n_segments]
+        times = [_microseconds(seconds) for seconds in (*(cost.seconds[part] for part in parts), cost.total)]
+        per_segment = f"{1e6 * cost.total / cost.n_segments:.2f}"
+        return [f"  {cost.formulation}", *times, per_segment, "–" if isnan(ratio) else f"{ratio:.2f}"]
 
-def _times(cost: Cost, parts: tuple[str, ...], reference: float) -> list[str]:
-    total = cost.total
-    ratio = "–" if isnan(total) or isnan(reference) else f"{total / reference:.2f}"
-    per_segment = f"{1e6 * total / cost.n_segments:.2f}"
-    return [*(_microseconds(cost.seconds[part]) for part in parts), _microseconds(total), per_segment, ratio]
-
-
-def _numbers_table(title: str, columns: tuple[str, ...]) -> Table:
-    """Return a table with a column of names and columns of numbers."""
-    table = plain_table(title)
-    table.add_column("", overflow="fold", min_width=NAME_WIDTH)
-    for column in columns:
-        table.add_column(column, justify="right", no_wrap=True)
+    title = f"time of one evaluation, µs, in turns on a flat interface; ratio to {reference}"
+    table = plain_table(title, "", width=NAME_WIDTH, numbers=(*parts, "all", "a segment", "ratio"))
+    add_groups(table, study.costs, lambda cost: f"{cost.n_segments} slave segments", cells)
     return table
 
 
 def mesh_text(differing: Differing, reference: str) -> Text:
     """Return the case on which a candidate and the reference differ most: both verdicts, and a drawing."""
-    outcome, reference_outcome = (
-        outcome_words(differing.outcome, differing.margin),
-        outcome_words(differing.reference_outcome, differing.reference_margin),
-    )
-    lines = [
+    return indent_below(
         f"{differing.info.id}, case {differing.number}",
-        f"    {differing.formulation}: {outcome}",
-        f"    {reference}: {reference_outcome}",
-        *(f"    {line}" for line in as_text(differing.case).splitlines()),
-    ]
-    return Text("\n".join(["", *lines]))
+        f"{differing.formulation}: {_outcome(differing.outcome, differing.margin)}",
+        f"{reference}: {_outcome(differing.reference_outcome, differing.reference_margin)}",
+        *as_text(differing.case).splitlines(),
+    )
 
 
-def outcome_words(outcome: Outcome, margin: float) -> str:
+def _outcome(outcome: Outcome, margin: float) -> str:
     """Return a verdict with the error over its tolerance, or with the reason why it is no pass."""
     if not isfinite(margin):
         return f"{outcome.verdict}, {shorten(outcome.reason, REASON_LENGTH, placeholder=' …')}"

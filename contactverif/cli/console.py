@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import NoReturn
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
+from typing import NoReturn, TypeVar
 
 import typer
 from rich import box
@@ -29,6 +32,7 @@ STYLES = {  # Red only where the run fails by it. What a formulation states abou
     Result.NOT_JUDGED: "yellow",
     Result.UNDECIDED: "yellow",
 }
+_Item = TypeVar("_Item")
 PLAIN_STYLE = "dim"  # The style of the other results.
 _PIPE_WIDTH = 140  # The number of columns where no terminal says how many there are.
 
@@ -73,11 +77,61 @@ def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False
     return Segments([Segment(printable(line.text), line.style) for line in lines if not line.is_control])
 
 
-def plain_table(title: str) -> Table:
-    """Return a table without lines that a narrow terminal would break."""
-    return Table(
+def plain_table(
+    title: str = "",
+    name: str | None = None,
+    *,
+    width: int | None = None,
+    words: Sequence[str] = (),
+    numbers: Sequence[str] = (),
+    dense: bool = False,
+) -> Table:
+    """Return a table without lines that a narrow terminal would break.
+
+    Only the column `name`, at least `width` wide, gives way where the terminal is narrow: a number that is cut off is
+    wrong. Behind it are columns of `words`, left-aligned, and of `numbers`, right-aligned.
+    """
+    table = Table(
         title=title or None, title_justify="left", title_style="bold", header_style="bold", box=box.SIMPLE_HEAD
     )
+    if dense:
+        table.padding = (0, 1, 0, 0)
+    if name is not None:
+        table.add_column(name, overflow="fold", min_width=width)
+    for word in words:
+        table.add_column(word, no_wrap=True)
+    for number in numbers:
+        table.add_column(number, justify="right", no_wrap=True)
+    return table
+
+
+def add_groups(
+    table: Table,
+    items: Iterable[_Item],
+    heading: Callable[[_Item], str],
+    cells: Callable[[_Item], Iterable[RenderableType]],
+) -> None:
+    """Add a row for each item, and a bold heading above the items of a group, which follow one another."""
+    for title, group in groupby(items, heading):
+        table.add_row(Text(title, style="bold"))
+        for item in group:
+            table.add_row(*cells(item))
+
+
+def line(words: str, style: str = "") -> Text:
+    """Return a line that the terminal does not wrap."""
+    return Text(words, style=style, no_wrap=True, overflow="ignore")
+
+
+def indent_below(title: str, *lines: str) -> Text:
+    """Return lines below a title and an empty line."""
+    return Text("\n".join(["", title, *(f"    {each}" for each in lines)]))
+
+
+def fold(words: str, width: int, style: str = "", *, indent: int = 6) -> Text:
+    """Return words of any length, indent_below, to stand below a line."""
+    lines = textwrap.wrap(words, max(width - indent, 20))
+    return line("\n".join(" " * indent + each for each in lines), style)
 
 
 def result_text(result: Result, before: str = "") -> Text:

@@ -6,11 +6,11 @@ Rule for the next editor: as in `run_tables`, a table reads a `Run` from memory 
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 
 from rich.text import Text
 
+from contactverif.cli.console import fold, line
 from contactverif.contract.case_counts import CaseCounts, add_by_kind, percent, total
 from contactverif.contract.coverage import Coverage, coverage_of
 from contactverif.contract.result import Run
@@ -39,21 +39,21 @@ def _shares(everything: Sequence[Coverage], width: int) -> Iterator[Text]:
     together = _together(everything)
     incomplete = [each for each in everything if each.counts.undecided or each.counts.idle]
     if not incomplete:
-        yield _fold(f"No case was undecided, and none was idle (nothing in contact){together}.", width, indent=0)
+        yield fold(f"No case was undecided, and none was idle (nothing in contact){together}.", width, "dim", indent=0)
         yield Text("")
         return
     title = f"Undecided cases, and idle ones (nothing in contact){together}"
-    yield _fold(title, width, indent=0, style="bold")
+    yield fold(title, width, "bold", indent=0)
     size = max(len("property"), *(len(each.info.id) for each in incomplete))
-    yield _line(f"  {'property':{size}}  {'cases':>7}  {'undecided':>9}  {'idle':>7}", style="bold")
+    yield line(f"  {'property':{size}}  {'cases':>7}  {'undecided':>9}  {'idle':>7}", style="bold")
     for each in incomplete:
         counts = each.counts
         shares = f"{percent(counts.undecided_share):>9}  {percent(counts.idle_share):>7}"
-        yield _line(f"  {each.info.id:{size}}  {counts.cases:7}  {shares}")
+        yield line(f"  {each.info.id:{size}}  {counts.cases:7}  {shares}")
         yield from _reasons(each.reasons, width)
     if len(incomplete) < len(everything):
         words = "In all other properties every case was decided, and something was in contact."
-        yield _fold(words, width, indent=2, style="dim")
+        yield fold(words, width, "dim", indent=2)
     yield Text("")
 
 
@@ -65,28 +65,28 @@ def _together(group: Sequence[Coverage]) -> str:
 def _reasons(reasons: Mapping[str, int], width: int) -> Iterator[Text]:
     """Yield the most frequent reasons of undecided cases."""
     for reason, number in list(reasons.items())[:_MOST_REASONS]:
-        yield _fold(f"{number} undecided: {reason}", width)
+        yield fold(f"{number} undecided: {reason}", width, "dim")
     if len(reasons) > _MOST_REASONS:
         more = sum(list(reasons.values())[_MOST_REASONS:])
-        yield _fold(f"{more} undecided for {len(reasons) - _MOST_REASONS} other reasons", width)
+        yield fold(f"{more} undecided for {len(reasons) - _MOST_REASONS} other reasons", width, "dim")
 
 
 def _kinds(group: Sequence[Coverage], width: int) -> Iterator[Text]:
     """Yield how many cases of each kind were judged, in all properties of a group together."""
     kinds = add_by_kind(each.kinds for each in group)
     properties = ", ".join(each.info.id for each in group)
-    yield _fold(f"Cases of each kind in {properties}{_together(group)}", width, indent=0, style="bold")
+    yield fold(f"Cases of each kind in {properties}{_together(group)}", width, "bold", indent=0)
     size = min(max(len("kind"), *map(len, kinds)), _LONGEST_KIND)
-    yield _line(f"  {'kind':{size}}  {_row(_KIND_COLUMNS)}", style="bold")
+    yield line(f"  {'kind':{size}}  {_row(_KIND_COLUMNS)}", style="bold")
     for kind, counts in kinds.items():
         style = "yellow" if counts.judged == counts.idle else ""  # Nothing of this kind was judged in contact.
-        yield _line(f"  {(kind or _NO_KIND)[:size]:{size}}  {_row(_numbers(counts))}", style=style)
-    yield _line(f"  {'all':{size}}  {_row(_numbers(total(kinds.values())))}", style="dim")
+        yield line(f"  {(kind or _NO_KIND)[:size]:{size}}  {_row(_numbers(counts))}", style=style)
+    yield line(f"  {'all':{size}}  {_row(_numbers(total(kinds.values())))}", style="dim")
     weak = [f"{each.info.id}: {text}" for each in group if (text := _weak_kinds(each))] if len(group) > 1 else []
     if weak:
-        yield _line("  Kinds of which a property could judge less than half:", style="yellow")
+        yield line("  Kinds of which a property could judge less than half:", style="yellow")
     for text in weak:
-        yield _fold(text, width)
+        yield fold(text, width, "dim")
     yield Text("")
 
 
@@ -102,12 +102,3 @@ def _numbers(counts: CaseCounts) -> tuple[str, ...]:
 
 def _row(cells: Sequence[str]) -> str:
     return "  ".join(f"{cell:>{len(name)}}" for name, cell in zip(_KIND_COLUMNS, cells, strict=True)).rstrip()
-
-
-def _line(words: str, style: str = "") -> Text:
-    return Text(words, style=style, no_wrap=True, overflow="ignore")
-
-
-def _fold(words: str, width: int, *, indent: int = 6, style: str = "dim") -> Text:
-    lines = textwrap.wrap(words, max(width - indent, 20))
-    return _line("\n".join(" " * indent + line for line in lines), style=style)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from contactverif.cli.case_pictures import draw_outcome
 from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
 from contactverif.cli.console import say, show, show_as_it_is
+from contactverif.cli.counterexample_output import draw_outcome
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import (
@@ -42,7 +42,7 @@ from contactverif_reports.netcdf.write import write
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contest:
+class ComparisonPlan:
     """A reference, its candidates and the properties by which they are compared."""
 
     reference: Subject
@@ -59,9 +59,9 @@ class Contest:
         return next(item for item in self.properties if isinstance(item, Property) and item.id == differing.info.id)
 
 
-def load_contest(
+def load_plan(
     names: Sequence[str], reference_name: str, globs: Sequence[str], limits: Limits | None = None
-) -> Contest:
+) -> ComparisonPlan:
     """Load the formulations and the properties."""
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
@@ -73,18 +73,18 @@ def load_contest(
         raise MisuseError("--against", error.found, error.needed) from None
     if isinstance(reference, NotLoaded):
         raise MisuseError("--against", f"{reference_name}, which does not load ({reference.reason})", "one that loads")
-    return Contest(reference, [load_formulation(name, limits) for name in names], properties)
+    return ComparisonPlan(reference, [load_formulation(name, limits) for name in names], properties)
 
 
-def compare_formulations(contest: Contest, job: VerifyJob) -> int:
+def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
     """Run all properties, show the tables and write the files; return the exit status."""
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             journal = stack.enter_context(job.journal())
             study = run_comparison(
-                contest.reference,
-                contest.candidates,
-                contest.properties,
+                plan.reference,
+                plan.candidates,
+                plan.properties,
                 profile=job.profile,
                 interface=job.interface,
                 scene=job.scene,
@@ -93,14 +93,14 @@ def compare_formulations(contest: Contest, job: VerifyJob) -> int:
                 journal=journal,
             )
         promises_kept = study.comparison.promises_kept
-        subjects = [contest.reference, *contest.candidates]
-        gap = find_gap(study.run, subjects, contest.properties, job.sampling) if promises_kept else ""
+        subjects = [plan.reference, *plan.candidates]
+        gap = find_gap(study.run, subjects, plan.properties, job.sampling) if promises_kept else ""
         # The files are written before anything is shown, so that nothing that was judged is lost.
-        written = _write_results(study, contest, job.files)
+        written = _write_results(study, plan, job.files)
         complete = written.paths == job.files.paths and not gap
         end_journal(journal, complete=complete)
     show(SideBySide(study))
-    _show_meshes(study, contest, job.pictures, on_a_page=PAGE in written.paths)
+    _show_meshes(study, plan, job.pictures, on_a_page=PAGE in written.paths)
     show_what_plugins_printed()
     written.announce()
     show(f"Not complete: {gap}." if gap else last_line(study.comparison))
@@ -109,23 +109,23 @@ def compare_formulations(contest: Contest, job: VerifyJob) -> int:
     return exit_status(gap, whole=complete and not journal.trouble, promises_kept=promises_kept)
 
 
-def _write_results(study: Study, contest: Contest, files: OutputFiles) -> OutputFiles:
+def _write_results(study: Study, plan: ComparisonPlan, files: OutputFiles) -> OutputFiles:
     """Write the report and the page that the user wants; return those that are there."""
 
     def write_html(path: Path) -> None:
-        drawings = [_page_drawing(differing, contest) for differing in study.differing]
+        drawings = [_page_drawing(differing, plan) for differing in study.differing]
         write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
 
     return write_files(files, {REPORT: partial(write, study.run), PAGE: write_html})
 
 
-def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *, on_a_page: bool) -> None:
+def _show_meshes(study: Study, plan: ComparisonPlan, folder: PictureFolder | None, *, on_a_page: bool) -> None:
     """Print the meshes that tell most, and draw all of them into the folder, if there is one."""
     for place, differing in enumerate(study.differing):
         if place < MOST_MESHES:
-            show_as_it_is(mesh_text(differing, contest.reference.name))
+            show_as_it_is(mesh_text(differing, plan.reference.name))
         if folder is not None:
-            for name in _draw_pictures(differing, contest, folder):
+            for name in _draw_pictures(differing, plan, folder):
                 say(f"    picture: {folder.name / name}")
     rest = study.differing[MOST_MESHES:]
     if rest and folder is None and not on_a_page:
@@ -133,19 +133,19 @@ def _show_meshes(study: Study, contest: Contest, folder: PictureFolder | None, *
         show(f"\nThey also differ on {ids}: --out FILE.html or --pictures FOLDER draws those meshes.")
 
 
-def _page_drawing(differing: Differing, contest: Contest) -> Drawing:
+def _page_drawing(differing: Differing, plan: ComparisonPlan) -> Drawing:
     """Return what the page's picture of a case needs: its scene solved by both, or the forces of both."""
-    candidate, reference = contest.subjects[differing.formulation], contest.reference
+    candidate, reference = plan.subjects[differing.formulation], plan.reference
     if has_bodies(differing.case):
         return Drawing(solved=solve_scene(differing.case, [candidate, reference]))
-    exact_forces = contest.question(differing).exact
+    exact_forces = plan.question(differing).exact
     exact = None if exact_forces is None else exact_forces(differing.case)
     return Drawing(forces_on(differing.case, candidate), forces_on(differing.case, reference), exact)
 
 
-def _draw_pictures(differing: Differing, contest: Contest, folder: PictureFolder) -> list[str]:
+def _draw_pictures(differing: Differing, plan: ComparisonPlan, folder: PictureFolder) -> list[str]:
     """Draw the bodies as both solve them, or the case with the forces of each; return the files' names."""
-    candidate, reference = contest.subjects[differing.formulation], contest.reference
+    candidate, reference = plan.subjects[differing.formulation], plan.reference
     if has_bodies(differing.case):
         from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
 
@@ -157,6 +157,6 @@ def _draw_pictures(differing: Differing, contest: Contest, folder: PictureFolder
     names = []
     for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
         name = f"{case_id(subject.name, differing.info.id)}.png"
-        draw_outcome(subject, contest.question(differing), outcome, folder.path / name, argument="--pictures")
+        draw_outcome(subject, plan.question(differing), outcome, folder.path / name, argument="--pictures")
         names.append(name)
     return names

@@ -1,12 +1,37 @@
-"""The command `list`: what is installed."""
+"""The command `list`: installed formulations with what they state, and installed properties."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from contactverif.cli.shared_options import IsolationOptions
+
+if TYPE_CHECKING:
+    from contactverif.contract.result import NotLoaded
+    from contactverif.contract.subject import Subject
+    from contactverif.contract.traits import Traits
+    from contactverif.isolation.loading import Wrapper
+
+_YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
+    ("passes_normal_patch", "passes with node on node", "fails with node on node"),
+    ("passes_single_patch", "passes with nodes on midpoints", "fails with nodes on midpoints"),
+    ("covers_overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
+    ("converges", "converges", "does not converge"),
+    ("inf_sup", "satisfies inf-sup", "does not satisfy inf-sup"),
+    ("locks", "locks", "does not lock"),
+    ("integrates_linear_gap", "integrates a linear gap", "does not integrate a linear gap"),
+    ("local", "local", "not local"),
+    ("unbiased", "unbiased", "biased"),
+    ("nodes_push", "nodes push", "nodes may pull"),
+    ("independent_multipliers", "independent multipliers", "dependent multipliers"),
+    ("conserves_force", "conserves force", "does not conserve force"),
+    ("conserves_moment", "conserves moment", "does not conserve moment"),
+    ("symmetric", "symmetric", "unsymmetric"),
+    ("translation_stable", "stable under translation", "not stable under translation"),
+)
 
 
 def list_installed(
@@ -26,9 +51,64 @@ def list_installed(
       contactverif list
       contactverif list --traits
     """
-    from contactverif.cli.console import show
-    from contactverif.cli.listing_tables import formulations_table, properties_table
+    from contactverif.cli.console import plain_table, show
+    from contactverif.contract.result import NotLoaded
     from contactverif.run.registry import load_formulations, load_properties
 
-    show(formulations_table(load_formulations(isolation.limits()), every_trait=traits))
-    show(properties_table(load_properties()))
+    table = plain_table("formulations", words=("name",))
+    table.add_column("promises")
+    for item in load_formulations(isolation.limits()):
+        if isinstance(item, NotLoaded):
+            table.add_row(item.formulation, _not_loaded(item))
+        else:
+            table.add_row(item.name, _promises(item, traits))
+    show(table)
+    table = plain_table("properties", words=("id",))
+    table.add_column("asks")
+    for question in load_properties():
+        if isinstance(question, NotLoaded):
+            table.add_row(question.formulation, _not_loaded(question))
+        else:
+            table.add_row(question.id, question.summary)
+    show(table)
+
+
+def _not_loaded(item: NotLoaded) -> Text:
+    return Text(f"not loaded: {item.reason}", style="red")
+
+
+def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
+    """Return what a formulation states and which parts it leaves out, or what a wrapper does."""
+    from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+
+    if not isinstance(item, Subject):
+        return f"wraps another, {item.name}/NAME{f': {item.summary}' if item.summary else ''}"
+    statements = _statements(item.traits, every_trait) or ["nothing"]
+    missing = ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides)
+    return "; ".join([*statements, *([f"not provided: {missing}"] if missing else [])])
+
+
+def _statements(traits: Traits, every_trait: bool) -> list[str]:
+    """Return what the traits say, in words; the most important ones alone or all of them."""
+    statements: list[str] = [] if traits.enforcement == "penalty" else [f"by {traits.enforcement}"]
+    if traits.passes_flat_patch is not None:
+        statements.append("passes the flat patch test" if traits.passes_flat_patch else "fails the flat patch test")
+    if traits.tangent is not None:
+        statements.append(f"{traits.tangent} tangent")
+    return statements + _further_statements(traits) if every_trait else statements
+
+
+def _further_statements(traits: Traits) -> list[str]:
+    statements = [
+        yes if getattr(traits, name) else no for name, yes, no in _YES_OR_NO if getattr(traits, name) is not None
+    ]
+    for words, value in (
+        ("area {}", traits.area),
+        ("penalty {}", traits.penalty),
+        ("gap by {}", traits.gap),
+        ("force along {}", traits.force_along),
+        ("{} when sliding", traits.continuity),
+        ("forces stated on {}", ", ".join(traits.published_forces)),
+    ):
+        statements += [words.format(value)] if value else []
+    return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(traits.witnesses.items())]

@@ -45,10 +45,8 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --out case.svg
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
-    from contactverif.cli.case_pictures import draw_outcome
     from contactverif.cli.console import say, show
-    from contactverif.cli.counterexample_text import ending_lines, replay_table
-    from contactverif.cli.stored_formulation import announce_stored
+    from contactverif.cli.counterexample_output import announce_stored, draw_outcome, ending_lines, replay_table
     from contactverif.contract.property import Verdict
     from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
     from contactverif_reports.draw import as_text

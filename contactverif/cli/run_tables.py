@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.cli.console import PLAIN_STYLE, STYLES
+from contactverif.cli.console import PLAIN_STYLE, STYLES, fold, line
 from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.case_counts import whole_percent
 from contactverif.contract.property import Verdict
@@ -52,7 +52,7 @@ class RunTable:
     """A line for each formulation and property: promise, result, and how close it came to the tolerance.
 
     A remark stands behind its line if there is room, else below it. The name of the closest number is left out if there
-    is no room: the drawing of a failure repeats it. Below the table stands what the cases were worth.
+    is no room. Below the table stands what the cases were worth.
     """
 
     run: Run
@@ -60,13 +60,13 @@ class RunTable:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
         width = options.max_width
         for name in self.run.opposite_signs:
-            yield _fold(f"{name}: {OPPOSITE_SIGN}", width, style="bold red", indent=0)
+            yield fold(f"{name}: {OPPOSITE_SIGN}", width, style="bold red", indent=0)
             yield Text("")
         yield Text(headline(self.run.provenance))
         yield from _lines(self.run.rows, width)
         for plugin in self.run.not_loaded:
             yield Text(plugin.formulation, style="bold")
-            yield _fold(f"{Result.NOT_LOADED}: {plugin.reason}", width, style="red")
+            yield fold(f"{Result.NOT_LOADED}: {plugin.reason}", width, style="red")
         if self.run.rows:
             yield from _legend({row.result for row in self.run.rows}, width)
             yield from coverage_text(self.run, width)
@@ -122,15 +122,15 @@ def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
         if row.formulation != previous:
             yield Text(row.formulation, style="bold")
         previous = row.formulation
-        line = space + _align(cells, widths, space)
+        columns = space + _align(cells, widths, space)
         remark = _remark(row)
         options = ("; ".join(text for text in (remark, _quantity(row)) if text), remark)
-        behind = next((text for text in options if len(line) + 2 + len(text) <= max_width), "")
-        text = Text(f"{line}  {behind}".rstrip(), no_wrap=True, overflow="ignore")
+        behind = next((text for text in options if len(columns) + 2 + len(text) <= max_width), "")
+        text = line(f"{columns}  {behind}".rstrip())
         text.stylize(STYLES.get(row.result, PLAIN_STYLE), start_of_result, start_of_result + len(row.result))
         yield text
         if remark and not behind:
-            yield _fold(remark, max_width)
+            yield fold(remark, max_width)
 
 
 def _entries(row: Row) -> tuple[str, ...]:
@@ -187,12 +187,6 @@ def _align(cells: Sequence[str], widths: Sequence[int], space: str) -> str:
     )
 
 
-def _fold(words: str, width: int, style: str = "", indent: int = 6) -> Text:
-    """Return words of any length, indented, to stand below a line."""
-    lines = textwrap.wrap(words, max(width - indent, 20))
-    return Text("\n".join(" " * indent + line for line in lines), style=style, no_wrap=True, overflow="ignore")
-
-
 def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
     """Explain the columns, and those of the results that do not explain themselves."""
     entries = _LEGEND | {str(result): words for result, words in _MEANINGS.items() if result in results}
@@ -201,5 +195,5 @@ def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
     for name, words in entries.items():
         indent = " " * (width + 4)
         folded = textwrap.wrap(words, max(max_width - len(indent), 20))
-        yield Text(f"  {name:{width}}  " + f"\n{indent}".join(folded), style="dim", no_wrap=True, overflow="ignore")
+        yield line(f"  {name:{width}}  " + f"\n{indent}".join(folded), "dim")
     yield Text("")

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from contactverif.cli.case_pictures import draw_outcome
 from contactverif.cli.console import plain_table, say, show
+from contactverif.cli.counterexample_output import announce_stored, draw_outcome
 from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
-from contactverif.cli.stored_formulation import announce_stored
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError

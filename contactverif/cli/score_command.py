@@ -7,12 +7,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Table
+from rich.text import Text
 
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
     from contactverif.studies.queries.answer_file import Answers
     from contactverif.studies.queries.query_file import Queries
+    from contactverif.studies.queries.query_scores import Score, Scores
+
+_COLUMNS = {
+    "wrong": "decisions with a segment that is not nearest, or a wrong sign of the gap",
+    "sign": "wrong decisions about the sign alone: the gap exceeds 4u(L + |P − A|)",
+    "mistakes": "wrong decisions that roundoff does not explain",
+    "undecided": "queries to which the program says that it does not know",
+    "ξ, distance": "worst errors over right segments, in units of u(L + |P − A|)/L and u(L + |P − A|)",
+    "µs": "time of one decision",
+}
 
 
 def score(
@@ -57,7 +69,6 @@ def score(
     """
     _check_one_source(program, answers, built_in)
     from contactverif.cli.console import say, show
-    from contactverif.cli.score_tables import score_table, score_words
     from contactverif.studies.queries.query_file import read_exact, read_queries
     from contactverif.studies.queries.query_making import exact_path
     from contactverif.studies.queries.query_scores import score_answers
@@ -65,8 +76,8 @@ def score(
     questions, fingerprint = read_queries(queries)
     truth = read_exact(exact or exact_path(queries), fingerprint, len(questions.queries))
     scores = score_answers(questions, truth, _answers(queries, questions, program, answers))
-    show(score_table(scores))
-    show(score_words(scores))
+    show(_table(scores))
+    show(_legend(scores))
     if at_most is not None and scores.total.wrong_per_million > at_most:
         say(f"wrong decisions a million: {scores.total.wrong_per_million:.0f}, but --at-most {at_most:g}")
         raise typer.Exit(1)
@@ -98,3 +109,37 @@ def _answers(path: Path, questions: Queries, program: Sequence[str] | None, answ
     from contactverif.studies.queries.built_in_search import search_built_in
 
     return search_built_in(questions)
+
+
+def _table(scores: Scores) -> Table:
+    from contactverif.cli.console import plain_table
+
+    numbers = ("queries", "wrong", "a million", "sign", "mistakes", "undecided", "ξ", "distance", "µs")
+    table = plain_table(words=("kind",), numbers=numbers)
+    for score in scores.kinds:
+        table.add_row(*_cells(score))
+    table.add_section()
+    table.add_row(*_cells(scores.total), style="bold")
+    return table
+
+
+def _cells(score: Score) -> list[str]:
+    counts = (score.wrong_signs, score.beyond_roundoff, score.undecided)
+    return [
+        score.kind,
+        *map(str, (score.queries, score.wrong, f"{score.wrong_per_million:.0f}", *counts)),
+        f"{score.worst_xi:.3g}",
+        f"{score.worst_distance:.3g}",
+        "–" if score.seconds_each is None else f"{1e6 * score.seconds_each:.3g}",
+    ]
+
+
+def _legend(scores: Scores) -> Text:
+    """Return what the columns mean, and the first wrong decision of each kind."""
+    width = max(map(len, _COLUMNS)) + 2
+    lines = [f"  {name:{width}}{meaning}" for name, meaning in _COLUMNS.items()]
+    if scores.total.other_rule:
+        lines += ["", f"In {scores.total.other_rule} ties another segment was chosen than that of smallest overshoot."]
+    if scores.first_wrong:
+        lines += ["", "the first wrong decision of each kind", *(f"  {words}" for words in scores.first_wrong)]
+    return Text("\n".join(lines))

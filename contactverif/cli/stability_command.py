@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Table
+from rich.text import Text
 
 from contactverif.cli.output_files import MARKDOWN, PICTURES, REPORT, OutputFiles
 from contactverif.cli.shared_options import IsolationOptions, complete_formulation
@@ -13,6 +18,9 @@ from contactverif.cli.verify_command import select_names
 
 if TYPE_CHECKING:
     from contactverif.contract.result import Run
+    from contactverif_reports.stability.sweep_points import SweepPanel
+
+_MOST_IDS = 3  # Cases of a formulation whose command is printed.
 
 
 def stability(
@@ -93,19 +101,39 @@ def _write(result: Run, files: OutputFiles) -> None:
 
 
 def _show(result: Run, files: OutputFiles) -> None:
-    """Print the table, a sentence for each formulation, and the names of the files."""
+    """Print the table, a sentence for each formulation with commands to replay its worst cases, and the files."""
     from contactverif.cli.console import show, show_as_it_is
     from contactverif.cli.run_tables import summary
-    from contactverif.cli.stability_tables import replay_lines, roundings_table, sentence_text
+    from contactverif_reports.stability.sentences import sentence_of
     from contactverif_reports.stability.sweep_points import sweep_panels
 
     panels = sweep_panels(result)
-    show(roundings_table(panels))
+    show(_roundings_table(panels))
     show("* relative, at offset 1e6 and gap 1e-6; –: no number")
     typer.echo()
     for panel in panels:
-        show(sentence_text(panel))
-        for line in replay_lines(panel, files.names[REPORT]) if REPORT in files.names else []:
-            show_as_it_is(line)
+        sentence = f"{panel.formulation} {sentence_of(panel).replace('`', '')}"
+        show(Text(sentence, style="magenta" if panel.above else ""))
+        for point in panel.above[:_MOST_IDS] if REPORT in files.names else ():
+            report = shlex.quote(str(files.names[REPORT]))
+            show_as_it_is(Text(f"    contactverif replay {report} --case {shlex.quote(point.case_id)}"))
     files.announce()
     show(summary(result))
+
+
+def _roundings_table(panels: Sequence[SweepPanel]) -> Table:
+    """Return ω by formulation and state; the last column is the relative error of the forces."""
+    from contactverif.cli.console import plain_table
+    from contactverif_reports.stability.sweep_points import COLUMNS, FAR_AND_CLOSE, LINE_FACTOR, short_number
+
+    def rounding(number: float) -> Text:
+        style = "dim" if isnan(number) else "magenta" if number > LINE_FACTOR else "green"
+        return Text(short_number(number), style=style)
+
+    title = f"ω: the error over u × condition number (stable: at most {LINE_FACTOR:g})"
+    headings = [heading.replace(" ", "\n").replace(",", "") for heading in COLUMNS]
+    table = plain_table(title, "formulation", numbers=(*headings, "error of\nforces*"), dense=True)
+    for panel in panels:
+        numbers = [rounding(panel.roundings_at(stem)) for stem in COLUMNS.values()]
+        table.add_row(panel.formulation, *numbers, short_number(panel.force_error_at(FAR_AND_CLOSE)))
+    return table

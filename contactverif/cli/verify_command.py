@@ -157,7 +157,7 @@ def _show_results(
 ) -> None:
     """Show the table, the counterexamples, the names of the files, and the last line."""
     from contactverif.cli.console import show
-    from contactverif.cli.counterexample_text import how_to_keep
+    from contactverif.cli.counterexample_output import how_to_keep
     from contactverif.cli.run_tables import RunTable, summary
 
     show(RunTable(result))
@@ -195,7 +195,7 @@ def _show_counterexamples(
 ) -> None:
     """Print the smallest mesh of each failure, and draw it if the user named a folder."""
     from contactverif.cli.console import show_as_it_is
-    from contactverif.cli.counterexample_text import counterexample_text, failing_examples
+    from contactverif.cli.counterexample_output import counterexample_text, failing_examples
 
     for example in failing_examples(result):
         show_as_it_is(counterexample_text(example, files.names.get(REPORT)))
@@ -209,8 +209,8 @@ def _draw_counterexample(
     questions: Sequence[Property | NotLoaded],
     folder: PictureFolder,
 ) -> None:
-    from contactverif.cli.case_pictures import draw_outcome
     from contactverif.cli.console import say
+    from contactverif.cli.counterexample_output import draw_outcome
     from contactverif.contract.counterexample import case_id
     from contactverif.contract.property import Property
     from contactverif.contract.subject import Subject

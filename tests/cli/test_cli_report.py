@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from asking import Answer, Ask, asking
 
-from contactverif.cli.stored_formulation import announce_stored
+from contactverif.cli.counterexample_output import announce_stored
 from contactverif.contract.errors import MisuseError
 from contactverif.run.one_case import the_property
 

@@ -12,7 +12,7 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from subjects import load_subject
 
-from contactverif.cli.counterexample_text import counterexample_text
+from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict, judge
 from contactverif.contract.subject import Subject

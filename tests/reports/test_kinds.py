@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from handmade_report import run_with_kinds
 
-from contactverif.cli.counterexample_text import counterexample_text, failing_examples
+from contactverif.cli.counterexample_output import counterexample_text, failing_examples
 from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.case_counts import CaseCounts, percent
 from contactverif.contract.coverage import coverage_of

@@ -16,9 +16,9 @@ import pytest
 from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_with_kinds, small_run
 from rich.console import Console, RenderableType
 
-from contactverif.cli.changes_tables import ChangesTable, regressions_text
 from contactverif.cli.comparison_tables import errors_table, iterations_table, last_line, results_table
-from contactverif.cli.counterexample_text import counterexample_text, failing_examples, how_to_keep
+from contactverif.cli.counterexample_output import counterexample_text, failing_examples, how_to_keep
+from contactverif.cli.report_comparison import ChangesTable, regressions_text
 from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.cli.changes_tables import regressions_text
+from contactverif.cli.report_comparison import regressions_text
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface

@@ -1,18 +1,24 @@
-"""The counterexamples of a run in the terminal: numbers, a drawing of the mesh, and the line that replays it."""
+"""A counterexample for its reader: numbers, drawing and picture, and the line that replays it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
+import typer
 from rich.table import Table
 from rich.text import Text
 
-from contactverif.cli.console import plain_table
+from contactverif.cli.console import indent_below, plain_table
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.names import parse_name
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Run
-from contactverif_reports.draw import as_text
+from contactverif.contract.subject import Subject
+from contactverif.run.one_case import forces_on
+from contactverif.run.registry import formulation_names
+from contactverif_reports.draw import as_text, draw_case
 
 
 def failing_examples(run: Run) -> list[Counterexample]:
@@ -27,14 +33,12 @@ def counterexample_text(example: Counterexample, report: Path | None) -> Text:
     description = f"the case {outcome.case.name}" if outcome.case.name else "the smallest case found"
     if outcome.case.kind:
         description += f" ({outcome.case.kind})"
-    lines = [
+    return indent_below(
         f"{row.formulation}, {row.property_id}: {row.result}, {description}",
-        *(f"    {line}" for line in _numbers(row.info, outcome)),
-        *(f"    {line}" for line in as_text(outcome.case).splitlines()),
-    ]
-    if report is not None:
-        lines.append(f"    {example.replay_command(str(report))}")
-    return Text("\n".join(["", *lines]))
+        *_numbers(row.info, outcome),
+        *as_text(outcome.case).splitlines(),
+        *([] if report is None else [example.replay_command(str(report))]),
+    )
 
 
 def how_to_keep(run: Run) -> Text | None:
@@ -47,12 +51,39 @@ def how_to_keep(run: Run) -> Text | None:
 
 def replay_table(example: Counterexample, formulation: str, outcome: Outcome) -> Table:
     """Return the verdict that the report stores beside the verdict now."""
-    table = plain_table("")
+    table = plain_table()
     for column in ("", "formulation", "verdict", "reason"):
         table.add_column(column)
     table.add_row("stored", example.formulation, str(example.verdict), example.reason)
     table.add_row("now", formulation, str(outcome.verdict), outcome.reason)
     return table
+
+
+def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
+    """Draw the case of an outcome to a file."""
+    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
+    forces = forces_on(outcome.case, subject)
+    exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
+    try:
+        draw_case(outcome.case, path, title=title, forces=forces, exact=exact)
+    except MisuseError as error:
+        raise MisuseError(argument, error.found, error.needed) from None
+
+
+def announce_stored(name: str) -> str:
+    """Say on standard error which formulation a report names, before it is loaded; return the name.
+
+    Running it runs installed code with options that a stranger may have chosen.
+    """
+    base, options = parse_name("REPORT", name)
+    installed = formulation_names()
+    for part in base.split("/"):
+        if part not in installed:
+            needed = "an installed one: install its plugin, or give --formulation NAME"
+            raise MisuseError("REPORT", f"the formulation {part!r}, which is not installed", needed)
+    listed = ", ".join(f"{option} = {value!r}" for option, value in options.items())
+    typer.echo(f"the report names the formulation {base}, {listed or 'without options'}", err=True)
+    return name
 
 
 def ending_lines(outcome: Outcome) -> list[str]:
