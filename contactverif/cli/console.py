@@ -129,7 +129,7 @@ def indent_below(title: str, *lines: str) -> Text:
 
 
 def fold(words: str, width: int, style: str = "", *, indent: int = 6) -> Text:
-    """Return words of any length, indent_below, to stand below a line."""
+    """Return words of any length, indented, to stand below a line."""
     lines = textwrap.wrap(words, max(width - indent, 20))
     return line("\n".join(" " * indent + each for each in lines), style)
 

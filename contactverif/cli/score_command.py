@@ -13,7 +13,7 @@ from rich.text import Text
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
-    from contactverif.studies.queries.answer_file import Answers
+    from contactverif.studies.queries.answers import Answers
     from contactverif.studies.queries.query_file import Queries
     from contactverif.studies.queries.query_scores import Score, Scores
 
@@ -98,12 +98,12 @@ def _check_one_source(program: Sequence[str] | None, answers: Path | None, built
 def _answers(path: Path, questions: Queries, program: Sequence[str] | None, answers: Path | None) -> Answers:
     """Return the answers of a file, of a program, or of the built-in search."""
     if answers is not None:
-        from contactverif.studies.queries.answer_file import read_answers
+        from contactverif.studies.queries.answers import read_answers
         from contactverif.studies.queries.text_lines import TextLines
 
         return read_answers(TextLines.read(answers), questions)
     if program:
-        from contactverif.studies.queries.answering_program import ask_program
+        from contactverif.studies.queries.answers import ask_program
 
         return ask_program(program, path)
     from contactverif.studies.queries.built_in_search import search_built_in

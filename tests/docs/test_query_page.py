@@ -7,7 +7,7 @@ from pathlib import Path
 from quotes import DOCS, blocks
 
 from contactverif.oracle import nearest_segments
-from contactverif.studies.queries.answer_file import read_answers
+from contactverif.studies.queries.answers import read_answers
 from contactverif.studies.queries.query_file import ExactAnswer, exact_text, read_exact, read_queries
 from contactverif.studies.queries.query_scores import score_answers
 from contactverif.studies.queries.text_lines import TextLines

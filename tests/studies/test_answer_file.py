@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.studies.queries import answering_program
-from contactverif.studies.queries.answer_file import Answer, Answers, read_answers
-from contactverif.studies.queries.answering_program import ask_program
+from contactverif.studies.queries.answers import Answer, Answers, ask_program, read_answers
 from contactverif.studies.queries.query_file import Queries, read_queries
 from contactverif.studies.queries.text_lines import TextLines
 
@@ -99,7 +97,9 @@ def test_a_long_line_is_cut(queries: Queries) -> None:
 def test_the_start_of_a_program_does_not_count(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run without queries takes 3 s or a little more, a run with them 5 s; one is disturbed and takes longer."""
     times = {True: iter([5.5, 5.0, 9.0, 5.25, 5.125]), False: iter([3.25, 3.5, 3.0, 3.125, 20.0])}
-    monkeypatch.setattr(answering_program, "_time", lambda command, text: next(times[b"\nquery" in text]))
+    monkeypatch.setattr(
+        "contactverif.studies.queries.answers._time", lambda command, text: next(times[b"\nquery" in text])
+    )
     script = "import sys\nfor line in sys.stdin:\n  if line[:5] == 'query': print(line.split()[1], '0 1 0.5 0.25')"
     answers = ask_program([sys.executable, "-c", script], path)
     assert answers.answers == [Answer(0, 1, 0.5, 0.25)] * 3

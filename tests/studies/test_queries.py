@@ -11,10 +11,9 @@ import pytest
 
 from contactverif.contract.errors import MisuseError
 from contactverif.studies import queries as queries_package
-from contactverif.studies.queries.query_dice import Dice
 from contactverif.studies.queries.query_file import ExactAnswer, exact_text, queries_text, read_exact, read_queries
 from contactverif.studies.queries.query_making import KINDS, exact_path, make_queries, write_queries
-from contactverif.studies.queries.query_shapes import Shape
+from contactverif.studies.queries.surfaces import RandomNumbers, Shape
 
 N_EACH = 10
 QUERIES, EXACT = make_queries(3, N_EACH * len(KINDS))
@@ -111,13 +110,13 @@ def test_impossible_wishes_are_refused(seed: int, number: int, words: str) -> No
 
 
 def test_dice_stay_between_their_limits() -> None:
-    dice = Dice(5, 0)
+    dice = RandomNumbers(5, 0)
     assert {dice.integer(2, 4) for _ in range(100)} == {2, 3, 4}
     assert all(-1 <= dice.real(-1, 1) < 1 for _ in range(100))
     assert all(2.0**-3 <= dice.power(-3, -1) < 1 for _ in range(100))
     assert sorted(dice.shuffle(range(10))) == list(range(10))
     assert all(abs(c * c + s * s - 1) < 1e-15 for c, s in (dice.direction() for _ in range(100)))
-    assert Dice(5, 1).real(0, 1) != Dice(5, 2).real(0, 1)
+    assert RandomNumbers(5, 1).real(0, 1) != RandomNumbers(5, 2).real(0, 1)
 
 
 def test_files_are_read_back_as_they_were_written(tmp_path: Path) -> None:

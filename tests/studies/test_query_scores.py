@@ -18,7 +18,7 @@ from wrong_searches import (
     search_without_overshoot,
 )
 
-from contactverif.studies.queries.answer_file import Answer, Answers
+from contactverif.studies.queries.answers import Answer, Answers
 from contactverif.studies.queries.built_in_search import search_built_in
 from contactverif.studies.queries.query_file import ExactAnswer, Queries
 from contactverif.studies.queries.query_making import KINDS, make_queries

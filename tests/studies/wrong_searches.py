@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.studies.queries.answer_file import Answer, Answers
+from contactverif.studies.queries.answers import Answer, Answers
 from contactverif.studies.queries.query_file import Queries
-from contactverif.studies.queries.query_shapes import Shape
+from contactverif.studies.queries.surfaces import Shape
 
 Search = Callable[[Shape, FloatArray], Answer]
 

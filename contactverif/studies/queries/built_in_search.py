@@ -19,7 +19,7 @@ from contactverif.geometry.projection import (
     node,
     search_tree,
 )
-from contactverif.studies.queries.answer_file import Answer, Answers
+from contactverif.studies.queries.answers import Answer, Answers
 from contactverif.studies.queries.query_file import Queries
 
 _RUNS = 5  # The fastest of these runs counts: what disturbs a machine only adds time.
@@ -62,11 +62,7 @@ def _search(
 def search_built_in(queries: Queries) -> Answers:
     """Answer all queries by the search that plugins may use.
 
-    Returns
-    -------
-    Answers
-        The answers, and the seconds of each kind. The trees of the surfaces are ready and the kernel is compiled before
-        the clock starts.
+    The trees of the surfaces are ready and the kernel is compiled before the clock starts.
     """
     by_kind: dict[str, dict[int, list[int]]] = {}
     for number, query in enumerate(queries.queries):

@@ -6,21 +6,32 @@ import math
 
 import numpy as np
 
+from contactverif.contract.interface import Surface
 from contactverif.oracle.exact_nearest import Nearest
-from contactverif.studies.queries.kind_contract import Kind, has_inner_foot
-from contactverif.studies.queries.plain_kinds import N_POINTS, draw_bisector, draw_inside, point_over, points_over
-from contactverif.studies.queries.query_dice import Dice, Vector, rational_direction
-from contactverif.studies.queries.query_shapes import (
+from contactverif.studies.queries.kinds import (
+    N_POINTS,
+    Kind,
+    draw_bisector,
+    draw_inside,
+    has_inner_foot,
+    point_over,
+    points_over,
+)
+from contactverif.studies.queries.surfaces import (
     PYTHAGOREAN,
     Chain,
+    RandomNumbers,
     Shape,
+    Vector,
     add,
     exact_motion,
     frame,
     lattice_chain,
     make_shape,
     move,
+    move_together,
     polygon,
+    rational_direction,
     rough_chain,
     rounded_motion,
     stretch,
@@ -31,33 +42,32 @@ _LONG = 1000  # The number of segments of a long chain.
 _TINY = 1e-9  # The length of the shortest segment beside those of length 1.
 
 
-def one_ulp_off(dice: Dice, point: Vector) -> Vector:
+def one_ulp_off(random: RandomNumbers, point: Vector) -> Vector:
     """Return the point with one coordinate replaced by a neighbouring double, 0 by ± the unit roundoff."""
     x, y = point
-    moved_x, moved_y = (math.nextafter(v, dice.sign() * math.inf) if v else dice.sign() * 2.0**-53 for v in point)
-    return (moved_x, y) if dice.integer(0, 1) else (x, moved_y)
+    moved_x, moved_y = (math.nextafter(v, random.sign() * math.inf) if v else random.sign() * 2.0**-53 for v in point)
+    return (moved_x, y) if random.integer(0, 1) else (x, moved_y)
 
 
-def draw_near_tie(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_near_tie(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw exact ties and move each point by one unit in the last place."""
-    shape, points = draw_bisector(dice)
-    return shape, [one_ulp_off(dice, point) for point in points]
+    shape, points = draw_bisector(random)
+    return shape, [one_ulp_off(random, point) for point in points]
 
 
-def draw_three_feet(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_three_feet(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw three to five segments that touch one circle of whole numbers, and its centre."""
     lengths = [math.isqrt(a * a + b * b) for a, b in PYTHAGOREAN]
     radius = math.lcm(*lengths)
-    turns = dice.shuffle([(a, b, c) for (a, b), c in zip(PYTHAGOREAN, lengths, strict=True)])
-    side, chains = dice.sign(), []
-    for number, (a, b, c) in enumerate(turns[: dice.integer(3, 5)]):
+    turns = random.shuffle([(a, b, c) for (a, b), c in zip(PYTHAGOREAN, lengths, strict=True)])
+    side, chains = random.sign(), list[Chain]()
+    for number, (a, b, c) in enumerate(turns[: random.integer(3, 5)]):
         quarters = ((a, b), (-b, a), (-a, -b), (b, -a))
         a, b = quarters[number % 4]
         foot = (a * (radius // c), b * (radius // c))
         half = side * (radius // (32 * c))
         chains.append([(foot[0] - half * b, foot[1] + half * a), (foot[0] + half * b, foot[1] - half * a)])
-    points = exact_motion(dice, [*(point for chain in chains for point in chain), (0, 0)])
-    return make_shape(*([*ends] for ends in zip(points[:-1:2], points[1:-1:2], strict=True))), points[-1:]
+    return move_together(exact_motion, random, chains, [(0, 0)])
 
 
 def has_three_feet(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -65,17 +75,16 @@ def has_three_feet(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return len({near.foot for near in nearest.segments}) >= 3
 
 
-def draw_on_surface(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_on_surface(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points exactly on the segments and nodes of a lattice chain."""
-    chain = lattice_chain(dice, dice.integer(1, 8), spacing=16)
+    chain = lattice_chain(random, random.integer(1, 8), spacing=16)
     points = []
     for _ in range(N_POINTS):
-        place = dice.integer(0, len(chain) - 2)
+        place = random.integer(0, len(chain) - 2)
         (ax, ay), (bx, by) = chain[place : place + 2]
-        share = dice.integer(0, 16) / 16
+        share = random.integer(0, 16) / 16
         points.append((ax + share * (bx - ax), ay + share * (by - ay)))
-    moved = exact_motion(dice, [*chain, *points])
-    return make_shape(moved[: len(chain)]), moved[len(chain) :]
+    return move_together(exact_motion, random, [chain], points)
 
 
 def touches(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -83,16 +92,16 @@ def touches(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return nearest.squared_distance == 0
 
 
-def draw_tiny_gap(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_tiny_gap(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points that are one unit in the last place off a surface near the origin."""
-    chain = lattice_chain(dice, dice.integer(1, 8), spacing=16)
-    home = dice.integer(0, len(chain) - 2)
+    chain = lattice_chain(random, random.integer(1, 8), spacing=16)
+    home = random.integer(0, len(chain) - 2)
     (ax, ay), (bx, by) = chain[home : home + 2]
     on_surface = [(ax + k * (bx - ax) / 16, ay + k * (by - ay) / 16) for k in range(1, 16) if k != 8]
     places = move([*chain, *on_surface], (-(ax + bx) / 2, -(ay + by) / 2))
-    turned = stretch(turn(places, dice.choice(((1, 0), (0, 1), *PYTHAGOREAN))), 2.0**-8)
+    turned = stretch(turn(places, random.choice(((1, 0), (0, 1), *PYTHAGOREAN))), 2.0**-8)
     shape = make_shape(turned[: len(chain)])
-    return shape, [one_ulp_off(dice, dice.choice(turned[len(chain) :])) for _ in range(N_POINTS)]
+    return shape, [one_ulp_off(random, random.choice(turned[len(chain) :])) for _ in range(N_POINTS)]
 
 
 def nearly_touches(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -100,14 +109,13 @@ def nearly_touches(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return has_inner_foot(shape, point, nearest) and 0 < nearest.squared_distance <= 1e-30
 
 
-def draw_cavity(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_cavity(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points over a long segment, below nodes of another body that are nearer than the ends of the segment."""
     floor: Chain = [(10.0, 0.0), (-10.0, 0.0)]
-    height = dice.real(0.3, 1)
-    above = move(turn(rough_chain(dice, dice.integer(6, 12), largest_slope=0.05), (-1.0, 0.0)), (-5.0, 2.5 * height))
-    points = [(dice.real(-5, 3), height * dice.real(0.2, 1)) for _ in range(N_POINTS)]
-    moved = rounded_motion(dice, [*floor, *above, *points])
-    return make_shape(moved[:2], moved[2 : 2 + len(above)]), moved[2 + len(above) :]
+    height = random.real(0.3, 1)
+    above = turn(rough_chain(random, random.integer(6, 12), largest_slope=0.05), (-1.0, 0.0))
+    points = [(random.real(-5, 3), height * random.real(0.2, 1)) for _ in range(N_POINTS)]
+    return move_together(rounded_motion, random, [floor, move(above, (-5.0, 2.5 * height))], points)
 
 
 def nearest_node_is_of_another_segment(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -119,13 +127,12 @@ def nearest_node_is_of_another_segment(shape: Shape, point: Vector, nearest: Nea
     return bool(squares.min() < (1 - 1e-9) * squares[ends].min())
 
 
-def draw_sharp_tip(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_sharp_tip(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points before a tip of the body with an angle of 5° to 84°."""
-    (c, s), (c2, s2) = rational_direction(dice.real(0.02, 0.38)), rational_direction(dice.real(0.02, 0.38))
+    (c, s), (c2, s2) = rational_direction(random.real(0.02, 0.38)), rational_direction(random.real(0.02, 0.38))
     tip: Chain = [(-c, -s), (0.0, 0.0), (-c2, s2)]
-    points = [stretch([dice.slope(0.9)], dice.power(-20, 0))[0] for _ in range(N_POINTS)]
-    moved = rounded_motion(dice, [*tip, *points])
-    return make_shape(moved[:3]), moved[3:]
+    points = [stretch([random.slope(0.9)], random.power(-20, 0))[0] for _ in range(N_POINTS)]
+    return move_together(rounded_motion, random, [tip], points)
 
 
 def is_before_sharp_tip(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -136,38 +143,31 @@ def is_before_sharp_tip(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return first > 0 > second
 
 
-def draw_several_chains(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_several_chains(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw two to four chains, one over the other, whose segments are numbered in random order."""
     chains = []
-    for level in range(dice.integer(2, 4)):
-        chain = rough_chain(dice, dice.integer(2, 6), largest_slope=0.05)
-        if dice.integer(0, 1):  # Its body is on the other side.
+    for level in range(random.integer(2, 4)):
+        chain = rough_chain(random, random.integer(2, 6), largest_slope=0.05)
+        if random.integer(0, 1):  # Its body is on the other side.
             chain = move(turn(chain, (-1.0, 0.0)), chain[-1])
-        chains.append(move(chain, (dice.real(-1, 1), 2.5 * level)))
-    lengths = [len(chain) for chain in chains]
-    moved = rounded_motion(dice, [point for chain in chains for point in chain])
-    starts = [sum(lengths[:number]) for number in range(len(lengths))]
-    parts = [moved[start : start + length] for start, length in zip(starts, lengths, strict=True)]
-    shape = make_shape(*parts, order=dice.shuffle(range(sum(lengths) - len(lengths))))
-    corners = np.array(moved)
-    low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    scattered = [(dice.real(low[0], high[0]), dice.real(low[1], high[1])) for _ in range(N_POINTS // 2)]
-    return shape, [*scattered, *points_over(dice, shape)[N_POINTS // 2 :]]
+        chains.append(move(chain, (random.real(-1, 1), 2.5 * level)))
+    shape, _ = move_together(rounded_motion, random, chains, [])
+    shape = Shape(shape.nodes, Surface(shape.segments[random.shuffle(range(len(shape.segments)))]))
+    low, high = shape.nodes.min(axis=0).tolist(), shape.nodes.max(axis=0).tolist()
+    scattered = [(random.real(low[0], high[0]), random.real(low[1], high[1])) for _ in range(N_POINTS // 2)]
+    return shape, [*scattered, *points_over(random, shape)[N_POINTS // 2 :]]
 
 
-def draw_thin_body(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_thin_body(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points in a thin closed body that lies before another one, on both sides of its middle."""
-    body = polygon(dice, dice.integer(8, 20), flatten=dice.power(-8, -4))
-    behind = move(rough_chain(dice, 4, largest_slope=0.02), (2.0, -dice.real(0.4, 0.6)))
+    body = polygon(random, random.integer(8, 20), flatten=random.power(-8, -4))
+    behind = move(rough_chain(random, 4, largest_slope=0.02), (2.0, -random.real(0.4, 0.6)))
     points = []
     for _ in range(N_POINTS):
-        (ax, ay), (bx, by) = dice.choice(body), dice.choice(body)
-        share = 0.5 + dice.sign() * dice.power(-30, -2)
+        (ax, ay), (bx, by) = random.choice(body), random.choice(body)
+        share = 0.5 + random.sign() * random.power(-30, -2)
         points.append((ax + share * (bx - ax), ay + share * (by - ay)))
-    count = len(body)
-    moved = rounded_motion(dice, [*body, *behind, *points])
-    shape = make_shape(moved[:count], moved[count : count + len(behind)], closed=[0])
-    return shape, moved[count + len(behind) :]
+    return move_together(rounded_motion, random, [body, behind], points, closed=[0])
 
 
 def is_inside(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -175,16 +175,16 @@ def is_inside(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return nearest.segments[0].signed_squared_gap < 0
 
 
-def draw_seam(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_seam(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points over the segment that joins the last node of a closed chain to the first, and over its ends."""
-    shape = make_shape(rounded_motion(dice, stretch(polygon(dice, dice.integer(3, 12)), 4)), closed=[0])
+    shape = make_shape(rounded_motion(random, stretch(polygon(random, random.integer(3, 12)), 4)), closed=[0])
     last = len(shape.segments) - 1
-    points = [point_over(dice, shape, last, powers=(-20, -2)) for _ in range(N_POINTS // 2)]
+    points = [point_over(random, shape, last, powers=(-20, -2)) for _ in range(N_POINTS // 2)]
     first, second = shape.ends(last)
     _, t, n = frame(first, second)
     for _ in range(N_POINTS - len(points)):
-        end, side = dice.choice(((first, -1), (second, 1)))
-        points.append(add(end, (side * dice.power(-30, -4), t), (dice.power(-8, -2), n)))
+        end, side = random.choice(((first, -1), (second, 1)))
+        points.append(add(end, (side * random.power(-30, -4), t), (random.power(-8, -2), n)))
     return shape, points
 
 
@@ -193,44 +193,44 @@ def meets_seam(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return any(near.segment == len(shape.segments) - 1 for near in nearest.segments)
 
 
-def draw_offset(dice: Dice, offset: float) -> tuple[Shape, list[Vector]]:
+def draw_offset(random: RandomNumbers, offset: float) -> tuple[Shape, list[Vector]]:
     """Draw an ordinary chain far from the origin; half of the gaps are a few units in the last place there."""
-    c, s = dice.direction()
-    chain = move(rounded_motion(dice, rough_chain(dice, dice.integer(2, 12))), (offset * c, offset * s))
+    c, s = random.direction()
+    chain = move(rounded_motion(random, rough_chain(random, random.integer(2, 12))), (offset * c, offset * s))
     shape, last_place = make_shape(chain), math.frexp(offset)[1] - 53
-    small = points_over(dice, shape, powers=(last_place, last_place + 4))[: N_POINTS // 2]
-    return shape, [*small, *points_over(dice, shape)[N_POINTS // 2 :]]
+    small = points_over(random, shape, powers=(last_place, last_place + 4))[: N_POINTS // 2]
+    return shape, [*small, *points_over(random, shape)[N_POINTS // 2 :]]
 
 
-def draw_tiny_segment(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_tiny_segment(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw a chain near the origin with one segment of 1e-9, and points 1e-10 … 1 away from it."""
-    before, behind = rough_chain(dice, dice.integer(1, 4)), rough_chain(dice, dice.integer(1, 4))
-    c, s = dice.slope(0.3)
+    before, behind = rough_chain(random, random.integer(1, 4)), rough_chain(random, random.integer(1, 4))
+    c, s = random.slope(0.3)
     tiny = (-_TINY * c, _TINY * s)
     last = before[-1]
     chain = [*move(before, (-last[0], -last[1])), *move(behind, tiny)]
-    points = [stretch([dice.direction()], dice.power(-33, -1))[0] for _ in range(N_POINTS)]
-    by = dice.direction()
+    points = [stretch([random.direction()], random.power(-33, -1))[0] for _ in range(N_POINTS)]
+    by = random.direction()
     return make_shape(turn(chain, by)), turn(points, by)
 
 
-def draw_long_chain(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_long_chain(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw a rough chain of a thousand segments and a hundred points along it."""
-    shape = make_shape(rounded_motion(dice, rough_chain(dice, _LONG)))
-    return shape, [point for _ in range(10) for point in points_over(dice, shape, powers=(-20, -2))]
+    shape = make_shape(rounded_motion(random, rough_chain(random, _LONG)))
+    return shape, [point for _ in range(10) for point in points_over(random, shape, powers=(-20, -2))]
 
 
-def draw_far_away(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_far_away(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points that are 1e3 to 1e9 lengths away, so that all segments are nearly equally far."""
-    chain = rounded_motion(dice, rough_chain(dice, dice.integer(2, 12)))
-    points = [add(dice.choice(chain), (dice.power(10, 29), dice.direction())) for _ in range(N_POINTS)]
+    chain = rounded_motion(random, rough_chain(random, random.integer(2, 12)))
+    points = [add(random.choice(chain), (random.power(10, 29), random.direction())) for _ in range(N_POINTS)]
     return make_shape(chain), points
 
 
-def draw_other_units(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_other_units(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw ordinary queries with all coordinates multiplied by 2^-60 or 2^60."""
-    shape, points = draw_inside(dice)
-    factor = math.ldexp(1, 60 * dice.sign())
+    shape, points = draw_inside(random)
+    factor = math.ldexp(1, 60 * random.sign())
     return Shape(shape.nodes * factor, shape.surface), stretch(points[:4], factor)
 
 
@@ -249,8 +249,8 @@ HARD_KINDS = (
     Kind("several-chains", "two to four chains, segments numbered in random order", draw_several_chains),
     Kind("thin-body", "in a thin closed body before another: front or back", draw_thin_body, is_inside),
     Kind("seam", "the segment that closes a chain, or an end of it", draw_seam, meets_seam),
-    Kind("offset-1e6", "coordinates near 1e6, lengths near 1", lambda dice: draw_offset(dice, 1e6)),
-    Kind("offset-1e8", "coordinates near 1e8, lengths near 1", lambda dice: draw_offset(dice, 1e8)),
+    Kind("offset-1e6", "coordinates near 1e6, lengths near 1", lambda random: draw_offset(random, 1e6)),
+    Kind("offset-1e8", "coordinates near 1e8, lengths near 1", lambda random: draw_offset(random, 1e8)),
     Kind("tiny-segment", "a segment of 1e-9 beside those of 1", draw_tiny_segment),
     Kind("far-away", "a distance of 1e3 to 1e9 lengths", draw_far_away),
     Kind("other-units", "all coordinates times 2^-60 or 2^60", draw_other_units, has_inner_foot),

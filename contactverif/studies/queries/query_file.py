@@ -17,8 +17,7 @@ import numpy as np
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Surface
 from contactverif.oracle.exact_nearest import Nearest
-from contactverif.studies.queries.query_dice import Vector
-from contactverif.studies.queries.query_shapes import Shape
+from contactverif.studies.queries.surfaces import Shape, Vector
 from contactverif.studies.queries.text_lines import Line, TextLines
 
 FORMAT = 1  # The number of the format in the first line of both files.

@@ -8,11 +8,9 @@ from pathlib import Path
 from contactverif.contract.errors import MisuseError
 from contactverif.oracle.exact_nearest import Nearest, nearest_segments
 from contactverif.studies.queries.hard_kinds import HARD_KINDS
-from contactverif.studies.queries.kind_contract import Kind
-from contactverif.studies.queries.plain_kinds import PLAIN_KINDS
-from contactverif.studies.queries.query_dice import Dice, Vector
+from contactverif.studies.queries.kinds import PLAIN_KINDS, Kind
 from contactverif.studies.queries.query_file import ExactAnswer, Queries, Query, exact_text, queries_text
-from contactverif.studies.queries.query_shapes import Shape
+from contactverif.studies.queries.surfaces import RandomNumbers, Shape, Vector
 from contactverif_reports.files import whole
 
 KINDS = (*PLAIN_KINDS, *HARD_KINDS)
@@ -32,7 +30,7 @@ def make_queries(seed: int, number: int) -> tuple[Queries, list[ExactAnswer]]:
     answers: list[ExactAnswer] = []
     for place, kind in enumerate(KINDS):
         share = number // len(KINDS) + (place < number % len(KINDS))
-        for shape, points in _draw_kind(kind, Dice(seed, place), share):
+        for shape, points in _draw_kind(kind, RandomNumbers(seed, place), share):
             for point, nearest in points:
                 queries.append(Query(len(surfaces), point, kind.name))
                 answers.append(ExactAnswer.from_nearest(nearest))
@@ -57,11 +55,11 @@ def write_queries(path: Path, seed: int, number: int) -> int:
     return len(KINDS)
 
 
-def _draw_kind(kind: Kind, dice: Dice, number: int) -> Iterator[tuple[Shape, list[tuple[Vector, Nearest]]]]:
+def _draw_kind(kind: Kind, random: RandomNumbers, number: int) -> Iterator[tuple[Shape, list[tuple[Vector, Nearest]]]]:
     """Yield surfaces with points of one kind and their exact answers, that many points in all."""
     missing, failures = number, 0
     while missing:
-        shape, points = kind.draw(dice)
+        shape, points = kind.draw(random)
         answers = [(point, nearest_segments(shape.nodes, shape.segments, point)) for point in points]
         suitable = [(point, nearest) for point, nearest in answers if kind.holds(shape, point, nearest)][:missing]
         if suitable:

@@ -16,10 +16,9 @@ from fractions import Fraction
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.oracle.exact_nearest import nearest_segments
-from contactverif.studies.queries.answer_file import Answer, Answers
-from contactverif.studies.queries.query_dice import Vector
+from contactverif.studies.queries.answers import Answer, Answers
 from contactverif.studies.queries.query_file import ExactAnswer, ExactSegment, Queries
-from contactverif.studies.queries.query_shapes import Shape
+from contactverif.studies.queries.surfaces import Shape, Vector
 
 SIGN_TOLERANCE = 4  # The tolerance of the gap, in units of u (L + |P − A|); verification of gaps elsewhere uses it too.
 _MILLION = 1e6
@@ -134,7 +133,6 @@ def _has_wrong_sign(answer: Answer, segments: Sequence[ExactSegment], unit: floa
 
 
 def _length(shape: Shape, segment: int) -> float:
-    """Return the length of a segment."""
     (ax, ay), (bx, by) = shape.ends(segment)
     return math.hypot(bx - ax, by - ay)
 

@@ -1,56 +1,96 @@
-"""Kinds of queries at one vertex, one segment or one free end of an ordinary chain."""
+"""Kinds of queries: the data of one, and those at one vertex, segment or free end of an ordinary chain.
+
+What holds is decided by the exact answer alone. A point for which it does not hold is drawn again, so that a query is
+of the kind whose name it bears.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 from contactverif.oracle.exact_nearest import Nearest
-from contactverif.studies.queries.kind_contract import Kind, has_inner_foot, is_tie, lies_off_a_vertex
-from contactverif.studies.queries.query_dice import Dice, Vector
-from contactverif.studies.queries.query_shapes import (
+from contactverif.studies.queries.surfaces import (
     Chain,
+    RandomNumbers,
     Shape,
+    Vector,
     add,
     exact_motion,
     frame,
     lattice_chain,
     make_shape,
+    move_together,
     rough_chain,
     rounded_motion,
 )
 
 N_POINTS = 10  # The number of points that are drawn for a surface.
 _ALMOST = 1e-12  # The distance from a node, in lengths of the segment, within which a foot almost hits it.
+Draw = Callable[[RandomNumbers], tuple[Shape, list[Vector]]]
+Condition = Callable[[Shape, Vector, Nearest], bool]
 
 
-def point_over(dice: Dice, shape: Shape, segment: int, *, powers: tuple[int, int] = (-30, -2)) -> Vector:
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of query."""
+
+    name: str  # One word, as it stands in the file.
+    meaning: str
+    draw: Draw  # Draws a surface and some points for it.
+    holds: Condition = lambda shape, point, nearest: True  # Whether a point is of this kind, by its exact answer.
+
+
+def has_inner_foot(shape: Shape, point: Vector, nearest: Nearest) -> bool:
+    """Return whether one segment is nearest, and the foot is between its nodes."""
+    return len(nearest.segments) == 1 and 0 < nearest.segments[0].xi < 1
+
+
+def is_tie(shape: Shape, point: Vector, nearest: Nearest) -> bool:
+    """Return whether no rule but the number of the segment decides."""
+    return nearest.n_undecided > 1
+
+
+def lies_off_a_vertex(sign: int) -> Condition:
+    """Return the condition that a node of two segments is nearest, and the point is outside (+1) or inside (−1)."""
+
+    def condition(shape: Shape, point: Vector, nearest: Nearest) -> bool:
+        gap = nearest.segments[0].signed_squared_gap
+        return len(nearest.segments) == 2 and nearest.n_undecided == 1 and gap * sign > 0
+
+    return condition
+
+
+def point_over(random: RandomNumbers, shape: Shape, segment: int, *, powers: tuple[int, int] = (-30, -2)) -> Vector:
     """Return a point over or under the inside of a segment, at a distance between two powers of 2 of its length."""
     first, second = shape.ends(segment)
     length, t, n = frame(first, second)
-    gap = dice.sign() * dice.power(*powers) * length
-    return add(first, (dice.real(0.05, 0.95) * length, t), (gap, n))
+    gap = random.sign() * random.power(*powers) * length
+    return add(first, (random.real(0.05, 0.95) * length, t), (gap, n))
 
 
-def points_over(dice: Dice, shape: Shape, *, powers: tuple[int, int] = (-30, -2)) -> list[Vector]:
+def points_over(random: RandomNumbers, shape: Shape, *, powers: tuple[int, int] = (-30, -2)) -> list[Vector]:
     """Return points over or under random segments."""
-    segments = [dice.integer(0, len(shape.segments) - 1) for _ in range(N_POINTS)]
-    return [point_over(dice, shape, segment, powers=powers) for segment in segments]
+    segments = [random.integer(0, len(shape.segments) - 1) for _ in range(N_POINTS)]
+    return [point_over(random, shape, segment, powers=powers) for segment in segments]
 
 
-def draw_inside(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_inside(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw a rough chain and points beside its segments."""
-    shape = make_shape(rounded_motion(dice, rough_chain(dice, dice.integer(2, 12))))
-    return shape, points_over(dice, shape)
+    shape = make_shape(rounded_motion(random, rough_chain(random, random.integer(2, 12))))
+    return shape, points_over(random, shape)
 
 
-def draw_free_end(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_free_end(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points past the ends of a rough chain, by 2^-40 … 2 lengths."""
-    shape = make_shape(rounded_motion(dice, rough_chain(dice, dice.integer(1, 6))))
+    shape = make_shape(rounded_motion(random, rough_chain(random, random.integer(1, 6))))
     points = []
     for _ in range(N_POINTS):
-        end = dice.integer(0, 1)
+        end = random.integer(0, 1)
         ends = shape.ends((0, len(shape.segments) - 1)[end])
         _, t, n = frame(*ends)
-        past = (2 * end - 1) * dice.power(-40, 0)
-        points.append(add(ends[end], (past, t), (dice.sign() * dice.power(-20, 0), n)))
+        past = (2 * end - 1) * random.power(-40, 0)
+        points.append(add(ends[end], (past, t), (random.sign() * random.power(-20, 0), n)))
     return shape, points
 
 
@@ -60,58 +100,53 @@ def is_past_free_end(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return not others and not 0 <= near.xi <= 1 and shape.surface.neighbours[near.segment, int(near.xi > 1)] < 0
 
 
-def draw_vertex(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_vertex(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points between the two normals of a vertex, outside a convex one or inside a concave one."""
-    chain = rounded_motion(dice, rough_chain(dice, dice.integer(2, 8)))
+    chain = rounded_motion(random, rough_chain(random, random.integer(2, 8)))
     shape, points = make_shape(chain), []
     for _ in range(N_POINTS):
-        vertex = dice.integer(1, len(chain) - 2)
+        vertex = random.integer(1, len(chain) - 2)
         (_, t, n), (_, _, n2) = frame(chain[vertex - 1], chain[vertex]), frame(chain[vertex], chain[vertex + 1])
         side = 1 if t[0] * n2[0] + t[1] * n2[1] > 0 else -1
-        share, reach = dice.real(0, 1), side * dice.power(-20, -3)
+        share, reach = random.real(0, 1), side * random.power(-20, -3)
         points.append(add(chain[vertex], (reach * share, n), (reach * (1 - share), n2)))
     return shape, points
 
 
-def draw_valley(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_valley(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points near the bisector of a concave vertex, off it by 2^-40 … 1/8 of their height."""
-    left, right = dice.real(0.3, 3), dice.real(0.3, 3)
+    left, right = random.real(0.3, 3), random.real(0.3, 3)
     arms: Chain = [(4.0, 4 * right), (0.0, 0.0), (-4.0, 4 * left)]
-    chain = rounded_motion(dice, [(8.0, 4 * right), *arms, (-8.0, 4 * left)])
+    chain = rounded_motion(random, [(8.0, 4 * right), *arms, (-8.0, 4 * left)])
     (_, t, n), (_, _, n2) = frame(chain[1], chain[2]), frame(chain[2], chain[3])
     points = []
     for _ in range(N_POINTS):
-        height = dice.power(-12, 0)
-        off = height * dice.sign() * dice.power(-40, -4)
+        height = random.power(-12, 0)
+        off = height * random.sign() * random.power(-40, -4)
         points.append(add(chain[2], (height, n), (height, n2), (off, t)))
     return make_shape(chain), points
 
 
-def draw_bisector(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_bisector(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points on the axis of a symmetric vertex, convex or concave, on a lattice: exact ties."""
-    width, height = dice.integer(2, 12), dice.sign() * dice.integer(1, 24)
+    width, height = random.integer(2, 12), random.sign() * random.integer(1, 24)
     arms: Chain = [(width, height), (0, 0), (-width, height)]
     whole = [(width + 4.0, float(height)), *arms, (-width - 4.0, float(height))]
-    points: Chain = [(0, dice.sign() * dice.integer(1, 16) / 8) for _ in range(N_POINTS)]
-    moved = exact_motion(dice, [*whole, *points])
-    return make_shape(moved[: len(whole)]), moved[len(whole) :]
+    points: Chain = [(0, random.sign() * random.integer(1, 16) / 8) for _ in range(N_POINTS)]
+    return move_together(exact_motion, random, [whole], points)
 
 
-def draw_node_hit(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_node_hit(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points whose foot is exactly at a node of a lattice chain."""
-    chain = lattice_chain(dice, dice.integer(1, 8))
+    chain = lattice_chain(random, random.integer(1, 8))
     points: Chain = []
     for _ in range(N_POINTS):
-        segment, end, multiple = (
-            dice.integer(0, len(chain) - 2),
-            dice.integer(0, 1),
-            dice.sign() / 2 ** dice.integer(1, 8),
-        )
+        segment, end = random.integer(0, len(chain) - 2), random.integer(0, 1)
+        multiple = random.sign() / 2 ** random.integer(1, 8)
         (ax, ay), (bx, by) = chain[segment : segment + 2]
         x, y = chain[segment + end]
         points.append((x + multiple * (by - ay), y - multiple * (bx - ax)))
-    moved = exact_motion(dice, [*chain, *points])
-    return make_shape(moved[: len(chain)]), moved[len(chain) :]
+    return move_together(exact_motion, random, [chain], points)
 
 
 def hits_node(shape: Shape, point: Vector, nearest: Nearest) -> bool:
@@ -119,14 +154,14 @@ def hits_node(shape: Shape, point: Vector, nearest: Nearest) -> bool:
     return nearest.squared_distance > 0 and any(near.xi in (0, 1) for near in nearest.segments)
 
 
-def draw_node_almost_hit(dice: Dice) -> tuple[Shape, list[Vector]]:
+def draw_node_almost_hit(random: RandomNumbers) -> tuple[Shape, list[Vector]]:
     """Draw points over a node of a steep chain, along the normal of one of its segments."""
-    chain = rounded_motion(dice, rough_chain(dice, dice.integer(2, 8), largest_slope=0.9))
+    chain = rounded_motion(random, rough_chain(random, random.integer(2, 8), largest_slope=0.9))
     points = []
     for _ in range(N_POINTS):
-        segment, end = dice.integer(0, len(chain) - 2), dice.integer(0, 1)
+        segment, end = random.integer(0, len(chain) - 2), random.integer(0, 1)
         _, _, n = frame(chain[segment], chain[segment + 1])
-        points.append(add(chain[segment + end], (dice.sign() * dice.power(-20, -3), n)))
+        points.append(add(chain[segment + end], (random.sign() * random.power(-20, -3), n)))
     return make_shape(chain), points
 
 
