@@ -6,8 +6,7 @@ on a second, coprime lattice (sevenths), so that they are not at kinks. Exact ti
 Scenes with elastic bodies are in `contactverif.strategies.solids`, which imports the mechanics; this package does not.
 """
 
-from contactverif.strategies.class_meshes import normal_cases, overhung_cases, single_cases
-from contactverif.strategies.flat import flat_cases
+from contactverif.strategies.flat import flat_cases, normal_cases, overhung_cases, single_cases
 from contactverif.strategies.general import general_cases, smooth_cases
 from contactverif.strategies.ties import tie_cases
 

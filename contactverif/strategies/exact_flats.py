@@ -47,44 +47,51 @@ def linear_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case
 
 
 @st.composite
+def _exact_flat_cases(draw: DrawFn) -> Case:
+    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
+    depth = draw(st.integers(1, 7)) / 4 * 2.0 ** -draw(st.integers(6, 28))
+    penalty, seed, shift, offsets = _others(draw)
+    fineness = FINENESS if shift.any() else _FINENESS_AT_REST
+    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
+    return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
+
+
+@st.composite
 def _linear_flat_cases(draw: DrawFn) -> Case:
-    turn = draw(st.sampled_from(_TURNS))
-    slave_lengths, master_lengths = draw(_LENGTHS), draw(_LENGTHS)
+    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
     depth, rise = 2.0 ** -draw(st.integers(6, 12)), draw(st.sampled_from([1, -1, 2, -2, 3, -3]))
-    penalty, seed = draw(penalties()), draw(seeds())
-    shift = draw(st.one_of(st.just(np.zeros(2)), exact_shifts()))
-    offsets = draw(OFFSETS)
-    end = float(sum(slave_lengths))
+    penalty, seed, shift, offsets = _others(draw)
     # Heights are places times a power of two, so that they need some bits more than places.
-    slave = _places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, _COARSE)
-    inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
-    master = _places([-1.0, *inside, end + 1], offsets, 13, FINENESS)
+    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
     case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
     # The longest slave is 16 long, so that the penetration is 5/8 of that of the middle node or more.
     slope = depth * rise / 128
     (p, q, _), middle = turn, slave[len(slave) // 2]
-    lift = np.outer(slope * (slave - middle), [-q, p])
     positions = case.positions.copy()
-    positions[: len(slave)] += lift
+    positions[: len(slave)] += np.outer(slope * (slave - middle), [-q, p])
     parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
     return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)
 
 
-@st.composite
-def _exact_flat_cases(draw: DrawFn) -> Case:
-    turn = draw(st.sampled_from(_TURNS))
-    slave_lengths, master_lengths = draw(_LENGTHS), draw(_LENGTHS)
-    quarters, finest = draw(st.integers(1, 7)), draw(st.integers(6, 28))
+def _turn_and_lengths(draw: DrawFn) -> tuple[Turn, list[int], list[int]]:
+    return draw(st.sampled_from(_TURNS)), draw(_LENGTHS), draw(_LENGTHS)
+
+
+def _others(draw: DrawFn) -> tuple[float, int, FloatArray, list[int]]:
+    """Draw penalty, seed, translation and offsets."""
     penalty, seed = draw(penalties()), draw(seeds())
-    shift = draw(st.one_of(st.just(np.zeros(2)), exact_shifts()))
-    offsets = draw(OFFSETS)
+    return penalty, seed, draw(st.one_of(st.just(np.zeros(2)), exact_shifts())), draw(OFFSETS)
+
+
+def _slave_and_master(
+    slave_lengths: list[int], master_lengths: list[int], offsets: list[int], slave_bits: int, master_bits: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the places of both surfaces' nodes along the line; the master goes beyond the slave by 1."""
     end = float(sum(slave_lengths))
-    fineness = FINENESS if shift.any() else _FINENESS_AT_REST
-    slave = _places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, fineness)
+    slave = _places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, slave_bits)
     inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
-    master = _places([-1.0, *inside, end + 1], offsets, 13, fineness)
-    case = flat_state("", slave.tolist(), flat_master(master.tolist()), quarters / 4 * 2.0**-finest, turn=turn)
-    return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
+    return slave, _places([-1.0, *inside, end + 1], offsets, 13, master_bits)
 
 
 def _places(places: list[float], offsets: list[int], over: int, fineness: int) -> FloatArray:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import SearchStrategy
+from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
 from contactverif.strategies.contact import radial_factor
-from contactverif.strategies.panels import Panel, on_lattice, shortest
-from contactverif.strategies.parts import depth_units, depths, repeat_cyclically, shifts
+from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
+from contactverif.strategies.parts import (
+    OFFSETS,
+    depth_units,
+    depths,
+    motions,
+    penalties,
+    repeat_cyclically,
+    seeds,
+    shifts,
+    shuffles,
+)
 
 RADIUS = 4.0
 
@@ -60,3 +71,16 @@ def rings() -> SearchStrategy[Ring]:
     degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
     depth = st.one_of(depths(), depths(lowest=-6))
     return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
+
+
+def closed_cases() -> SearchStrategy[Case]:
+    """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
+    return _closed_cases()
+
+
+@st.composite
+def _closed_cases(draw: DrawFn) -> Case:
+    ring = replace(draw(rings()), degrees=360)
+    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
+    interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
+    return Case(interface, z, penalty, {}, seed)

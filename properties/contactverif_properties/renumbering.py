@@ -28,7 +28,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
-from contactverif.strategies.closed import closed_cases
+from contactverif.strategies.rings import closed_cases
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.relabelled import renumber
 from contactverif_properties.shared.same_answer import TIE, answer_alike, compare, same_answer_quantities
