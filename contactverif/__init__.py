@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         evaluate_both,
     )
     from contactverif.contract.interface import Interface, Surface
-    from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
+    from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
     from contactverif.contract.traits import Traits
@@ -54,7 +54,7 @@ _HOMES = {
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
     "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
-    "contract.property": ("Measurement", "Outcome", "Property", "Quantity", "Verdict"),
+    "contract.property": ("Finding", "Measurement", "Outcome", "Property", "Quantity", "Verdict"),
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
     "contract.traits": ("Traits",),
@@ -82,6 +82,7 @@ __all__ = [
     "ContactverifError",
     "ContractError",
     "End",
+    "Finding",
     "Formulation",
     "Handle",
     "Interface",

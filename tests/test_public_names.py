@@ -39,7 +39,7 @@ PUBLIC = {
         *("Body", "Rectangle", "Placing", "block", "rigid_surface", "body_from_mesh"),
         *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
         # Properties, and runs over them.
-        *("Property", "Cases", "Quantity", "Measurement", "Outcome", "Verdict", "Row", "Run"),
+        *("Property", "Cases", "Quantity", "Measurement", "Finding", "Outcome", "Verdict", "Row", "Run"),
         *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify"),
         # Errors.
         *("ContactverifError", "ContractError", "MisuseError"),

@@ -116,8 +116,8 @@ def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
     for number in checked_numbers(info, measurement):
         mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity
         lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
-    if measurement.place:
-        lines.append(measurement.place)
+    if measurement.finding is not None:
+        lines.append(str(measurement.finding))
     others = [_detail(name, value) for name, value in measurement.details.items() if not _is_ending(name)]
     return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
 

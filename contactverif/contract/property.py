@@ -7,7 +7,7 @@ only a `Property` holds functions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from importlib import import_module
@@ -80,18 +80,20 @@ class Quantity:
         refuse("quantity", self.name, self.unit)
         clean(self, lines=("tolerance", "reason"))
 
+    def check(self, value: float, tolerance: float) -> CheckedNumber:
+        """Return a value of this quantity beside its tolerance.
+
+        Parameters
+        ----------
+        value, tolerance : float
+            Both in the unit of the quantity. A NaN value is a failure.
+        """
+        return CheckedNumber(self, value, tolerance)
+
 
 @dataclass(frozen=True, slots=True)
 class CheckedNumber:
-    """A measured number beside its tolerance.
-
-    Attributes
-    ----------
-    quantity : Quantity
-        The quantity that was measured.
-    value, tolerance : float
-        Both in the unit of the quantity. A NaN value is a failure.
-    """
+    """A measured number beside its tolerance, both in the unit of the quantity. A NaN value is a failure."""
 
     quantity: Quantity
     value: float
@@ -100,7 +102,13 @@ class CheckedNumber:
     @property
     def ratio(self) -> float:
         """Value over tolerance (the inverse for "at least"): above 1 fails, infinite if one is not finite."""
-        return excess(self.quantity, self.value, self.tolerance)
+        if not (isfinite(self.value) and isfinite(self.tolerance)):
+            return float("inf")
+        at_most = self.quantity.sense == "at most"
+        top, bottom = (self.value, self.tolerance) if at_most else (self.tolerance, self.value)
+        if bottom <= 0:
+            return 0.0 if top <= bottom else float("inf")
+        return top / bottom
 
     @property
     def sign(self) -> str:
@@ -109,13 +117,59 @@ class CheckedNumber:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """What was found at one place, beside what is right there.
+
+    Attributes
+    ----------
+    place : str
+        The place in words, such as a row and a column of the tangent.
+    found, right : tuple[float, ...]
+        The numbers at that place, as many of both; empty where the place says it all.
+    unit : str
+        The unit of both.
+    found_name, right_name : str
+        What the numbers are, in a word: `force` and `exact`.
+    remark : str
+        Anything else about the place.
+
+    Raises
+    ------
+    ValueError
+        If not as many numbers are found as are right.
+    """
+
+    place: str
+    found: tuple[float, ...] = ()
+    right: tuple[float, ...] = ()
+    unit: str = "1"
+    found_name: str = "found"
+    right_name: str = "right"
+    remark: str = ""
+
+    def __post_init__(self) -> None:
+        clean(self, lines=("place", "unit", "found_name", "right_name", "remark"))
+        for name in ("found", "right"):
+            object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
+        if len(self.found) != len(self.right):
+            raise ValueError(f"{len(self.found)} numbers are found, and {len(self.right)} are right")
+
+    def __str__(self) -> str:
+        if not self.found:
+            return "; ".join(filter(None, (self.place, self.remark)))
+        found, right = (", ".join(f"{number:.10g}" for number in numbers) for numbers in (self.found, self.right))
+        text = f"{self.place}: {self.found_name} {found}, {self.right_name} {right}"
+        return f"{text}; {self.remark}" if self.remark else text
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
     """The numbers that a property measured on one case, with their tolerances.
 
     Attributes
     ----------
-    values, tolerances : Mapping[str, float]
-        {quantity: number}, the same names; a NaN value is a failure.
+    numbers : Sequence[CheckedNumber]
+        The numbers, each as `quantity.check(value, tolerance)`; one of each quantity at most.
     undecided : str
         The reason why a failure would not be the formulation's fault (roundoff, a kink); empty if it would.
     broken : str
@@ -127,21 +181,38 @@ class Measurement:
     idle : bool
         Nothing was in contact, so that a pass says little; a property with too many idle cases is not judged
         (`PropertyInfo.least_contact`).
-    place : str
-        The place of the worst number in words, such as a row and a column of the tangent; empty where there is none.
+    finding : Finding | None
+        The place of the worst number, and what is found and right there; None where nothing is known of it.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is measured twice.
     """
 
-    values: Mapping[str, float]
-    tolerances: Mapping[str, float]
+    numbers: Sequence[CheckedNumber] = ()
     undecided: str = ""
     broken: str = ""
     details: Mapping[str, float] = field(default_factory=dict)
     series: Mapping[str, FloatArray] = field(default_factory=dict)
     idle: bool = False
-    place: str = ""
+    finding: Finding | None = None
 
     def __post_init__(self) -> None:
-        clean(self, lines=("undecided", "broken", "place"))
+        clean(self, lines=("undecided", "broken"))
+        object.__setattr__(self, "numbers", tuple(self.numbers))
+        if len(self.values) != len(self.numbers):
+            raise ValueError("a quantity is measured twice")
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The measured values, {name of the quantity: value}."""
+        return {number.quantity.name: number.value for number in self.numbers}
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """The tolerances of the measured values, {name of the quantity: tolerance}."""
+        return {number.quantity.name: number.tolerance for number in self.numbers}
 
 
 Measure = Callable[[Case, Subject], Measurement]
@@ -357,24 +428,29 @@ class Outcome:
 DECIDED = frozenset({Verdict.PASS, Verdict.FAIL, Verdict.CRASHED})  # The verdicts that count as judged.
 
 
-def excess(quantity: Quantity, value: float, tolerance: float) -> float:
-    """Return how far the value is towards its tolerance: above 1 fails, infinite if one of them is not finite."""
-    if not (isfinite(value) and isfinite(tolerance)):
-        return float("inf")
-    top, bottom = (value, tolerance) if quantity.sense == "at most" else (tolerance, value)
-    if bottom <= 0:
-        return 0.0 if top <= bottom else float("inf")
-    return top / bottom
+def check_all(
+    values: Mapping[Quantity, float], tolerance: Mapping[Quantity, float] | float
+) -> tuple[CheckedNumber, ...]:
+    """Return values beside one tolerance, or each beside its own; tolerances of what has no value play no part.
+
+    Parameters
+    ----------
+    values : Mapping[Quantity, float]
+        {quantity: value}, each in its unit.
+    tolerance : Mapping[Quantity, float] | float
+        {quantity: tolerance}, or one number for all.
+    """
+    each = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(values, tolerance)
+    return tuple(quantity.check(value, each[quantity]) for quantity, value in values.items())
 
 
 def checked_numbers(info: PropertyInfo, measurement: Measurement | None) -> tuple[CheckedNumber, ...]:
     """Return the measured numbers beside their tolerances, in the order of the quantities."""
-    if measurement is None:
-        return ()
+    by_name = {number.quantity.name: number for number in measurement.numbers} if measurement is not None else {}
     return tuple(
-        CheckedNumber(quantity, measurement.values[quantity.name], measurement.tolerances[quantity.name])
+        quantity.check(by_name[quantity.name].value, by_name[quantity.name].tolerance)
         for quantity in info.quantities
-        if quantity.name in measurement.values
+        if quantity.name in by_name
     )
 
 
@@ -398,7 +474,7 @@ def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
     if measurement.undecided and (failures or not numbers):
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
-        return Verdict.FAIL, "; ".join([*failures, *([measurement.place] if measurement.place else [])])
+        return Verdict.FAIL, "; ".join([*failures, *([str(measurement.finding)] if measurement.finding else [])])
     for number in reversed(numbers):
         if not isfinite(number.tolerance):  # The judge's fault, not the formulation's: neither pass nor accusation.
             return Verdict.UNDECIDED, f"the tolerance of {number.quantity.name} is {number.tolerance}"

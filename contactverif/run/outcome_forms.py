@@ -5,14 +5,15 @@ The store of a row and the journal of a run keep outcomes in this way.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import freeze
 from contactverif.contract.case_summary import CaseSummary
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
 
 _ALWAYS = 6  # Seconds, numbers of segments, penalty and two lengths.
 
@@ -25,8 +26,11 @@ class OutcomeForm(NamedTuple):
     measured: bool
     idle: bool
     reason: str
-    texts: tuple[str, str, str]
-    values: tuple[str, ...]
+    undecided: str
+    broken: str
+    quantities: tuple[Quantity, ...]
+    finding: Finding | None  # Without its numbers.
+    n_found: int
     details: tuple[str, ...]
     series: tuple[tuple[str, int], ...]
     parameters: tuple[str, ...]
@@ -39,7 +43,8 @@ class OutcomeForm(NamedTuple):
         lengths = [length for _, length in self.series]
         if min(lengths, default=0) < 0:
             raise ValueError(f"a series of {min(lengths)} numbers")
-        return _ALWAYS + len(self.parameters) + 2 * len(self.values) + len(self.details) + sum(lengths)
+        n_pairs = len(self.quantities) + self.n_found
+        return _ALWAYS + len(self.parameters) + 2 * n_pairs + len(self.details) + sum(lengths)
 
 
 def encode(outcome: Outcome) -> tuple[OutcomeForm, list[float]]:
@@ -48,29 +53,24 @@ def encode(outcome: Outcome) -> tuple[OutcomeForm, list[float]]:
     sizes = [float(summary.n_slave_segments), float(summary.n_master_segments)]
     lengths = [summary.penalty, summary.largest_coordinate, summary.shortest_segment]
     numbers = [outcome.seconds, *sizes, *lengths, *summary.parameters.values()]
-    values: Mapping[str, float] = {}
-    details: Mapping[str, float] = {}
-    series: tuple[tuple[str, int], ...] = ()
-    texts = "", "", ""
-    if measurement is not None:
-        values, details = measurement.values, measurement.details
-        numbers += values.values()
-        numbers += [measurement.tolerances[name] for name in values]
-        numbers += details.values()
-        series = tuple((name, len(entries)) for name, entries in measurement.series.items())
-        for entries in measurement.series.values():
-            numbers += np.asarray(entries).tolist()
-        texts = measurement.undecided, measurement.broken, measurement.place
+    measured = measurement or Measurement()
+    finding = measured.finding or Finding("")
+    numbers += np.array([(number.value, number.tolerance) for number in measured.numbers]).ravel().tolist()
+    numbers += np.concatenate([[*measured.details.values()], *measured.series.values()]).tolist()
+    numbers += finding.found + finding.right
     form = OutcomeForm(
         outcome.verdict,
         bool(outcome.breach),
         measurement is not None,
-        measurement is not None and bool(measurement.idle),
+        bool(measured.idle),
         outcome.reason,
-        texts,
-        tuple(values),
-        tuple(details),
-        series,
+        measured.undecided,
+        measured.broken,
+        tuple(number.quantity for number in measured.numbers),
+        measured.finding and replace(finding, found=(), right=()),
+        len(finding.found),
+        tuple(measured.details),
+        tuple((name, len(entries)) for name, entries in measured.series.items()),
         tuple(summary.parameters),
         summary.name,
         summary.kind,
@@ -92,15 +92,15 @@ def decode(form: OutcomeForm, numbers: Sequence[float]) -> Outcome:
     )
     measurement = None
     if form.measured:
-        undecided, broken, place = form.texts
         measurement = Measurement(
-            read_named(form.values),
-            read_named(form.values),
-            undecided=undecided,
-            broken=broken,
-            place=place,
+            [quantity.check(next(rest), next(rest)) for quantity in form.quantities],
+            undecided=form.undecided,
+            broken=form.broken,
             details=read_named(form.details),
             series={name: freeze([next(rest) for _ in range(length)], np.float64) for name, length in form.series},
             idle=form.idle,
         )
+        if form.finding is not None:
+            found, right = (tuple(next(rest) for _ in range(form.n_found)) for _ in range(2))
+            measurement = replace(measurement, finding=replace(form.finding, found=found, right=right))
     return Outcome(summary, form.verdict, form.reason, measurement, seconds, form.breach)

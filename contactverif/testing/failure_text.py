@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict, excess
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 
 
@@ -52,15 +52,12 @@ def _numbers(question: PropertyInfo, outcome: Outcome) -> list[str]:
     if measurement is None:
         return []
     lines = [f"    {measurement.broken}"] if measurement.broken else []
-    for quantity in question.quantities:
-        if quantity.name not in measurement.values:
-            continue
-        value, tolerance = measurement.values[quantity.name], measurement.tolerances[quantity.name]
-        mark = "✗" if excess(quantity, value, tolerance) > 1 else "✓"
-        lines.append(f"    {mark} {quantity.name}: {value:.6g}; needed: {quantity.sense} {tolerance:.3g}")
+    for number in checked_numbers(question, measurement):
+        mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity
+        lines.append(f"    {mark} {quantity.name}: {number.value:.6g}; needed: {quantity.sense} {number.tolerance:.3g}")
         lines.append(f"      tolerance: {quantity.tolerance} ({quantity.reason})")
-    if measurement.place:
-        lines.append(f"    {measurement.place}")
+    if measurement.finding is not None:
+        lines.append(f"    {measurement.finding}")
     return lines
 
 

@@ -32,7 +32,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import force_error, shape_integrals, traction_forces
 from contactverif.problems.arcs import Arcs
@@ -75,12 +75,14 @@ def measure_arcs(case: Case, subject: Subject) -> Measurement:
     arcs = Arcs.from_case(case)
     errors = {refine: _errors(arcs, refine, subject) for refine in REFINEMENTS}
     values = errors.pop(REFINEMENTS[-1])
-    tolerances = {name: NODAL if name == FORCES.name else TOTAL for name in values}
-    details = {f"{name}, m = {refine}": value for refine, part in errors.items() for name, value in part.items()}
-    return Measurement(values, tolerances, details=details)
+    tolerances = {quantity: NODAL if quantity == FORCES else TOTAL for quantity in values}
+    details = {
+        f"{quantity.name}, m = {refine}": value for refine, part in errors.items() for quantity, value in part.items()
+    }
+    return Measurement(check_all(values, tolerances), details=details)
 
 
-def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[str, float]:
+def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[Quantity, float]:
     """Return the errors {quantity: number} on one mesh."""
     case = arcs.case(refine)
     formulation, interface, n_slave = subject.for_case(case), case.interface, case.interface.n_slave_nodes
@@ -92,15 +94,15 @@ def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[str, float]:
     exact = share * arcs.slave_force
     totals = forces[:n_slave].sum(axis=0), -forces[n_slave:].sum(axis=0)
     slave, master = (float(np.linalg.norm(total - exact) / np.linalg.norm(exact)) for total in totals)
-    values = {SLAVE.name: slave, FORCES.name: _nodal_error(arcs, case, forces, share)}
+    values = {SLAVE: slave, FORCES: _nodal_error(arcs, case, forces, share)}
     if subject.traits.conserves_force:
-        values[MASTER.name] = master
+        values[MASTER] = master
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(interface, pairing, case.z)
         radial = forces[:n_slave] * case.positions[:n_slave] / arcs.slave_radius
         total = nearest_sum(points, abs(float(radial.sum())))
-        values[SUM.name] = abs(total / (share * arcs.length * arcs.pressure) - 1)
-        values[PRESSURE.name] = _pressure_error(points, arcs.pressure)
+        values[SUM] = abs(total / (share * arcs.length * arcs.pressure) - 1)
+        values[PRESSURE] = _pressure_error(points, arcs.pressure)
     return values
 
 

@@ -121,9 +121,8 @@ def measure_convergence(case: Case, subject: Subject) -> Measurement:
     if len(pressures) == len(errors):
         judged.append((PRESSURE_RATE, _rate(pressures), limits.pressure_rate))
         judged.append((PRESSURE, pressures[-1], limits.pressure))
-    values = {quantity.name: value for quantity, value, _ in judged}
-    tolerances = {quantity.name: tolerance for quantity, _, tolerance in judged}
-    return Measurement(values, tolerances, undecided=_reason(errors), series=_as_series(errors))
+    numbers = [quantity.check(value, tolerance) for quantity, value, tolerance in judged]
+    return Measurement(numbers, undecided=_reason(errors), series=_as_series(errors))
 
 
 def hertz_cases() -> Cases:

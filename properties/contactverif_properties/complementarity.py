@@ -20,7 +20,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import solve
@@ -75,22 +75,22 @@ def measure_complementarity(case: Case, subject: Subject) -> Measurement:
     trace = find_solution(system)
     details = solution_details(trace)
     if not trace.converged:
-        return Measurement({}, {}, details=details, undecided=f"Newton found no solution: {trace.end.label}")
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution, n_free = trace.u[-1], scene.n_free
     pairing = system.pair(solution)
     condition = system.step(system.matrix(solution, pairing)[0], np.zeros(system.size)).condition
     if condition <= 0:
-        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
     units, length = length_units(system, solution, pairing), case.shortest_segment
     floor = solution_floor(system, solution, pairing, condition) / length
     lengths: FloatArray = solution / units / length
-    values = {TENSION.name: float(np.maximum(-lengths[n_free:], 0.0).max(initial=0.0))}
+    values = {TENSION: float(np.maximum(-lengths[n_free:], 0.0).max(initial=0.0))}
     rescaled = subject.with_penalty(subject.penalty(case) / SCALE_RATIO)
     again = solve(scene, rescaled, start=solution)
     if again.converged:
-        values[CHANGE.name] = float((np.abs(again.u[-1] - solution) / units).max()) / length
+        values[CHANGE] = float((np.abs(again.u[-1] - solution) / units).max()) / length
     details |= {"converged with another scale": float(again.converged)}
-    return Measurement(values, dict.fromkeys(values, floor), details=details, idle=is_untouched(system, trace))
+    return Measurement(check_all(values, floor), details=details, idle=is_untouched(system, trace))
 
 
 def refuse_undefined_solution(traits: Traits) -> str:

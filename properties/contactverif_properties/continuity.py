@@ -26,7 +26,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases
@@ -77,16 +77,16 @@ def measure_continuity(case: Case, subject: Subject) -> Measurement:
         case, samples[int(np.abs(samples).sum(axis=1).argmax())], rounding_distance(case, subject.traits)
     )
     jumps = find_jumps(forces, samples, HALVINGS, ALLOWED)
-    values = {FORCE.name: ratio(jumps[0][1], size)}
-    tolerances = {FORCE.name: ALLOWED * ratio(_largest_step(samples), size) + rounding}
+    values = {FORCE: ratio(jumps[0][1], size)}
+    tolerances = {FORCE: ALLOWED * ratio(_largest_step(samples), size) + rounding}
     if subject.traits.continuity == "C1":
         samples = slope(_places())
         steepest = float(np.abs(samples).max())
-        values[SLOPE.name] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)
-        tolerances[SLOPE.name] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
-    places = [place for place, jump in jumps if ratio(jump, size) > tolerances[FORCE.name]]
+        values[SLOPE] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)
+        tolerances[SLOPE] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
+    places = [place for place, jump in jumps if ratio(jump, size) > tolerances[FORCE]]
     details = {"jumps": float(len(places))} | ({"place of the largest jump": places[0]} if places else {})
-    return Measurement(values, tolerances, details=details, idle=size == 0)
+    return Measurement(check_all(values, tolerances), details=details, idle=size == 0)
 
 
 def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: float) -> list[tuple[float, float]]:

@@ -41,8 +41,8 @@ def measure_overhang(case: Case, subject: Subject) -> Measurement:
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     covered = min(slave.max(), master.max()) - max(slave.min(), master.min())
     ratio = float(np.ptp(slave) / covered)
-    tolerances = {name: ratio * tolerance for name, tolerance in measurement.tolerances.items()}
-    return replace(measurement, tolerances=tolerances)
+    numbers = [replace(number, tolerance=ratio * number.tolerance) for number in measurement.numbers]
+    return replace(measurement, numbers=numbers)
 
 
 def _widen_tolerance(quantity: Quantity) -> Quantity:

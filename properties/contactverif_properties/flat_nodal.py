@@ -24,7 +24,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.property import Measurement, Property, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights
@@ -58,13 +58,13 @@ def measure_springs(case: Case, subject: Subject) -> Measurement:
         likeness = float((forces * exact).sum())
         forces = forces * (float((exact**2).sum()) / likeness if likeness > 0 else 1.0)
     tolerance, size = gap_tolerance(case, depth), spring * float(weights[: interface.n_slave_nodes].sum())
-    values = {FORCE.name: float(np.linalg.norm(forces - exact, axis=1).max()) / size}
+    values = {FORCE: float(np.linalg.norm(forces - exact, axis=1).max()) / size}
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(interface, pairing, case.z)
-        values[GAP.name] = point_errors(case, points, case.penalty, case.penalty * depth)[0]
+        values[GAP] = point_errors(case, points, case.penalty, case.penalty * depth)[0]
         if not unbiased:
-            values[REPORTED_FORCE.name] = point_errors(case, points, case.penalty, spring)[1]
-    return Measurement(values, dict.fromkeys(values, tolerance))
+            values[REPORTED_FORCE] = point_errors(case, points, case.penalty, spring)[1]
+    return Measurement(check_all(values, tolerance))
 
 
 def _push(case: Case, weights: FloatArray) -> FloatArray:

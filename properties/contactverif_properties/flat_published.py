@@ -59,11 +59,11 @@ def measure_published(case: Case, subject: Subject) -> Measurement:
     """
     stated = _stated_forces(case, subject.traits)
     if stated is None:
-        return Measurement({}, {}, idle=True)
+        return Measurement(idle=True)
     forces = _forces_of_unit(case, subject)
     n_slave = case.interface.n_slave_nodes
     error = float(np.linalg.norm(forces - stated, axis=1).max() / np.abs(stated[:n_slave]).sum())
-    return Measurement({FORCE.name: error}, {FORCE.name: gap_tolerance(case, case.parameter("penetration"))})
+    return Measurement([FORCE.check(error, gap_tolerance(case, case.parameter("penetration")))])
 
 
 def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:

@@ -71,7 +71,7 @@ def measure_resultant(case: Case, subject: Subject) -> Measurement:
         rounding = COORDINATE_ROUNDING * case.largest_coordinate
         pairing = formulation.pair(interface, case.z)
         undecided = explain_by_kink(stretched, formulation, pairing, rounding, {"forces": error})
-    return Measurement({TOTAL_ERROR.name: value}, {TOTAL_ERROR.name: tolerance}, undecided)
+    return Measurement([TOTAL_ERROR.check(value, tolerance)], undecided)
 
 
 def refuse_unknown_total(traits: Traits) -> str:

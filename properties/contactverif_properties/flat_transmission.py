@@ -48,7 +48,7 @@ def measure_transmission(case: Case, subject: Subject) -> Measurement:
         The largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces, dimensionless.
     """
     error, tolerance = transmission_error(case, subject)
-    return Measurement({FORCE_ERROR.name: error}, {FORCE_ERROR.name: tolerance})
+    return Measurement([FORCE_ERROR.check(error, tolerance)])
 
 
 FLAT_TRANSMISSION = Property(

@@ -40,7 +40,7 @@ def measure_force_imbalance(case: Case, subject: Subject) -> Measurement:
     state, forces = forces_of_any_state(case, subject)
     imbalance = ratio(float(np.linalg.norm(forces.sum(axis=0))), sum_slave_forces(state, forces))
     tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
-    return Measurement({IMBALANCE.name: imbalance}, {IMBALANCE.name: tolerance}, idle=not forces.any())
+    return Measurement([IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
 
 
 FORCE_BALANCE = Property(

@@ -55,13 +55,15 @@ def measure_vanishing_overlap(case: Case, subject: Subject) -> Measurement:
     measurement = measure_overhang(case, subject)
     rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure_of(case, case.penalty)
     more = rounding / covered_share(case)
-    tolerances = dict(measurement.tolerances)
     if subject.traits.enforcement == "multiplier":
-        growth = 1 + more / tolerances[STRESS.name]  # The other tolerances are multiples of this one.
-        tolerances = {name: growth * tolerance for name, tolerance in tolerances.items()}
+        growth = 1 + more / measurement.tolerances[STRESS.name]  # The other tolerances are multiples of this one.
+        numbers = [replace(number, tolerance=growth * number.tolerance) for number in measurement.numbers]
     else:
-        tolerances |= {name: tolerances[name] + more for name in _POINTWISE if name in tolerances}
-    return replace(measurement, tolerances=tolerances, details={**measurement.details, **_rank(case, subject)})
+        numbers = [
+            replace(number, tolerance=number.tolerance + more) if number.quantity.name in _POINTWISE else number
+            for number in measurement.numbers
+        ]
+    return replace(measurement, numbers=numbers, details={**measurement.details, **_rank(case, subject)})
 
 
 def covered_share(case: Case) -> float:

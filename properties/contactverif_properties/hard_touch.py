@@ -25,7 +25,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.touching_states import touching_states
@@ -70,24 +70,24 @@ def measure_touch(case: Case, subject: Subject) -> Measurement:
     forces = formulation.residual(interface, pairing, state.z)[: interface.n_unknowns]
     longest = float(interface.slave.lengths(case.positions).max())
     size, gap = case.largest_coordinate, abs(case.parameter("shift"))
-    values = {FORCE.name: float(np.abs(forces).max()) / (case.penalty * longest * size)}
-    tolerances = {FORCE.name: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
+    values = {FORCE: float(np.abs(forces).max()) / (case.penalty * longest * size)}
+    tolerances = {FORCE: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
     if "tangent" in subject.provides and subject.traits.tangent == "exact":
         n = interface.n_unknowns
         tangent = dense(formulation.tangent(interface, pairing, state.z))[:n, :n]
         along, across = _motions(case)
         resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
-        values |= {PRESSING.name: resistance, PULLING.name: -resistance}
+        values |= {PRESSING: resistance, PULLING: -resistance}
         roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
-        tolerances |= {PRESSING.name: 4.0, PULLING.name: roundoff}
+        tolerances |= {PRESSING: 4.0, PULLING: roundoff}
         if gap:
             depth = _DEPTH * UNIT_ROUNDOFF * size
             z = state.z.copy()
             z[:n] -= depth * across
             tangent = dense(formulation.tangent(interface, formulation.pair(interface, z), z))[:n, :n]
-            values[SLIDING.name] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
-            tolerances[SLIDING.name] = roundoff + 4 * depth / case.shortest_segment
-    return Measurement(values, tolerances)
+            values[SLIDING] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
+            tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
+    return Measurement(check_all(values, tolerances))
 
 
 def _motions(case: Case) -> tuple[FloatArray, FloatArray]:

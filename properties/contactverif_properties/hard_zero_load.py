@@ -22,7 +22,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import solve
@@ -70,8 +70,8 @@ def measure_unloaded(case: Case, subject: Subject) -> Measurement:
     tolerance = 64 * UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
     tolerance *= 1 + case.penalty * case.shortest_segment / young
     tolerance += condition_tolerance(scene, case.penalty) * float(np.abs(scene.start).max()) / case.shortest_segment
-    values = {STRESS.name: stress / young, FORCE.name: float(np.abs(forces).max()) / (young * height)}
-    return Measurement(values, dict.fromkeys(values, tolerance), details=end_details(trace))
+    values = {STRESS: stress / young, FORCE: float(np.abs(forces).max()) / (young * height)}
+    return Measurement(check_all(values, tolerance), details=end_details(trace))
 
 
 def promise_rest(traits: Traits) -> bool:

@@ -38,7 +38,7 @@ def measure_moment_imbalance(case: Case, subject: Subject) -> Measurement:
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
     imbalance = ratio(moment, state.diameter * sum_slave_forces(state, forces))
     tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
-    return Measurement({IMBALANCE.name: imbalance}, {IMBALANCE.name: tolerance}, idle=not forces.any())
+    return Measurement([IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
 
 
 MOMENT_BALANCE = Property(

@@ -62,7 +62,7 @@ def measure_rank(case: Case, subject: Subject) -> Measurement:
     matrix, floor = system.matrix(u, system.pair(u))
     step = system.step(matrix, np.zeros(system.size), floor)
     details = {"multipliers": float(system.n_multipliers)}
-    return Measurement({REDUNDANT.name: float(step.deficiency)}, {REDUNDANT.name: 0.0}, details=details)
+    return Measurement([REDUNDANT.check(float(step.deficiency), 0.0)], details=details)
 
 
 MULTIPLIER_RANK = Property(

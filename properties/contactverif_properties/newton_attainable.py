@@ -34,7 +34,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import move, snap
 from contactverif.mechanics.linear import scale_factors
@@ -165,10 +165,10 @@ def measure_attainable(case: Case, subject: Subject) -> Measurement:
             break
     details = solution_details(trace) | {"share of the load": share}
     if not trace.converged:
-        return Measurement({}, {}, details=details, undecided=f"Newton found no solution: {trace.end.label}")
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution = examine(system, case, trace.u[-1])
     if solution is None:
-        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
     places = dict(zip(OFFSETS, settle(solution, case, [segment * 2.0**power for power in OFFSETS]), strict=True))
     for power, attained in places.items():
         details |= {
@@ -178,13 +178,13 @@ def measure_attainable(case: Case, subject: Subject) -> Measurement:
             f"error over the shortest segment at 2^{power}": attained.length / case.shortest_segment,
         }
     decided = [attained for attained in places.values() if not attained.undecided]
-    values = {ADDED.name: max(attained.added for attained in places.values())}
-    tolerances = {ADDED.name: MOST_ROUNDINGS}
+    values = {ADDED: max(attained.added for attained in places.values())}
+    tolerances = {ADDED: MOST_ROUNDINGS}
     if decided:
-        values[RESIDUAL.name] = max(attained.residual for attained in decided)
-        values[ERROR.name] = max(attained.error for attained in decided)
-        tolerances |= {RESIDUAL.name: 1.0, ERROR.name: 1.0}
-    return Measurement(values, tolerances, details=details, idle=is_untouched(system, trace))
+        values[RESIDUAL] = max(attained.residual for attained in decided)
+        values[ERROR] = max(attained.error for attained in decided)
+        tolerances |= {RESIDUAL: 1.0, ERROR: 1.0}
+    return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(system, trace))
 
 
 def _load_less(scene: Scene, share: float) -> Scene:

@@ -75,14 +75,13 @@ def measure_history(case: Case, subject: Subject) -> Measurement:
         undecided = _find_excuse(trace)
     details, series = solution_details(trace), history(trace)
     if undecided:
-        return Measurement({}, {}, details=details, series=series, undecided=undecided)
+        return Measurement(details=details, series=series, undecided=undecided)
     begin = _first_final_iterate(trace)
     arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NOISE))
     iterations = float(max(arrived[0] - begin, 0)) if _is_solved(trace) else inf
     details["finite"] = float(iterations <= 1)
     return Measurement(
-        {FINAL_ITERATIONS.name: iterations},
-        {FINAL_ITERATIONS.name: float(_allowed_iterations(trace, begin))},
+        [FINAL_ITERATIONS.check(iterations, float(_allowed_iterations(trace, begin)))],
         details=details,
         series=series,
         idle=is_untouched(system, trace),

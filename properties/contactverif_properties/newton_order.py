@@ -85,17 +85,17 @@ def measure_order(case: Case, subject: Subject) -> Measurement:
     trace = find_solution(system)
     details = solution_details(trace)
     if not trace.converged:
-        return Measurement({}, {}, details=details, undecided=f"Newton found no solution: {trace.end.label}")
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution = trace.u[-1]
     pairing = system.pair(solution)
     matrix, _ = system.matrix(solution, pairing)
     condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= system.size * UNIT_ROUNDOFF:
-        return Measurement({}, {}, details=details, undecided="the matrix has no inverse at the solution")
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
     steps = fit_steps(system, case, solution, pairing, condition)
     details["rate"], details["steps"] = steps.rate, float(steps.count)
     if np.isnan(steps.order):
-        return Measurement({}, {}, details=details, undecided="a kink: too few states near the solution pair like it")
+        return Measurement(details=details, undecided="a kink: too few states near the solution pair like it")
     undecided = ""
     if steps.order < QUADRATIC:
         details["spectral radius"] = spectral_radius(system, solution, pairing)
@@ -104,8 +104,7 @@ def measure_order(case: Case, subject: Subject) -> Measurement:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     linear = steps.order == inf  # One step solves a linear problem, which has no order.
     return Measurement(
-        {} if linear else {ORDER.name: steps.order},
-        {} if linear else {ORDER.name: QUADRATIC},
+        [] if linear else [ORDER.check(steps.order, QUADRATIC)],
         details=details,
         undecided=undecided,
         idle=is_untouched(system, trace),

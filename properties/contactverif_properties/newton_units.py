@@ -94,8 +94,7 @@ def measure_units(case: Case, subject: Subject) -> Measurement:
             differences.append(units.compare_step(case, trace, number))
     details = solution_details(trace) | {"exponent of lengths": float(k), "exponent of moduli": 2.0 * j}
     return Measurement(
-        {STEPS.name: max(differences, default=0.0)},
-        {STEPS.name: 1.0},
+        [STEPS.check(max(differences, default=0.0), 1.0)],
         undecided=undecided,
         broken=broken,
         details=details | {"steps that agree to the last bit": float(differences.count(0.0))},

@@ -80,7 +80,7 @@ def measure_nodal_push(case: Case, subject: Subject) -> Measurement:
     residual = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
     size = sum_larger_forces(state, residual)
     if not size:
-        return Measurement({PULL.name: 0.0}, {PULL.name: 0.0}, idle=True)
+        return Measurement([PULL.check(0.0, 0.0)], idle=True)
     forces = -residual.reshape(-1, 2)
     normals, allowance = allowed_pushes(formulation, state)
     pulls = np.array([_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(forces)])
@@ -89,7 +89,7 @@ def measure_nodal_push(case: Case, subject: Subject) -> Measurement:
     undecided = ""
     if pulled and pulled <= _nodes_round_corners(formulation, state):
         undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
-    return Measurement({PULL.name: max(0.0, float(pulls.max())) / size}, {PULL.name: tolerance}, undecided)
+    return Measurement([PULL.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
 
 
 def _nodes_round_corners(formulation: CheckedFormulation, state: Case) -> set[int]:

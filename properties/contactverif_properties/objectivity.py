@@ -26,7 +26,7 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
@@ -99,18 +99,18 @@ def measure_objectivity(case: Case, subject: Subject) -> Measurement:
     tolerance = segment_tolerance(case, one_pass, largest)
     errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
     size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
-    values = {FORCES.name: ratio(errors["forces"], size)}
+    values = {FORCES: ratio(errors["forces"], size)}
     if tangents:
         tangent, tangent_there = tangents
         errors["tangent"] = float(np.abs(tangent_there - turn @ tangent @ turn.T).max())
-        values[TANGENT.name] = ratio(errors["tangent"], float(np.abs(tangent).max()))
+        values[TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
     failures = select_failures(errors, values, tolerance)
     rounding = COORDINATE_ROUNDING * largest
     undecided = ""
     if failures:  # Slivers may cost more digits in one place than in the other.
         undecided = explain_by_kink(case, formulation, pairing, rounding, failures)
         undecided = undecided or explain_by_kink(there, formulation, pairing_there, rounding, failures)
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided, idle=not forces[:n].any())
+    return Measurement(check_all(values, tolerance), undecided, idle=not forces[:n].any())
 
 
 def _count_passes(case: Case, subject: Subject, formulation: CheckedFormulation, pairing: Pairing | None) -> int:

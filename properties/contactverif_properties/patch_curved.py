@@ -39,7 +39,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
@@ -104,17 +104,17 @@ def measure_rings(case: Case, subject: Subject) -> Measurement:
         scene = replace(shrink_fit(problem, slave=slave, refine=refine), penalty=case.penalty)
         solution = solve_for_accuracy(scene, subject)
         if not solution.balanced:
-            return Measurement({}, {}, f"Newton's method: {solution.trace.end.label} at refine = {refine}")
+            return Measurement(undecided=f"Newton's method: {solution.trace.end.label} at refine = {refine}")
         undecided = undecided or _lost_end(solution)
         means.append(_mean_errors(solution, fit, slave))
         details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": ring_force_error(solution, fit, slave)}
     coarse, fine = means
     details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf
-    values = {SLAVE.name: _extrapolate(coarse.slave, fine.slave), MASTER.name: _extrapolate(coarse.master, fine.master)}
+    values = {SLAVE: _extrapolate(coarse.slave, fine.slave), MASTER: _extrapolate(coarse.master, fine.master)}
     if not np.isnan(fine.reported):
-        values[REPORTED.name] = _extrapolate(coarse.reported, fine.reported)
-        values[BESIDE.name] = abs(fine.reported - fine.slave)
-    return Measurement(values, dict.fromkeys(values, BOUND), undecided, details=details)
+        values[REPORTED] = _extrapolate(coarse.reported, fine.reported)
+        values[BESIDE] = abs(fine.reported - fine.slave)
+    return Measurement(check_all(values, BOUND), undecided, details=details)
 
 
 def _lost_end(solution: Solution) -> str:

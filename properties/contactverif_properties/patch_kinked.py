@@ -36,7 +36,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.mechanics.newton import solve
@@ -106,7 +106,7 @@ def measure_kink(case: Case, subject: Subject) -> Measurement:
     """
     problem, upper_slave = patch_of(case)
     measurement = _measure_two_normals(problem, upper_slave, case.penalty, subject)
-    fails = any(value > measurement.tolerances[name] for name, value in measurement.values.items())
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
     return _add_three_normals(measurement, fails, problem, upper_slave, subject)
 
 
@@ -126,19 +126,19 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
     errors /= np.linalg.norm(exact, axis=1).max()
     values = {
-        STRESS.name: _stress_error(problem, scene, q),
-        SLAVE.name: float(errors[:n_slave].max()),
-        MASTER.name: float(errors[n_slave:].max()),
+        STRESS: _stress_error(problem, scene, q),
+        SLAVE: float(errors[:n_slave].max()),
+        MASTER: float(errors[n_slave:].max()),
     }
     tolerances = dict.fromkeys(values, _floor(problem, start, gap))
     unique = not multiplier or traits.independent_multipliers is True
     if "contact_points" in formulation.provides and traits.penalty == "distributed" and unique:
         points = formulation.contact_points(scene.interface, pairing, z)
         if not points.on_master.any():  # Nobody says how two passes share a pressure.
-            values[PRESSURE.name] = _pressure_error(points, pressure)
-            tolerances[PRESSURE.name] = tolerances[STRESS.name] + problem.contraction
+            values[PRESSURE] = _pressure_error(points, pressure)
+            tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
     idle = not by_contact.any()
-    return Measurement(values, tolerances, details=end_details(trace), idle=idle)
+    return Measurement(check_all(values, tolerances), details=end_details(trace), idle=idle)
 
 
 def _solve(
@@ -191,15 +191,13 @@ def _add_three_normals(
         floors.append(_floor(stiff, solution.state, stiff.pressure / penalty))
     if len(errors) < 2:
         reason = f"Newton's method with three normals: {solution.trace.end.label}"
-        return measurement if fails else Measurement({}, {}, reason, details=measurement.details)
-    values, tolerances = dict(measurement.values), dict(measurement.tolerances)
-    values[CUT.name], tolerances[CUT.name] = errors[1], max(SHARE / STIFF[1], floors[1])
+        return measurement if fails else Measurement(undecided=reason, details=measurement.details)
+    numbers = [*measurement.numbers, CUT.check(errors[1], max(SHARE / STIFF[1], floors[1]))]
     if errors[1] > floors[1]:
-        values[FALL.name] = float(-np.diff(np.log10(errors)).min())
-        tolerances[FALL.name] = SLOPE
+        numbers.append(FALL.check(float(-np.diff(np.log10(errors)).min()), SLOPE))
     names = [f"stress error, three normals, ε̂ = {stiffness:g} E/ℓ" for stiffness in STIFF]
     details = {**measurement.details, **dict(zip(names, errors, strict=False))}
-    return replace(measurement, values=values, tolerances=tolerances, details=details)
+    return replace(measurement, numbers=numbers, details=details)
 
 
 def _floor(problem: KinkedPatch, state: Case, gap: float) -> float:

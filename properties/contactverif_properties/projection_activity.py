@@ -64,8 +64,7 @@ def measure_activity(case: Case, subject: Subject) -> Measurement:
     here, small = (_count(Reported.from_case(state, subject)) for state in (case, _in_large_unit(case)))
     excluded = here.points + small.points - here.decided - small.decided
     return Measurement(
-        {WRONG.name: float(here.wrong + small.wrong)},
-        {WRONG.name: 0.0},
+        [WRONG.check(float(here.wrong + small.wrong), 0.0)],
         broken=here.broken or small.broken,
         details={"decided points": here.decided + small.decided, "points left out": excluded},
         idle=not here.decided,

@@ -30,7 +30,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
@@ -73,16 +73,18 @@ def measure_areas(case: Case, subject: Subject) -> Measurement:
         the same. All are dimensionless. Broken: a weight is negative or NaN, or idle points are left out.
     """
     reported = Reported.from_case(case, subject)
-    values = dict.fromkeys((WEIGHT.name, ENDS.name, SUM.name), 0.0)
+    values = dict.fromkeys((WEIGHT, ENDS, SUM), 0.0)
     one_pass = not reported.points.on_master.any()
     for each in reported.passes:
         lengths = _lengths(each, subject.traits)
         trials = [_Areas(each, subject.traits, length, reported.distant, one_pass).errors() for length in lengths]
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
-    tolerances = {WEIGHT.name: 16 * UNIT_ROUNDOFF, ENDS.name: 16 * UNIT_ROUNDOFF, SUM.name: 64 * UNIT_ROUNDOFF}
-    fits = values[SUM.name] <= tolerances[SUM.name]
-    return Measurement(values, tolerances, broken=_breach(reported, fits=fits), idle=not reported.points.active.any())
+    tolerances = {WEIGHT: 16 * UNIT_ROUNDOFF, ENDS: 16 * UNIT_ROUNDOFF, SUM: 64 * UNIT_ROUNDOFF}
+    fits = values[SUM] <= tolerances[SUM]
+    return Measurement(
+        check_all(values, tolerances), broken=_breach(reported, fits=fits), idle=not reported.points.active.any()
+    )
 
 
 def _breach(reported: Reported, *, fits: bool) -> str:
@@ -118,7 +120,7 @@ class _Areas:
     distant: float
     one_pass: bool
 
-    def errors(self) -> dict[str, float]:
+    def errors(self) -> dict[Quantity, float]:
         """Return the errors of weights, ends and sums by name."""
         points = self.each.points
         ends = np.stack([points.area_from, points.area_to])
@@ -131,9 +133,9 @@ class _Areas:
         weights = np.where(whole.weight > 0, np.abs(whole.weight - (high - low) / 2 * self.length[on]), 0.0)
         outside = np.maximum.reduce([low - whole.c, whole.c - high, -1 - low, high - 1, _overlaps(whole)], initial=0.0)
         return {
-            WEIGHT.name: largest(weights / (size[on] * stretch)),
-            ENDS.name: largest(outside / 2 * self._current()[on] / size[on]),
-            SUM.name: largest(np.array(list(self._sum_errors(size)))),
+            WEIGHT: largest(weights / (size[on] * stretch)),
+            ENDS: largest(outside / 2 * self._current()[on] / size[on]),
+            SUM: largest(np.array(list(self._sum_errors(size)))),
         }
 
     def _current(self) -> FloatArray:

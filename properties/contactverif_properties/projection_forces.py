@@ -33,7 +33,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif_properties.shared.applicability import refuse_barrier
@@ -85,21 +85,23 @@ def measure_account(case: Case, subject: Subject) -> Measurement:
     reported = Reported.from_case(case, subject)
     points, state = reported.points, reported.state
     distance = reported.distant
-    values = {UNIT.name: _normal_error(points)}
-    tolerances = {UNIT.name: 8 * UNIT_ROUNDOFF}
+    values = {UNIT: _normal_error(points)}
+    tolerances = {UNIT: 8 * UNIT_ROUNDOFF}
     if (difference := _force_difference(reported)) is not None:
-        values[FORCES.name], tolerance = _compare_forces(reported, difference)
-        tolerances[FORCES.name] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
+        values[FORCES], tolerance = _compare_forces(reported, difference)
+        tolerances[FORCES] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
     if subject.traits.gap is not None:
-        values[FOOT.name] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
-        tolerances[FOOT.name] = 16 * UNIT_ROUNDOFF
+        values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
+        tolerances[FOOT] = 16 * UNIT_ROUNDOFF
     if _has_linear_law(subject.traits):
         penalty = 1.0 if state.n_multipliers else subject.penalty(state)
         active = points.select(points.active)
         errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
-        values[LAW.name] = largest(errors)
-        tolerances[LAW.name] = 8 * UNIT_ROUNDOFF
-    return Measurement(values, tolerances, broken=_breach(points, subject.traits), idle=not points.active.any())
+        values[LAW] = largest(errors)
+        tolerances[LAW] = 8 * UNIT_ROUNDOFF
+    return Measurement(
+        check_all(values, tolerances), broken=_breach(points, subject.traits), idle=not points.active.any()
+    )
 
 
 def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, float]:

@@ -28,7 +28,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.oracle.exact_points import ExactPoints, Lattice, positions
 from contactverif_properties.shared.applicability import refuse_barrier
@@ -54,7 +54,7 @@ NORMAL = Quantity(
     "A difference, a root and a division are rounded, and ends at uD turn a segment.",
 )
 POSITION = Quantity("error of the position", "1", "4u", "Two products and their sum are rounded, relative to X.")
-_ROUNDINGS = {GAP.name: 4, XI.name: 4, NORMAL.name: 8, POSITION.name: 4}
+_ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
 def measure_places(case: Case, subject: Subject) -> Measurement:
@@ -77,23 +77,23 @@ def measure_places(case: Case, subject: Subject) -> Measurement:
     values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:
         places = Places.from_pass(each, subject.traits.gap, reported.distant)
-        for name, errors in (*_errors(places, reported.distant), (POSITION.name, _position_errors(each, far))):
+        for name, errors in (*_errors(places, reported.distant), (POSITION, _position_errors(each, far))):
             values[name] = float(np.maximum(values[name], largest(errors)))
     tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
-    return Measurement(values, tolerances, idle=not reported.points.active.any())
+    return Measurement(check_all(values, tolerances), idle=not reported.points.active.any())
 
 
-def _errors(places: Places, distant: float) -> Iterator[tuple[str, FloatArray]]:
+def _errors(places: Places, distant: float) -> Iterator[tuple[Quantity, FloatArray]]:
     """Yield the name of each quantity with its errors, NaN only where an active point has NaN."""
     points, view = places.reported, places.view
     facing = np.isfinite(places.scale)
     counted = facing & ~points.weighted
-    yield GAP.name, _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[counted]
+    yield GAP, _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[counted]
     length = view.master_length / places.foot_scale
-    yield XI.name, _size(view.xi.errors(points.xi) * length, points.active)[facing]
+    yield XI, _size(view.xi.errors(points.xi) * length, points.active)[facing]
     carrier = np.minimum(view.master_length, view.slave_length)  # Rounding the ends of a segment turns it.
     turns = view.normal.errors(points.normal)
-    yield NORMAL.name, _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + distant / carrier), points.active)[facing]
+    yield NORMAL, _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + distant / carrier), points.active)[facing]
 
 
 def _position_errors(each: Pass, far: float) -> FloatArray:

@@ -76,8 +76,7 @@ def measure_segments(case: Case, subject: Subject) -> Measurement:
         if not (facing | rounded).all():
             broken = "a master segment does not face the slave segment of its point"
     return Measurement(
-        {FARTHER.name: value},
-        {FARTHER.name: 4 * UNIT_ROUNDOFF},
+        [FARTHER.check(value, 4 * UNIT_ROUNDOFF)],
         broken=broken,
         details={"tied points": ties},
         idle=not reported.points.active.any(),

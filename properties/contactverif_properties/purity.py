@@ -36,7 +36,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
@@ -129,10 +129,10 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
     changes = count_changes(formulation, second, questions)
 
     values = {
-        REPEATED.name: changes.repeated,
-        REORDERED.name: changes.residual,
-        TANGENT.name: changes.tangent,
-        POINTS.name: changes.contact_points,
+        REPEATED: changes.repeated,
+        REORDERED: changes.residual,
+        TANGENT: changes.tangent,
+        POINTS: changes.contact_points,
     }
     tolerances = dict.fromkeys(values, 0.0)
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
@@ -140,31 +140,31 @@ def measure_purity(case: Case, subject: Subject) -> Measurement:
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
     if subject.traits.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
-        values[BATCHED.name] = compare_batch(state, near, forces, batch)
-        tolerances[BATCHED.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        values[BATCHED] = compare_batch(state, near, forces, batch)
+        tolerances[BATCHED] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
     if (there := subject.in_second_process()) is not None:
         far = there.with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
         forces_there = np.array(far.answers([("residual", interface, pairing, u) for u in (z, near)]))
-        values[SECOND_PROCESS.name] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
-        tolerances[SECOND_PROCESS.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        values[SECOND_PROCESS] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
+        tolerances[SECOND_PROCESS] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
     if "residual_and_tangent" in formulation.provides:
-        values[IN_ONE_CALL.name], tolerances[IN_ONE_CALL.name] = changes.residual_and_tangent, 0.0
+        values[IN_ONE_CALL], tolerances[IN_ONE_CALL] = changes.residual_and_tangent, 0.0
         answers = formulation.answers(
             [(verb, interface, pairing, u) for verb in ("tangent", "residual_and_tangent") for u in (z, near)]
         )
         tangents, pairs = np.array([dense(tangent) for tangent in answers[:2]]), answers[2:]
         one_call = np.array([residual for residual, _ in pairs])
-        values[ONE_RESIDUAL.name] = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
-        values[ONE_TANGENT.name] = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
-        tolerances[ONE_RESIDUAL.name] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
-        tolerances[ONE_TANGENT.name] = TANGENT_ROUNDINGS * UNIT_ROUNDOFF
+        values[ONE_RESIDUAL] = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
+        values[ONE_TANGENT] = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
+        tolerances[ONE_RESIDUAL] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        tolerances[ONE_TANGENT] = TANGENT_ROUNDINGS * UNIT_ROUNDOFF
     if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
-    return Measurement(values, tolerances, broken="; ".join(broken), idle=idle)
+    return Measurement(check_all(values, tolerances), broken="; ".join(broken), idle=idle)
 
 
 def _compare_penalties(

@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
@@ -72,16 +72,16 @@ def measure_scaling(case: Case, subject: Subject) -> Measurement:
     (forces_there,), tangents_there = ask_forces_and_tangents(rescaled, (there.interface, pairing_there, there.z))
     forces, forces_there = forces[:n], forces_there[:n]
     errors = {"forces": float(np.abs(forces_there / factor - forces).max())}
-    values = {FORCES.name: ratio(errors["forces"], float(np.abs(forces).max()))}
+    values = {FORCES: ratio(errors["forces"], float(np.abs(forces).max()))}
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
         errors["tangent"] = float(np.abs(tangent_there - tangent).max())
-        values[TANGENT.name] = ratio(errors["tangent"], float(np.abs(tangent).max()))
+        values[TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
     tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
     failures = select_failures(errors, values, tolerance)
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
     undecided = explain_by_kink(case, formulation, pairing, rounding, failures) if failures else ""
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided, idle=not forces.any())
+    return Measurement(check_all(values, tolerance), undecided, idle=not forces.any())
 
 
 SCALING = Property(

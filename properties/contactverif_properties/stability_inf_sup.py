@@ -30,7 +30,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.inf_sup import inf_sup_constant
@@ -81,12 +81,12 @@ def measure_inf_sup(case: Case, subject: Subject) -> Measurement:
         ZERO_COUNT: np.array([mesh.n_zero for mesh in meshes], dtype=np.float64),
         MULTIPLIER_COUNT: np.array([mesh.n_multipliers for mesh in meshes], dtype=np.float64),
     }
-    values = {ZEROS.name: float(series[ZERO_COUNT].max())}
+    values = {ZEROS: float(series[ZERO_COUNT].max())}
     if (constants > 0).all():
-        values[SLOPE.name] = float(np.polyfit(np.log(segments[-N_FITTED:]), np.log(constants[-N_FITTED:]), 1)[0])
-    tolerances = {ZEROS.name: 0.0, SLOPE.name: MOST_SLOPE}
+        values[SLOPE] = float(np.polyfit(np.log(segments[-N_FITTED:]), np.log(constants[-N_FITTED:]), 1)[0])
+    tolerances = {ZEROS: 0.0, SLOPE: MOST_SLOPE}
     details = {"β on the finest mesh": float(constants[-1])}
-    return Measurement(values, {name: tolerances[name] for name in values}, details=details, series=series)
+    return Measurement(check_all(values, tolerances), details=details, series=series)
 
 
 def refuse_without_pressures(traits: Traits) -> str:

@@ -39,7 +39,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact
@@ -88,42 +88,42 @@ def measure_local(case: Case, subject: Subject) -> Measurement:
     errors = (
         _errors_of_linear(near, subject.traits, forces) if linear else _errors_of_uniform(near, subject.traits, forces)
     )
-    if FORCES.name not in errors and subject.traits.takes_longdouble:
-        errors[FORCES.name] = forces - _in_long_double(far, formulation, pairing)
+    if FORCES not in errors and subject.traits.takes_longdouble:
+        errors[FORCES] = forces - _in_long_double(far, formulation, pairing)
     if not errors:
-        errors[FORCES.name] = forces - near_forces
-    values = {}
-    if FORCES.name in errors:
-        values[FORCES.name] = conditioning.count_roundings(errors[FORCES.name])
-    if TOTAL.name in errors:
-        values[TOTAL.name] = _count_total(near, errors[TOTAL.name], conditioning)
+        errors[FORCES] = forces - near_forces
+    values: dict[Quantity, float] = {}
+    if FORCES in errors:
+        values[FORCES] = conditioning.count_roundings(errors[FORCES])
+    if TOTAL in errors:
+        values[TOTAL] = _count_total(near, errors[TOTAL], conditioning)
     failed = max(values.values()) > MOST_ROUNDINGS
     undecided = explain_by_rounded_decision(near, formulation, pairing) if failed else ""
-    return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS), undecided)
+    return Measurement(check_all(values, MOST_ROUNDINGS), undecided)
 
 
-def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[str, FloatArray]:
+def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
     """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
     if knows_forces(traits):
-        return {FORCES.name: _error_of_patch(case, forces)}
+        return {FORCES: _error_of_patch(case, forces)}
     if not knows_total(traits):
         return {}
     n_slave, exact = 2 * case.interface.n_slave_nodes, exact_forces(case)
     totals = [
         float(sum(map(Fraction, forces[axis:n_slave:2].tolist())) - sum(exact[axis:n_slave:2])) for axis in (0, 1)
     ]
-    return {TOTAL.name: np.array(totals)}
+    return {TOTAL: np.array(totals)}
 
 
-def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[str, FloatArray]:
+def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
     """Return the same under a linear penetration, of the rows of slave nodes."""
     if traits.enforcement != "penalty" or not knows_linear_total(traits):
         return {}
     n_slave = case.interface.n_slave_nodes
     error = forces[: 2 * n_slave].reshape(-1, 2) + exact_slave_forces(case, traits)
-    errors = {TOTAL.name: error.sum(axis=0)}
+    errors = {TOTAL: error.sum(axis=0)}
     if traits.integrates_linear_gap:
-        errors[FORCES.name] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
+        errors[FORCES] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
     return errors
 
 

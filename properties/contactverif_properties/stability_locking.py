@@ -36,7 +36,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
@@ -80,24 +80,24 @@ def measure_locking(case: Case, subject: Subject) -> Measurement:
     columns, penalty = (n_slave, n_master), case.parameter("stiffness")
     answer = answer_to_wave(columns, penalty, subject)
     if answer is None:
-        return Measurement({}, {}, undecided=_UNSOLVED)
+        return Measurement(undecided=_UNSOLVED)
     smooth = matching_answer(n_slave, case.penalty).pressure_range
     by_forces, by_points = answer.force_range / smooth, answer.point_range / smooth
-    values = {ROUGHNESS.name: float(np.fmax(by_forces, by_points))}
+    values = {ROUGHNESS: float(np.fmax(by_forces, by_points))}
     details = {"roughness of nodal forces": by_forces}
     if np.isfinite(by_points):
         details["roughness of reported pressures"] = by_points
     if subject.traits.enforcement == "penalty":
         soft = answer_to_wave(columns, SOFT, subject)
         if soft is None:
-            return Measurement({}, {}, undecided=_UNSOLVED)
+            return Measurement(undecided=_UNSOLVED)
         at_soft = wave_blocks(*columns, SOFT, wave=0.0).penalty
         factor = soft.stiffness / at_soft  # Springs may act twice.
         ratio = answer.compliance / mean_of_matching(columns, factor * case.penalty)
-        values[DRIFT.name] = 1 - ratio * mean_of_matching(columns, factor * at_soft) / soft.compliance
+        values[DRIFT] = 1 - ratio * mean_of_matching(columns, factor * at_soft) / soft.compliance
         details["stiffness of the springs over the penalty"] = factor
-    tolerances = {DRIFT.name: MOST_DRIFT, ROUGHNESS.name: MOST_ROUGHNESS}
-    return Measurement(values, {name: tolerances[name] for name in values}, details=details)
+    tolerances = {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}
+    return Measurement(check_all(values, tolerances), details=details)
 
 
 def mean_of_matching(columns: tuple[int, int], distributed: float) -> float:

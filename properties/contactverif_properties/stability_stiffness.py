@@ -109,11 +109,11 @@ def measure_stiffness(case: Case, subject: Subject) -> Measurement:
             system = _system(case, subject, penalty)
             u, matrix = _solve(system, pairing, u)
         if np.abs(system.residual(u, pairing)).max() > _settled_residual(case):
-            return Measurement({}, {}, undecided="Newton's method does not settle on the frozen pairing")
+            return Measurement(undecided="Newton's method does not settle on the frozen pairing")
         turned = _TurnedSystem(system, motion, scene.interface.at(motion.move(scene.interface.nodes)), pairing)
         u_turned = _nearest_to_balance(turned, matrix, u)
     except _SingularMatrix:
-        return Measurement({}, {}, undecided="the matrix has no inverse in floats")
+        return Measurement(undecided="the matrix has no inverse in floats")
     state = replace(case, z=system.state(u))
     forces = system.formulation.residual(scene.interface, pairing, state.z)
     expected = motion.turn(forces.reshape(-1, 2)).reshape(-1)

@@ -23,7 +23,7 @@ where a decision hangs on less than 64 u D: there a right search may decide othe
 from __future__ import annotations
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.property import Measurement, Property, check_all
 from contactverif.contract.subject import Subject
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties.shared.any_state import move_state, prepare_state
@@ -67,21 +67,21 @@ def measure_translation(case: Case, subject: Subject) -> Measurement:
     (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
     change = forces_there - forces
     conditioning = measure_conditioning(near, formulation, pairing, forces)
-    values = {FORCES.name: conditioning.count_roundings(change)}
+    values = {FORCES: conditioning.count_roundings(change)}
     if tangents:
         here, there = tangents
         slope = measure_tangent_slope(near, formulation, pairing, here)
-        values[TANGENT.name] = count_tangent_roundings(near, here, there, slope)
+        values[TANGENT] = count_tangent_roundings(near, here, there, slope)
     excusable = pairing is None  # A plugin without a pairing decides anew in each residual.
     if pairing is not None:
         excusable = max(values.values()) <= MOST_ROUNDINGS  # The frozen pairing decides the same in both places.
         change = formulation.residual(far.interface, formulation.pair(far.interface, far.z), far.z) - forces
-        values[SEARCH.name] = conditioning.count_roundings(change)
+        values[SEARCH] = conditioning.count_roundings(change)
     undecided = ""
     if excusable and max(values.values()) > MOST_ROUNDINGS:
         undecided = explain_by_rounded_decision(near, formulation, pairing)
     idle = not forces[: near.interface.n_unknowns].any()
-    return Measurement(values, dict.fromkeys(values, MOST_ROUNDINGS), undecided, idle=idle)
+    return Measurement(check_all(values, MOST_ROUNDINGS), undecided, idle=idle)
 
 
 STABILITY_TRANSLATION = Property(

@@ -27,7 +27,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
@@ -72,22 +72,22 @@ def measure_symmetry(case: Case, subject: Subject) -> Measurement:
     values, tolerances, undecided = {}, {}, ""
     if "tangent" in formulation.provides:
         tangent = dense(formulation.tangent(case.interface, pairing, case.z))
-        values[ASYMMETRY.name] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
-        tolerances[ASYMMETRY.name] = segment_tolerance(case, forces, distance)
+        values[ASYMMETRY] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
+        tolerances[ASYMMETRY] = segment_tolerance(case, forces, distance)
     if subject.traits.tangent != "approximate":
         for share in RADII if pairing is None else RADII[:1]:
             radius = share * case.shortest_segment
-            values[WORK.name] = largest_work(case, formulation, pairing, radius)
-            tolerances[WORK.name] = 64 * UNIT_ROUNDOFF * distance / radius
+            values[WORK] = largest_work(case, formulation, pairing, radius)
+            tolerances[WORK] = 64 * UNIT_ROUNDOFF * distance / radius
             undecided = ""
-            if values[WORK.name] <= tolerances[WORK.name] or pairing is not None:
+            if values[WORK] <= tolerances[WORK] or pairing is not None:
                 break
             directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
             kinks = (find_kink(case, formulation, pairing, radius, direction) for direction in directions)
             undecided = next(filter(None, kinks), "")
             if not undecided:
                 break
-    return Measurement(values, tolerances, undecided, idle=not forces[: case.interface.n_unknowns].any())
+    return Measurement(check_all(values, tolerances), undecided, idle=not forces[: case.interface.n_unknowns].any())
 
 
 def largest_work(case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float) -> float:

@@ -37,7 +37,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity, Verdict, judge
+from contactverif.contract.property import Finding, Measurement, Property, Quantity, Verdict, check_all, judge
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
@@ -107,26 +107,28 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
             comparison = comparison.join(differences.compare(more, length))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
         tolerances = {
-            CENTRAL.name: 30 * conditioning ** (2 / 3),
-            TAYLOR.name: SLOPE,
-            COMPLEX.name: 1e-11 + 64 * conditioning,
+            CENTRAL: 30 * conditioning ** (2 / 3),
+            TAYLOR: SLOPE,
+            COMPLEX: 1e-11 + 64 * conditioning,
         }
-        values, place = {CENTRAL.name: comparison.error}, comparison.place
+        values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
-            values[TAYLOR.name] = comparison.slope
+            values[TAYLOR] = comparison.slope
         if subject.traits.takes_complex and not formulation.decides_anew(pairing):
-            values[COMPLEX.name], complex_place = differences.compare_complex_step(
+            values[COMPLEX], complex_finding = differences.compare_complex_step(
                 np.vstack([directions, more]), comparison.turns
             )
-            if values[COMPLEX.name] > tolerances[COMPLEX.name]:
-                place = complex_place
+            if values[COMPLEX] > tolerances[COMPLEX]:
+                finding = complex_finding
         idle = comparison.bending == np.inf
-        measurement = Measurement(values, tolerances, undecided, broken, {"length": length}, idle=idle, place=place)
+        measurement = Measurement(
+            check_all(values, tolerances), undecided, broken, {"length": length}, idle=idle, finding=finding
+        )
         return measurement, comparison.bending
 
     first, bending = measure_over(shortest)
     if judge(TANGENT_DIRECTIONAL, first)[0] is not Verdict.FAIL:
-        return replace(first, place="")
+        return replace(first, finding=None)
     if bending >= shortest / 2:
         return first
     second, _ = measure_over(max(bending, SHORTEST_BENDING * shortest))
@@ -149,8 +151,8 @@ class Comparison:
         The length over which the residual is seen to bend, see `Differences.compare`.
     defects : FloatArray, shape (n_directions, n_unknowns)
         The tangent times each direction, minus the central difference.
-    place : str
-        The row of the largest error, in words.
+    finding : Finding | None
+        The row of the largest error.
     turns : FloatArray, shape (n_unknowns,)
         The change of the derivative in each row over a length ℓ, from the third derivative.
     """
@@ -159,7 +161,7 @@ class Comparison:
     slope: float
     bending: float
     defects: FloatArray
-    place: str
+    finding: Finding | None
     turns: FloatArray
 
     def join(self, other: Comparison) -> Comparison:
@@ -218,14 +220,14 @@ class Differences:
         slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
         size = max(np.abs(derivative).max(), np.abs(slopes).max())
         if size == 0:
-            return Comparison(0.0, np.inf, np.inf, 0 * derivative, "", 0 * case.z)
+            return Comparison(0.0, np.inf, np.inf, 0 * derivative, None, 0 * case.z)
         errors = np.abs(slopes - derivative)  # (n_steps, n_directions, n_unknowns)
         best = errors.max(axis=2).argmin(axis=0)
         closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
         third = np.abs(slopes[0] - slopes[1]).max(axis=0) / (central[0] ** 2 - central[1] ** 2)  # Third derivative / 6.
         turns = third * case.shortest_segment**2
         sizes = self._sizes(np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
-        error, place = self._worst_row(errors.min(axis=0), sizes, derivative, closest)
+        error, finding = self._worst_row(errors.min(axis=0), sizes, derivative, closest)
         forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
         remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
         floor = 1e3 * UNIT_ROUNDOFF * reach * size
@@ -235,10 +237,10 @@ class Differences:
             if taylor_slope(smooth, steps[forward], floor) < SLOPE:
                 slope = np.inf
         bending = float(np.sqrt(size / third.max())) if third.any() else np.inf
-        return Comparison(error, slope, bending, derivative - closest, place, turns)
+        return Comparison(error, slope, bending, derivative - closest, finding, turns)
 
-    def compare_complex_step(self, directions: FloatArray, turns: FloatArray) -> tuple[float, str]:
-        """Return the largest difference of Im R(x + ihd)/h from the derivative, likewise, and its row in words.
+    def compare_complex_step(self, directions: FloatArray, turns: FloatArray) -> tuple[float, Finding]:
+        """Return the largest difference of Im R(x + ihd)/h from the derivative, likewise, and its row.
 
         The step h is so small that h² vanishes.
         """
@@ -264,13 +266,16 @@ class Differences:
 
     def _worst_row(
         self, errors: FloatArray, sizes: FloatArray, derivative: FloatArray, difference: FloatArray
-    ) -> tuple[float, str]:
-        """Return the largest error over the size of its row, and that row in words."""
+    ) -> tuple[float, Finding]:
+        """Return the largest error over the size of its row, and that row."""
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = np.where(errors > 0, errors / sizes, 0.0)
         number, row = divmod(int(relative.argmax()), relative.shape[1])
-        numbers = f"tangent times direction {derivative[number, row]:.10g}, derivative {difference[number, row]:.10g}"
-        return float(relative[number, row]), f"row {row} ({groups_of(self.case).describe(row)}): {numbers}"
+        place = f"row {row} ({groups_of(self.case).describe(row)})"
+        found, right = (derivative[number, row],), (difference[number, row],)
+        return float(relative[number, row]), Finding(
+            place, found, right, "N m-1", found_name="tangent times direction", right_name="derivative"
+        )
 
 
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:

@@ -40,7 +40,7 @@ def measure_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
     depth = abs(float(node_gaps(case).mean()))
     tolerance = gap_tolerance(case, depth, rounding_distance(case, subject.traits))
-    return Measurement({NODAL.name: error}, {NODAL.name: tolerance}, idle=not forces.any())
+    return Measurement([NODAL.check(error, tolerance)], idle=not forces.any())
 
 
 def refuse_unknown_integral(traits: Traits) -> str:

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.property import Measurement, Property, check_all
 from contactverif.contract.subject import Subject
 from contactverif.strategies.straight import tilted_cases
 from contactverif_properties.shared.kinks import explain_by_kink
@@ -68,12 +68,12 @@ def measure_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     push, across = float(total @ normal), abs(float(total[0] * normal[1] - total[1] * normal[0]))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     size = float(np.linalg.norm(total))
-    values = {OFF_NORMAL.name: ratio(across, size)}
-    errors = {OFF_NORMAL.name: across}
+    values = {OFF_NORMAL: ratio(across, size)}
+    errors = {OFF_NORMAL: across}
     if knows_linear_total(traits):
         exact = float(np.linalg.norm(exact_slave_forces(case, traits).sum(axis=0)))
-        errors[TOTAL.name] = abs(push - exact)
-        values[TOTAL.name] = errors[TOTAL.name] / exact
+        errors[TOTAL] = abs(push - exact)
+        values[TOTAL] = errors[TOTAL] / exact
     depth = abs(float(node_gaps(case).mean()))
     tolerance = gap_tolerance(case, depth, rounding_distance(case, traits))
     error = max((error for name, error in errors.items() if values[name] > tolerance), default=0.0)
@@ -83,7 +83,7 @@ def measure_tilted_resultant(case: Case, subject: Subject) -> Measurement:
         reach = COORDINATE_ROUNDING * case.largest_coordinate
         pairing = formulation.pair(case.interface, case.z)
         undecided = explain_by_kink(case, formulation, pairing, reach, {"forces": error})
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided, broken)
+    return Measurement(check_all(values, tolerance), undecided, broken)
 
 
 TILTED_RESULTANT = Property(

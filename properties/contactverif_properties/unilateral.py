@@ -29,7 +29,7 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif_properties.shared.any_state import prepare_state
@@ -78,7 +78,7 @@ def measure_unilateral(case: Case, subject: Subject) -> Measurement:
     formulation, state = prepare_state(case, subject)
     forces = _forces(formulation, state)[: case.interface.n_unknowns]
     values, tolerances = _pull_of_points(formulation, state)
-    return Measurement(values, tolerances, idle=not forces.any())
+    return Measurement(check_all(values, tolerances), idle=not forces.any())
 
 
 def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
@@ -104,14 +104,14 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     count = formulation.n_multipliers(interface)
     size = case.penalty * depth * case.slave_length
     raised = lift_slave(case, 2 * depth).with_multipliers(np.zeros(count))
-    values = {OPEN.name: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
+    values = {OPEN: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
     distant, one_end = nodes_far_from_contact(case), open_all_but_one_end(case)
     if not count and distant.any():
         forces = np.linalg.norm(_forces(formulation, one_end).reshape(-1, 2)[: len(distant)], axis=1)
-        values[DISTANT.name] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
+        values[DISTANT] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
     tolerances = dict.fromkeys(values, 0.0)
     pulls = [_pull_of_points(formulation, prepare_state(state, subject)[1]) for state in (case, one_end)]
-    pull, tolerance = max(pulls, key=lambda each: each[0].get(PULL.name, 0.0) / each[1].get(PULL.name, 1.0))
+    pull, tolerance = max(pulls, key=lambda each: each[0].get(PULL, 0.0) / each[1].get(PULL, 1.0))
     pushes = _contact_forces(formulation, case)
     broken = "" if pushes.any() else "nothing begins where the surfaces penetrate"
     undecided = ""
@@ -120,7 +120,7 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
         undecided = "a kink: moved by roundoff, it begins one way and not another" if len(begins) == 2 else ""
     elif _push_of_slave(pushes, case) < 0:
         broken = OPPOSITE_SIGN
-    return Measurement(values | pull, tolerances | tolerance, undecided, broken, idle=bool(undecided))
+    return Measurement(check_all(values | pull, tolerances | tolerance), undecided, broken, idle=bool(undecided))
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> Array:
@@ -140,7 +140,9 @@ def _push_of_slave(residual: Array, case: Case) -> float:
     return -float((residual.reshape(-1, 2)[: case.interface.n_slave_nodes] @ np.array([-y, x])).sum())
 
 
-def _pull_of_points(formulation: CheckedFormulation, state: Case) -> tuple[dict[str, float], dict[str, float]]:
+def _pull_of_points(
+    formulation: CheckedFormulation, state: Case
+) -> tuple[dict[Quantity, float], dict[Quantity, float]]:
     """Return the largest negative pressure over the largest of all, and its tolerance; nothing without points."""
     if "contact_points" not in formulation.provides:
         return {}, {}
@@ -150,7 +152,7 @@ def _pull_of_points(formulation: CheckedFormulation, state: Case) -> tuple[dict[
     largest, pull = (float(np.max(sign * pressure, initial=0.0)) for sign in (1, -1))
     forces = formulation.residual(state.interface, pairing, state.z)
     value = pull / max(largest, pull) if pull else 0.0
-    return {PULL.name: value}, {PULL.name: segment_tolerance(state, forces, state.largest_coordinate)}
+    return {PULL: value}, {PULL: segment_tolerance(state, forces, state.largest_coordinate)}
 
 
 def _move_by_roundoff(case: Case) -> Iterator[Case]:

@@ -18,7 +18,7 @@ from contactverif.contract.foreign_text import (
     printable,
 )
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, PropertyInfo, Quantity, Verdict
+from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo, Quantity, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 
@@ -91,13 +91,14 @@ def _case(name: str) -> Case:
 @texts
 def test_cases_and_results_hold_clean_text(text: str) -> None:
     case = _case(text)
-    measurement = Measurement({}, {}, undecided=text, broken=text, place=text)
+    measurement = Measurement(undecided=text, broken=text, finding=Finding(text, remark=text))
     outcome = Outcome(case, Verdict.FAIL, text, measurement)
     info = PropertyInfo("id", "family", text, (Quantity("q", "1", text, text),))
     row = Row(text, info, Verdict.FAIL, None, known=text, reason=text, shrunk=outcome)
     run = Run((row,), (NotLoaded(text, text),), {text: {}}, {text: text}, (text,))
-    words = [case.name, case.kind, *case.parameters, measurement.undecided, measurement.broken, measurement.place]
-    words += [outcome.reason, outcome.summary.name, info.summary, info.quantities[0].reason, row.formulation]
+    words = [case.name, case.kind, *case.parameters, measurement.undecided, measurement.broken]
+    words += [str(measurement.finding), outcome.reason, outcome.summary.name, info.summary, info.quantities[0].reason]
+    words.append(row.formulation)
     words += [row.known, row.reason, *run.provided, *run.provenance, *run.provenance.values(), *run.opposite_signs]
     words += [run.not_loaded[0].formulation, run.not_loaded[0].reason]
     for word in words:

@@ -10,7 +10,7 @@ import pytest
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, excess, judge
+from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict, judge
 
 MOST = Quantity("defect", "1", "u 8X/|g|", "roundoff of a gap")
 LEAST = Quantity("slope", "1", "1.9", "second order", sense="at least")
@@ -20,7 +20,7 @@ QUESTION = Property(
     summary="asks",
     quantities=(MOST, LEAST),
     cases=lambda interface: None,
-    measure=lambda case, subject: Measurement({}, {}),
+    measure=lambda case, subject: Measurement(),
     promise=lambda traits: None,
 )
 
@@ -28,8 +28,8 @@ QUESTION = Property(
 def measurement(
     defect: float = 0.5, slope: float = 2.0, *, tolerances: tuple[float, float] = (1.0, 1.9), **more: str
 ) -> Measurement:
-    values = {"defect": defect, "slope": slope}
-    return Measurement(values, dict(zip(values, tolerances, strict=True)), **more)  # type: ignore[arg-type]
+    numbers = [MOST.check(defect, tolerances[0]), LEAST.check(slope, tolerances[1])]
+    return Measurement(numbers, **more)  # type: ignore[arg-type]
 
 
 def test_a_pass_has_no_reason() -> None:
@@ -72,8 +72,8 @@ def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value:
     )
     assert judge(QUESTION, of_defect) == (Verdict.UNDECIDED, f"the tolerance of defect is {tolerance}")
     assert judge(QUESTION, of_slope) == (Verdict.UNDECIDED, f"the tolerance of slope is {tolerance}")
-    assert excess(MOST, value, tolerance) == inf
-    assert excess(LEAST, value, tolerance) == inf
+    assert MOST.check(value, tolerance).ratio == inf
+    assert LEAST.check(value, tolerance).ratio == inf
 
 
 def test_a_failure_stands_whatever_the_other_tolerance() -> None:
@@ -82,8 +82,8 @@ def test_a_failure_stands_whatever_the_other_tolerance() -> None:
 
 
 def test_a_quantity_may_be_left_unmeasured() -> None:
-    assert judge(QUESTION, Measurement({"defect": 0.5}, {"defect": 1.0})) == (Verdict.PASS, "")
-    assert judge(QUESTION, Measurement({"defect": 2.0}, {"defect": 1.0}))[0] is Verdict.FAIL
+    assert judge(QUESTION, Measurement([MOST.check(0.5, 1.0)])) == (Verdict.PASS, "")
+    assert judge(QUESTION, Measurement([MOST.check(2.0, 1.0)]))[0] is Verdict.FAIL
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,22 @@ def test_a_quantity_may_be_left_unmeasured() -> None:
         ("at least", inf, 1.0, inf),
     ],
 )
-def test_excess(sense: Literal["at most", "at least"], value: float, tolerance: float, ratio: float) -> None:
-    assert excess(Quantity("x", "1", "", "", sense), value, tolerance) == ratio
+def test_ratio(sense: Literal["at most", "at least"], value: float, tolerance: float, ratio: float) -> None:
+    assert Quantity("x", "1", "", "", sense).check(value, tolerance).ratio == ratio
+
+
+def test_a_finding_stands_behind_the_numbers_of_a_failure() -> None:
+    finding = Finding("slave node 0", (0.25, 1.0), (0.125, 1.0), "N", "force", "exact", "free end")
+    text = "slave node 0: force 0.25, 1, exact 0.125, 1; free end"
+    assert judge(QUESTION, Measurement([MOST.check(2.0, 1.0)], finding=finding))[1] == f"defect 2, at most 1; {text}"
+    assert str(Finding("row 3", remark="no entry")) == "row 3; no entry"
+    with pytest.raises(ValueError, match="1 numbers are found, and 0 are right"):
+        Finding("row 3", (1.0,))
+
+
+def test_no_quantity_is_measured_twice() -> None:
+    with pytest.raises(ValueError, match="twice"):
+        Measurement([MOST.check(1.0, 1.0), MOST.check(2.0, 1.0)])
 
 
 def test_verdicts_read_as_words_and_their_numbers_are_those_of_reports() -> None:

@@ -161,7 +161,8 @@ def test_an_entry_that_the_pattern_lacks_is_named() -> None:
     outcome = judge_case(TANGENT_LONG, state, plain("vts-me", forget))
     assert outcome.measurement is not None
     assert outcome.measurement.values[LACKING.name] == 1
-    assert "row 0 (x of slave node 0), column 1 (y of slave node 0): tangent 0 (not in the pattern)" in outcome.reason
+    place = "row 0 (x of slave node 0), column 1 (y of slave node 0), not in the pattern"
+    assert f"{place}: tangent 0, derivative" in outcome.reason
 
 
 def test_a_coupling_outside_the_pattern_is_found_where_unknowns_move_together() -> None:
@@ -272,7 +273,7 @@ def test_a_failure_is_named_in_the_terminal_in_a_report_on_a_page_and_in_pytest(
     (row,) = result.rows
     assert row.shrunk is not None
     assert row.shrunk.measurement is not None
-    place = row.shrunk.measurement.place
+    place = str(row.shrunk.measurement.finding)
     assert place.startswith("row 0 (x of slave node 0), column 1 (y of slave node 0): tangent ")
     assert place in explain(row, command="pytest")
     path = tmp_path / "report.nc"

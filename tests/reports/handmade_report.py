@@ -22,7 +22,7 @@ def question(id_: str = "patch.flat.transmission", family: str = "patch", *quant
         summary="a uniform pressure is transmitted exactly",
         quantities=quantities,
         cases=lambda interface: None,
-        measure=lambda case, subject: Measurement({}, {}),
+        measure=lambda case, subject: Measurement(),
         promise=lambda traits: None,
     )
 
@@ -44,7 +44,7 @@ def flat(
 def outcome(case: Case, value: float, verdict: Verdict | None = None, reason: str = "") -> Outcome:
     verdict = verdict or (Verdict.PASS if value <= 1e-12 else Verdict.FAIL)
     reason = reason or ("" if verdict is Verdict.PASS else f"force error {value:.3g}, at most 1e-12")
-    measurement = Measurement({ERROR.name: value}, {ERROR.name: 1e-12}, details={"Σ|R|": 2.5})
+    measurement = Measurement([ERROR.check(value, 1e-12)], details={"Σ|R|": 2.5})
     return Outcome(case, verdict, reason, measurement, seconds=0.25)
 
 

@@ -92,8 +92,8 @@ def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
         "text.nc": "no netCDF file",
         "cut.nc": "which is damaged",
         "other.nc": "of something else",
-        "newer.nc": "schema 99; needed schema 2; install a newer contactverif",
-        "older.nc": "schema 1, which an older contactverif wrote; needed schema 2; run the same command again",
+        "newer.nc": "schema 99; needed schema 3; install a newer contactverif",
+        "older.nc": "schema 1, which an older contactverif wrote; needed schema 3; run the same command again",
         "empty.nc": "without the group 'summary'; needed an undamaged report",
     }.items():
         with pytest.raises(MisuseError, match=words) as error:

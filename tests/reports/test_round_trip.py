@@ -22,7 +22,7 @@ from contactverif.cli.report_comparison import ChangesTable, regressions_text
 from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.property import Finding, Measurement, Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.runner import run as verify
@@ -43,20 +43,19 @@ def hard_run() -> Run:
     info = replace(info, least_contact=0.0, usual_undecided=0.1)
     case, other = flat([2, 2], [4]), flat([1, 1, 2], [2, 2])
     series = {"residual": np.array([1.0, np.nan, 1e-9, np.nan]), "a/b ′": np.array([np.inf])}
-    good = Measurement({"force error": 1e-15, "slope": 2.0}, {"force error": 1e-12, "slope": 1.9}, series=series)
+    good = Measurement([ERROR.check(1e-15, 1e-12), SLOPE.check(2.0, 1.9)], series=series)
+    beside = Finding("row 3", (0.25, np.nan), (-0.0, 5e-324), "N", "force", "exact", "free end")
     details = {"iterations": 4.0, "end": 1.0, "x": np.nan}
     outcomes = (
         Outcome(case, Verdict.PASS, "", good, 0.5),
-        Outcome(
-            other, Verdict.FAIL, "force error is nan", Measurement({"force error": np.nan}, {"force error": 1e-12})
-        ),
+        Outcome(other, Verdict.FAIL, "force error is nan", Measurement([ERROR.check(np.nan, 1e-12)], finding=beside)),
         Outcome(case, Verdict.UNDECIDED, "a kink", replace(good, undecided="a kink", idle=True), 0.25),
-        Outcome(case, Verdict.UNDECIDED, "roundoff", replace(good, undecided="roundoff")),
+        Outcome(case, Verdict.UNDECIDED, "roundoff", replace(good, undecided="roundoff", finding=Finding("row 4"))),
         Outcome(case, Verdict.UNDECIDED, "a kink", replace(good, undecided="a kink")),
         Outcome(other, Verdict.FAIL, "changed its input", replace(good, broken="changed its input", series={})),
         Outcome(other, Verdict.FAIL, "breaks the contract: shape (3,)", None, breach=True),
-        Outcome(awkward(), Verdict.PASS, "", Measurement({}, {}, details={"end": 0.0, "iterations": 3.0})),
-        Outcome(case, Verdict.PASS, "", Measurement({}, {"slope": 1.9}, details=details)),
+        Outcome(awkward(), Verdict.PASS, "", Measurement(details={"end": 0.0, "iterations": 3.0})),
+        Outcome(case, Verdict.PASS, "", Measurement(details=details)),
     )
     rows = [
         Row("mine", info, Verdict.FAIL, True, reason="breaks the contract", planned=12, outcomes=outcomes,
@@ -183,7 +182,8 @@ def facts(measurement: Measurement | None) -> object:
         return None
     numbers = (measurement.values, measurement.tolerances, measurement.details)
     series = {name: np.asarray(values).tobytes() for name, values in measurement.series.items()}
-    return [repr(sorted(entry.items())) for entry in numbers], series, measurement.undecided, measurement.broken
+    words = measurement.undecided, measurement.broken, repr(measurement.finding)
+    return [repr(sorted(entry.items())) for entry in numbers], series, words
 
 
 def test_the_cases_of_a_row_are_a_sequence(tmp_path: Path) -> None:

@@ -61,7 +61,7 @@ def test_root_attributes_are_the_provenance(report: Path) -> None:
     with xr.open_datatree(report) as tree:
         assert tree.attrs["seed"] == "7"
         assert tree.attrs["promises_kept"] == "false"
-        assert tree.attrs["schema"] == "2"
+        assert tree.attrs["schema"] == "3"
         assert tree.attrs["Conventions"] == "CF-1.11 UGRID-1.0"
 
 

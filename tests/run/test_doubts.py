@@ -35,7 +35,7 @@ def one_row(count: int, *, idle: int = 0, undecided: int = 0, **info: Any) -> Ro
 
     def measure(case: Case, subject: Subject) -> Measurement:
         reason = "a kink" if case.seed >= count - undecided else ""
-        return Measurement({"error": float(bool(reason))}, {"error": 1e-6}, reason, idle=case.seed < idle)
+        return Measurement([ERROR.check(float(bool(reason)), 1e-6)], reason, idle=case.seed < idle)
 
     question = Property(
         "x.y", "x", "A number.", (ERROR,), lambda _: numbered_cases(count), measure, lambda _: True, **info
@@ -119,7 +119,7 @@ def test_the_residual_alone_is_enough_to_see_the_sign() -> None:
 
 def test_no_right_formulation_has_the_opposite_sign() -> None:
     subjects = [load_formulation(name) for name in FAILS]
-    nothing = Property("x.y", "x", "None.", (), lambda _: st.just(named_case("a1")), lambda *_: Measurement({}, {}),
+    nothing = Property("x.y", "x", "None.", (), lambda _: st.just(named_case("a1")), lambda *_: Measurement(),
                        lambda _: None)  # fmt: skip
     assert run(subjects, [nothing], seed=1, examples=1).opposite_signs == ()
 
@@ -140,7 +140,7 @@ def test_a_list_of_scenes_without_solutions_fails_only_who_promised(promise: boo
     """A stranger's first formulation may have no solution on some mesh: that is neither wrong nor a failed run."""
 
     def measure(case: Case, subject: Subject) -> Measurement:
-        return Measurement({}, {}, "Newton's method found no balance" if case.seed else "")
+        return Measurement(undecided="Newton's method found no balance" if case.seed else "")
 
     cases = numbered_cases(3)
     question = Property("x.y", "x", "A number.", (ERROR,), lambda _: cases, measure, lambda _: promise, bodies=True)

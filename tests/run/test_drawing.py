@@ -46,7 +46,7 @@ class Cases:
 
 
 def no_error(case: Case, subject: Subject) -> Measurement:
-    return Measurement({"error": 0.0}, {"error": 1e-6})
+    return Measurement([ERROR.check(0.0, 1e-6)])
 
 
 ANY = Property("patch.any", "patch", "No error.", (ERROR,), stiff_cases, no_error, lambda _: True)

@@ -14,7 +14,7 @@ from lossy_store import lose_one_outcome
 from test_workers import facts
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
@@ -56,13 +56,15 @@ def n_cases(result: Run) -> int:
     return sum(len(row.outcomes) + (row.witness is not None) for row in result.rows)
 
 
+ERROR, OTHER = Quantity("error", "1", "ξ", "a reason"), Quantity("other", "N", "", "", "at least")
+
+
 def outcome(number: float) -> Outcome:
     """Return an outcome with everything that one can have."""
     measured = Measurement(
-        {"error": number, "other": np.nan},
-        {"error": 1e-9, "other": -0.0},
+        [ERROR.check(number, 1e-9), OTHER.check(np.nan, -0.0)],
         undecided="a kink",
-        place="row 3",
+        finding=Finding("row 3", (number,), (np.nan,), remark="ξ"),
         details={"steps": 3.0},
         series={"residual": np.array([1.0, np.inf, number])},
         idle=True,
@@ -91,7 +93,10 @@ def test_a_number_of_numpy_among_the_words_is_taken_for_what_it_is(tmp_path: Pat
     writer = OutcomeFile(tmp_path)
     whole = outcome(1.0)
     assert whole.measurement is not None
-    measured = replace(whole.measurement, idle=np.True_, place=np.str_("row 3"))
+    assert whole.measurement.finding is not None
+    measured = replace(
+        whole.measurement, idle=np.True_, finding=replace(whole.measurement.finding, place=np.str_("row 3"))
+    )
     writer.add_outcome(0, 0, replace(whole, measurement=measured, breach=np.True_))
     writer.file.close()
     known = KnownOutcomes([tmp_path], 1, 100)

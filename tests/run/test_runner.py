@@ -45,7 +45,7 @@ def measure_residual(case: Case, subject: Subject) -> Measurement:
     formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     forces = formulation.residual(case.interface, pairing, case.z)
-    return Measurement({"error": float(np.abs(forces).max())}, {"error": 1e-6})
+    return Measurement([ERROR.check(float(np.abs(forces).max()), 1e-6)])
 
 
 ZERO = Property(
@@ -378,7 +378,7 @@ def test_a_broken_promise_fails_the_run_and_a_missing_one_does_not() -> None:
 @pytest.mark.parametrize(("undecided", "verdict"), [(10, Verdict.PASS), (11, Verdict.NOT_JUDGED)])
 def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, verdict: Verdict) -> None:
     def sometimes(case: Case, subject: Subject) -> Measurement:
-        return Measurement({"error": 1.0 * (case.seed <= undecided)}, {"error": 0.5}, "a kink")
+        return Measurement([ERROR.check(1.0 * (case.seed <= undecided), 0.5)], "a kink")
 
     question = replace(
         ZERO, cases=lambda _: st.integers(1, 100).map(lambda seed: replace(a_case(1), seed=seed)), measure=sometimes
@@ -511,7 +511,7 @@ def test_our_own_mistake_comes_out_with_the_case(late: bool) -> None:
         if failed or not late:
             raise ZeroDivisionError("in a property")
         failed = len(case.interface.slave) > 1
-        return Measurement({"error": float(failed)}, {"error": 0.5})
+        return Measurement([ERROR.check(float(failed), 0.5)])
 
     question = replace(ZERO, measure=mistaken, cases=lambda _: sizes(2))
     with pytest.raises(ZeroDivisionError) as error:

@@ -45,7 +45,7 @@ def question(id_: str = "patch.flat.transmission", *quantities: Quantity) -> Pro
         summary="a question made by hand",
         quantities=quantities or (ERROR,),
         cases=lambda interface: None,
-        measure=lambda case, subject: Measurement({}, {}),
+        measure=lambda case, subject: Measurement(),
         promise=lambda traits: None,
     )
 
@@ -60,7 +60,7 @@ def outcome(margin: float | Verdict, size: int = 1, **details: float) -> Outcome
     """Return the outcome of a case of `size` segments: a number of `margin` tolerances, or a verdict without one."""
     if isinstance(margin, Verdict):
         return Outcome(a_case(size), margin, "" if margin is Verdict.PASS else "made by hand", seconds=0.25)
-    measurement = Measurement({ERROR.name: margin * TOLERANCE}, {ERROR.name: TOLERANCE}, details=details)
+    measurement = Measurement([ERROR.check(margin * TOLERANCE, TOLERANCE)], details=details)
     return Outcome(a_case(size), *judge(question(), measurement), measurement, seconds=0.25)
 
 
@@ -94,7 +94,7 @@ def with_changes(old: Cell, **changes: Any) -> Cell:
 
 def test_a_margin_is_the_quantity_that_went_furthest() -> None:
     order = question("newton.order", ERROR, SLOPE)
-    measurement = Measurement({ERROR.name: 0.5, SLOPE.name: 0.95}, {ERROR.name: 1.0, SLOPE.name: 1.9})
+    measurement = Measurement([ERROR.check(0.5, 1.0), SLOPE.check(0.95, 1.9)])
     outcomes = (Outcome(a_case(1), Verdict.FAIL, "slope", measurement),)
     result = Cell.from_row(Row("nts", order, Verdict.FAIL, None, planned=1, outcomes=outcomes))
     assert result.margins.tolist() == [2.0]  # 1.9 / 0.95, the quantity that must be at least its tolerance
@@ -111,7 +111,7 @@ def test_medians_and_worst_are_over_what_was_decided() -> None:
 
 def test_a_failure_without_a_number_is_infinitely_far() -> None:
     assert cell(Verdict.CRASHED, Verdict.FAIL).margins.tolist() == [inf, inf]
-    broken = Measurement({ERROR.name: 0.0}, {ERROR.name: TOLERANCE}, broken="changes its input")
+    broken = Measurement([ERROR.check(0.0, TOLERANCE)], broken="changes its input")
     outcomes = (Outcome(a_case(1), Verdict.FAIL, "changes its input", broken),)
     result = Cell.from_row(Row("nts", question(), Verdict.FAIL, None, planned=1, outcomes=outcomes))
     assert result.margins.tolist() == [inf]
@@ -573,7 +573,7 @@ def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> N
 def test_a_stored_report_gives_the_cells_of_its_run(tmp_path: Path) -> None:
     rows: tuple[Row, ...] = (row("vts-ppt", 0.5, 0.25, Verdict.UNDECIDED, promise=True, sizes=[3, 2, 1]),)
     order = question("newton.order", SLOPE)
-    solved = Measurement({SLOPE.name: 2.0}, {SLOPE.name: 1.9}, details={"iterations": 3.0, "end": 0.0})
+    solved = Measurement([SLOPE.check(2.0, 1.9)], details={"iterations": 3.0, "end": 0.0})
     outcomes = (Outcome(a_case(1), Verdict.PASS, "", solved), Outcome(a_case(2), Verdict.CRASHED, "exception: x"))
     rows += (Row("vts-ppt", order, Verdict.CRASHED, True, planned=2, outcomes=outcomes, reason="exception: x"),)
     rows += (row("vts-me:n=4", 64.0, 0.25, promise=False, sizes=[3, 2]),)

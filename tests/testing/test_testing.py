@@ -32,13 +32,13 @@ def a_case(size):
 
 def measured(case, subject):
     forces = subject.for_case(case).residual(case.interface, None, case.z)
-    return Measurement({"error": float(np.abs(forces).max())}, {"error": 1e-6})
+    return Measurement([ERROR.check(float(np.abs(forces).max()), 1e-6)])
 
 def cases(interface):
     return st.integers(1, 60).map(a_case)
 
 def undecided(case, subject):
-    return Measurement({"error": 1.0}, {"error": 0.0}, "a kink")
+    return Measurement([ERROR.check(1.0, 0.0)], "a kink")
 
 ZERO = Property("patch.zero", "patch", "No force at rest.", (ERROR,), cases, measured, lambda it: it.passes_flat_patch)
 TANGENT = replace(ZERO, id="tangent.zero", needs=frozenset({"tangent"}), promise=lambda traits: None)

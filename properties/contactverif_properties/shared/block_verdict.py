@@ -12,7 +12,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement
+from contactverif.contract.property import Finding, Measurement
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.block_derivatives import STEPS, single_moves
 from contactverif_properties.shared.tangent_blocks import (
@@ -58,15 +58,12 @@ def measure_blocks(case: Case, subject: Subject) -> Measurement:
     error = float(comparison.error[row, column]) / size if value else 0.0  # A block that is excused has none.
     quantity = COMPLEX_BLOCK if judge.by_complex_step else BLOCK
     undecided = "" if value > 1 or lacking else excuses.reason
-    values = {quantity.name: error, LACKING.name: float(lacking)}
-    tolerances = {quantity.name: error / value if value else EXACT, LACKING.name: 0.0}
-    if undecided:
-        values, tolerances = {}, {}
+    tolerance = error / value if value else EXACT
+    numbers = [] if undecided else [quantity.check(error, tolerance), LACKING.check(float(lacking), 0.0)]
     return Measurement(
-        values,
-        tolerances,
+        numbers,
         undecided=undecided,
-        place=describe_block(judge, comparison, int(row), int(column)) if value > 1 else "",
+        finding=worst_entry(judge, comparison, int(row), int(column)) if value > 1 else None,
         details={
             "blocks": float((comparison.largest > 0).sum()),
             "blocks at a kink": float(excuses.kinked),
@@ -76,8 +73,8 @@ def measure_blocks(case: Case, subject: Subject) -> Measurement:
     )
 
 
-def describe_block(judge: BlockJudge, comparison: Comparison, row: int, column: int) -> str:
-    """Return the worst entry of a block in words: row, column, value and derivative.
+def worst_entry(judge: BlockJudge, comparison: Comparison, row: int, column: int) -> Finding:
+    """Return the worst entry of a block beside its derivative.
 
     Parameters
     ----------
@@ -94,10 +91,16 @@ def describe_block(judge: BlockJudge, comparison: Comparison, row: int, column: 
     errors = np.abs(judge.tangent[part] - comparison.derivative[part])
     first, second = divmod(int(errors.argmax()), errors.shape[1])
     i, j = int(rows[first]), int(columns[second])
-    missing = "" if judge.pattern[i, j] else " (not in the pattern)"
-    numbers = f"tangent {judge.tangent[i, j]:.10g}{missing}, derivative {comparison.derivative[i, j]:.10g}"
-    largest = f"largest entry of the block {comparison.largest[row, column]:.3g}"
-    return f"row {i} ({groups.describe(i)}), column {j} ({groups.describe(j)}): {numbers}; {largest}"
+    missing = "" if judge.pattern[i, j] else ", not in the pattern"
+    return Finding(
+        f"row {i} ({groups.describe(i)}), column {j} ({groups.describe(j)}){missing}",
+        (judge.tangent[i, j],),
+        (comparison.derivative[i, j],),
+        "N m-1",
+        "tangent",
+        "derivative",
+        f"largest entry of the block {comparison.largest[row, column]:.3g}",
+    )
 
 
 def lacking_entries(judge: BlockJudge, comparison: Comparison, excess: FloatArray) -> IntArray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif_properties.shared.flat_forces import knows_total, uniform_forces
@@ -57,20 +57,20 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
     slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     largest = case.penalty * case.diameter * case.slave_length
-    values, tolerances, broken = {SIZE.name: size / largest}, {SIZE.name: 4.0}, ""
+    values, tolerances, broken = {SIZE: size / largest}, {SIZE: 4.0}, ""
     if bounds[1] == 0:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
-        values[DIRECTION.name] = ratio(_outside(total, case.parameters["edges"]), size)
+        values[DIRECTION] = ratio(_outside(total, case.parameters["edges"]), size)
         if knows_total(subject.traits):
             along = float(total @ case.parameters["axis"])
-            values[TOTAL.name] = max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1])
+            values[TOTAL] = max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1])
     reach = min(case.parameter("penetration"), case.shortest_segment)
     tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments)
-    tolerances |= {name: tolerance for name in values if name != SIZE.name}
+    tolerances |= {quantity: tolerance for quantity in values if quantity != SIZE}
     details = {"share of the upper bound": ratio(float(total @ case.parameters["axis"]), float(bounds[1]))}
     # Where the lower bound is 0, no force is as good an answer as any.
-    return Measurement(values, tolerances, broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
+    return Measurement(check_all(values, tolerances), broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
 
 
 def promise_bounds(traits: Traits) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif_properties.shared.roundoff import ratio
@@ -64,21 +64,21 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     size = case.diameter if traits.translation_stable else case.largest_coordinate
     tolerance = UNIT_ROUNDOFF * (8 * size / penetration + 4 * case.n_segments)
     if tolerance >= 1:
-        return Measurement({}, {}, VACUOUS)
+        return Measurement(undecided=VACUOUS)
     exact = exact_forces(case)
     slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
     along, normal = case.parameters["direction"], _normal(case)
-    values = {ALONG.name: ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum()))}
-    tolerances = {ALONG.name: tolerance}
+    values = {ALONG: ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum()))}
+    tolerances = {ALONG: tolerance}
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     if knows_total(traits):
-        values[TOTAL.name], tolerances[TOTAL.name] = abs(push / whole - 1), tolerance
+        values[TOTAL], tolerances[TOTAL] = abs(push / whole - 1), tolerance
     if traits.passes_flat_patch is not False:
         forces, largest = forces_of_gap(case, subject, exact)
-        values[NODAL.name] = float(np.linalg.norm(forces - exact, axis=1).max()) / whole
-        tolerances[NODAL.name] = tolerance * largest
-    return Measurement(values, tolerances, broken=broken)
+        values[NODAL] = float(np.linalg.norm(forces - exact, axis=1).max()) / whole
+        tolerances[NODAL] = tolerance * largest
+    return Measurement(check_all(values, tolerances), broken=broken)
 
 
 def exact_forces(case: Case) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement
+from contactverif.contract.property import Measurement, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import is_of_class
@@ -70,25 +70,25 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
 def _measure(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
     error, tolerance = transmission_error(case, subject)
-    values, tolerances = {FORCE.name: error}, {FORCE.name: tolerance}
+    values, tolerances = {FORCE: error}, {FORCE: tolerance}
     formulation = subject.for_case(case)
     if "contact_points" in formulation.provides:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = _point_errors(case, formulation)
-        values[GAP.name], tolerances[GAP.name] = gap, tolerance
+        values[GAP], tolerances[GAP] = gap, tolerance
         if subject.traits.penalty != "nodal":
-            values[PRESSURE.name], tolerances[PRESSURE.name] = pressure, tolerance
-    return Measurement(values, tolerances)
+            values[PRESSURE], tolerances[PRESSURE] = pressure, tolerance
+    return Measurement(check_all(values, tolerances))
 
 
 def _is_within(measurement: Measurement, factor: float) -> bool:
     """Return whether all values are at most `factor` times their tolerances."""
-    return all(value <= factor * measurement.tolerances[name] for name, value in measurement.values.items())
+    return all(number.value <= factor * number.tolerance for number in measurement.numbers)
 
 
 def _heals(before: Measurement, after: Measurement) -> bool:
     """Return whether values that failed are at roundoff afterwards, and a quarter of what they were or less."""
-    failures = [name for name, value in before.values.items() if value > before.tolerances[name]]
+    failures = [number.quantity.name for number in before.numbers if number.value > number.tolerance]
     return _is_within(after, _MOVED) and all(4 * after.values[name] <= before.values[name] for name in failures)
 
 

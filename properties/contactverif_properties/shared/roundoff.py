@@ -117,14 +117,16 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
 
 
-def select_failures(errors: Mapping[str, float], values: Mapping[str, float], tolerance: float) -> dict[str, float]:
+def select_failures(
+    errors: Mapping[str, float], values: Mapping[Quantity, float], tolerance: float
+) -> dict[str, float]:
     """Return those errors whose value is above the tolerance.
 
     Parameters
     ----------
     errors : Mapping[str, float]
         The largest error of an entry, under "forces" or "tangent".
-    values : Mapping[str, float]
+    values : Mapping[Quantity, float]
         The same errors in the same order, over the size of what they belong to, by the names of quantities.
     tolerance : float
         The tolerance of all values.

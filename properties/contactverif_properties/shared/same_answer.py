@@ -13,7 +13,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import default_points, nearest_segments
 from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
@@ -139,13 +139,13 @@ def compare(
     case, size = first.case, max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
     change = second.forces[carry.nodes] - first.forces @ carry.matrix.T
     errors, bits = {"forces": float(np.abs(change).max())}, int(np.count_nonzero(change))
-    values = {quantities[0].name: ratio(errors["forces"], size)}
+    values = {quantities[0]: ratio(errors["forces"], size)}
     if first.tangent is not None and second.tangent is not None:
         places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = second.tangent[np.ix_(places, places)] - turn @ first.tangent @ turn.T
         errors["tangent"], bits = float(np.abs(change).max()), bits + int(np.count_nonzero(change))
-        values[quantities[1].name] = ratio(
+        values[quantities[1]] = ratio(
             errors["tangent"], float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
         )
     distance = max(rounding_distance(answer.case, subject.traits) for answer in (first, second))
@@ -153,7 +153,7 @@ def compare(
     failures = select_failures(errors, values, tolerance)
     undecided = _explain(first, second, failures) if failures and explain else ""
     details, idle = {BITS: float(bits)}, not (first.forces.any() or second.forces.any())
-    return Measurement(values, dict.fromkeys(values, tolerance), undecided, details=details, idle=idle)
+    return Measurement(check_all(values, tolerance), undecided, details=details, idle=idle)
 
 
 def _explain(first: Answer, second: Answer, failures: dict[str, float]) -> str:

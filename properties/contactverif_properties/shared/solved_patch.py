@@ -16,7 +16,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of
@@ -101,23 +101,23 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     pairing, forces = contact_at(state, trace, formulation)
     slave, master = force_errors(state, scene, forces, q, pressure)
     values = {
-        STRESS.name: stress_error(scene, scene.stresses(q), pressure),
-        SLAVE_FORCES.name: slave,
-        MASTER_FORCES.name: master,
-        GAP.name: gap_error(state, pressure / penalty, pressure / penalty),
+        STRESS: stress_error(scene, scene.stresses(q), pressure),
+        SLAVE_FORCES: slave,
+        MASTER_FORCES: master,
+        GAP: gap_error(state, pressure / penalty, pressure / penalty),
     }
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, pairing, state.z)
         gap, reported = point_errors(case, points, penalty, pressure)
-        values[GAP.name] = max(values[GAP.name], gap)
+        values[GAP] = max(values[GAP], gap)
         if subject.traits.penalty != "nodal":
-            values[PRESSURE.name] = reported
+            values[PRESSURE] = reported
     roundoff = uniform_tolerances(state, scene, pressure)
     tolerances = dict.fromkeys(values, roundoff.stress)
-    tolerances[GAP.name] *= _gap_factor(case, penalty)
-    if PRESSURE.name in values:
-        tolerances[PRESSURE.name] = roundoff.pressure
-    return Measurement(values, tolerances, details=end_details(trace))
+    tolerances[GAP] *= _gap_factor(case, penalty)
+    if PRESSURE in values:
+        tolerances[PRESSURE] = roundoff.pressure
+    return Measurement(check_all(values, tolerances), details=end_details(trace))
 
 
 def _gap_factor(case: Case, penalty: float) -> float:
@@ -164,7 +164,7 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
     exact_u = np.append(exact, saddle.multipliers)
     trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
     measurement = saddle.errors(u)
-    fails = any(value > measurement.tolerances[name] for name, value in measurement.values.items())
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
     if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
         measurement = saddle.errors(exact_u)
     return replace(measurement, details=end_details(trace))
@@ -193,20 +193,20 @@ class _SaddlePoint:
         forces = self.formulation.residual(state.interface, pairing, state.z)
         slave, master = force_errors(state, scene, forces, q, pressure)
         values = {
-            STRESS.name: stress_error(scene, scene.stresses(q), pressure),
-            SLAVE_FORCES.name: slave,
-            MASTER_FORCES.name: master,
-            GAP.name: gap_error(state, 0.0, pressure / self.penalty),
+            STRESS: stress_error(scene, scene.stresses(q), pressure),
+            SLAVE_FORCES: slave,
+            MASTER_FORCES: master,
+            GAP: gap_error(state, 0.0, pressure / self.penalty),
         }
         tolerance = uniform_tolerances(state, scene, pressure).stress
         tolerances = dict.fromkeys(values, tolerance)
-        tolerances[GAP.name] *= _gap_factor(self.case, self.penalty)
+        tolerances[GAP] *= _gap_factor(self.case, self.penalty)
         if self.subject.traits.penalty == "distributed":
             loaded = self.multipliers != 0  # The multiplier of a node that faces nothing is 0.
             errors = np.abs(multipliers[loaded] / pressure - 1)
-            values[MULTIPLIERS.name] = float(errors.max(initial=0.0))
-            tolerances[MULTIPLIERS.name] = tolerance / sharpness
-        return Measurement(values, tolerances)
+            values[MULTIPLIERS] = float(errors.max(initial=0.0))
+            tolerances[MULTIPLIERS] = tolerance / sharpness
+        return Measurement(check_all(values, tolerances))
 
 
 def solve_patch(

@@ -43,4 +43,4 @@ def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error
         CONDITION: worst.condition,
         FORCE_ERROR: ratio(largest, float(conditioning.floor[0])),
     }
-    return Measurement({quantity.name: worst.roundings}, {quantity.name: MOST_ROUNDINGS}, details=details, idle=idle)
+    return Measurement([quantity.check(worst.roundings, MOST_ROUNDINGS)], details=details, idle=idle)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement
+from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.solved_patch import (
     MULTIPLIERS,
@@ -54,11 +54,14 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     errors = moderate.values[STRESS.name], high.values[STRESS.name]
     slope = float(np.log(errors[1] / errors[0]) / np.log(HIGH)) if min(errors) > 0 else 0.0
     return Measurement(
-        {**moderate.values, **_rename_high(high.values)},
-        {**moderate.tolerances, **_rename_high(high.tolerances)},
+        [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
         undecided=moderate.undecided or high.undecided,
         details={**moderate.details, **_rename_high(high.details), SLOPE: slope},
     )
+
+
+def _at_high(quantity: Quantity) -> Quantity:
+    return replace(quantity, name=high_name(quantity.name))
 
 
 def _rename_high(numbers: Mapping[str, float]) -> dict[str, float]:
@@ -67,6 +70,6 @@ def _rename_high(numbers: Mapping[str, float]) -> dict[str, float]:
 
 TWO_PENALTIES = (
     *QUANTITIES,
-    *(replace(quantity, name=high_name(quantity.name)) for quantity in QUANTITIES),
+    *map(_at_high, QUANTITIES),
     MULTIPLIERS,
 )

@@ -21,7 +21,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
-from contactverif.contract.property import Measurement
+from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import fit_rate, solve_for_accuracy
 from contactverif.mechanics.scene import Scene
@@ -179,7 +179,9 @@ def _fit_rates(study: WaveStudy, errors: list[dict[str, float]], bounds: dict[st
             PRESSURE_RATE: bounds[PRESSURE_RATE],
             LAST_PRESSURE: bounds[LAST_PRESSURE] * constant_pressure_error(study),
         }
-    return Measurement(values, tolerances, series=series)
+    # `judge` takes the formulas and the senses of the property.
+    numbers = [Quantity(name, "1", "", "").check(value, tolerances[name]) for name, value in values.items()]
+    return Measurement(numbers, series=series)
 
 
 def constant_pressure_error(study: WaveStudy) -> float:

@@ -187,7 +187,7 @@ def _examples(run: Run, path: str) -> list[Example]:
     for id_, counterexample in by_id.items():
         measurement = counterexample.outcome.measurement
         numbers = checked_numbers(counterexample.row.info, measurement)
-        place = measurement.place if measurement is not None else ""
+        finding = measurement.finding if measurement is not None else None
         numbers_say_it = any(number.value == number.value and number.ratio > 1 for number in numbers)
         examples.append(
             Example(
@@ -195,7 +195,7 @@ def _examples(run: Run, path: str) -> list[Example]:
                 figure=figures.get(id_, Markup("")),
                 text="" if id_ in figures else as_text(counterexample.case),
                 numbers=numbers,
-                reason=place if numbers_say_it else counterexample.reason,
+                reason=str(finding or "") if numbers_say_it else counterexample.reason,
                 replay=counterexample.replay_command(path),
             )
         )

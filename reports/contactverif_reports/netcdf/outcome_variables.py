@@ -15,7 +15,7 @@ import xarray as xr
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case_summary import CaseSummary
 from contactverif.contract.counterexample import distinct, typeable
-from contactverif.contract.property import Measurement, Outcome, PropertyInfo
+from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.variables import codes, flags, numbers, words
 
@@ -42,20 +42,23 @@ class SharedNames:
     parameters: tuple[str, ...]
     n_iterates: int
     kinds: tuple[str, ...] = ()
+    n_components: int = 0
 
     @classmethod
     def from_outcomes(cls, info: PropertyInfo, outcomes: Iterable[Outcome]) -> SharedNames:
         """Collect the names, one outcome at a time."""
         details, parameters = dict[str, None](), dict[str, None]()
-        kinds, n_iterates = set[str](), 0
+        kinds, n_iterates, n_components = set[str](), 0, 0
         for outcome in outcomes:
             kinds.add(outcome.case_or_summary.kind)
             parameters |= dict.fromkeys(outcome.summary.parameters)
             if outcome.measurement is not None:
                 details |= dict.fromkeys(outcome.measurement.details)
                 n_iterates = max([n_iterates, *map(len, outcome.measurement.series.values())])
+                finding = outcome.measurement.finding
+                n_components = max(n_components, 0 if finding is None else len(finding.found))
         every_kind = dict.fromkeys([*info.kinds, *sorted(kinds - {""})])
-        return cls(tuple(details), tuple(parameters), n_iterates, tuple(every_kind))
+        return cls(tuple(details), tuple(parameters), n_iterates, tuple(every_kind), n_components)
 
 
 class OutcomeVariables:
@@ -89,7 +92,7 @@ class OutcomeVariables:
 
     def table(self, *, with_summaries: bool = True) -> Table:
         """Return all variables; the summaries of the cases only on request."""
-        table = self._verdicts() | self._values() | self._details() | self._series()
+        table = self._verdicts() | self._findings() | self._values() | self._details() | self._series()
         if with_summaries:
             table |= self._summaries()
         return {f"{self._prefix}{name}": variable for name, variable in table.items()}
@@ -118,10 +121,25 @@ class OutcomeVariables:
         for name, long_name in (
             ("undecided", "why a failure would not be the fault of the formulation"),
             ("broken", "a breach that no number shows"),
-            ("place", "the place of the worst number, such as a row and a column of the tangent"),
         ):
             texts = ["" if item is None else getattr(item, name) for item in self._measurements]
             table |= self._words(name, texts, long_name)
+        return table
+
+    def _findings(self) -> Table:
+        """Return the places of what was found beside what is right there; nothing where there is none."""
+        nothing = Finding("", unit="", found_name="", right_name="")
+        findings = [(item and item.finding) or nothing for item in self._measurements]
+        table: Table = {}
+        for attribute, (name, long_name) in schema.FINDING.items():
+            table |= self._words(name, [getattr(finding, attribute) for finding in findings], long_name)
+        for name in ("found", "right") if self._names.n_components else ():
+            values = np.full((len(findings), self._names.n_components), schema.NOT_MEASURED)
+            for row, finding in zip(values, findings, strict=True):
+                numbers_there = getattr(finding, name)
+                row[: len(numbers_there)] = numbers_there
+            comment = "at the place; missing behind the last one"
+            table[name] = self._numbers("component", values, f"numbers: {name}", "see finding_unit", comment)
         return table
 
     def _words(self, name: str, texts: list[str], long_name: str) -> Table:

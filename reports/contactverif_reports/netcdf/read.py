@@ -94,10 +94,10 @@ def _check_schema(root: Group, path: str) -> None:
     if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
     version = str(root.attrs["schema"])
-    if version.isdecimal() and int(version) < int(schema.SCHEMA):
+    if version.isdecimal() and int(version) < int(schema.READABLE[0]):
         needed = f"schema {schema.SCHEMA}; run the same command again to write the report anew"
         raise MisuseError(_ARGUMENT, f"{path} of schema {version}, which an older contactverif wrote", needed)
-    if version != schema.SCHEMA:
+    if version not in schema.READABLE:
         raise MisuseError(
             _ARGUMENT, f"{path} of schema {version}", f"schema {schema.SCHEMA}; install a newer contactverif"
         )

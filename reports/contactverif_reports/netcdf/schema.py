@@ -14,7 +14,8 @@ from enum import IntEnum
 from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Verdict
 
-SCHEMA = "2"
+SCHEMA = "3"
+READABLE = ("2", SCHEMA)  # A report of schema 2 has no numbers beside the place of what was found.
 CONVENTIONS = "CF-1.11 UGRID-1.0"
 TITLE = "contactverif: what a verification of contact formulations found"
 UNITS_NOTE = (
@@ -65,6 +66,14 @@ PARAMETER_UNITS: Mapping[str, str] = {
     "bodies_start": LENGTH,
 }
 
+# The words of a `Finding`, {attribute: (variable, what it is)}.
+FINDING: Mapping[str, tuple[str, str]] = {
+    "place": ("place", "place of the worst number, such as a row and a column of the tangent"),
+    "unit": ("finding_unit", "unit of found and right"),
+    "found_name": ("found_name", "what was found at the place"),
+    "right_name": ("right_name", "what is right there"),
+    "remark": ("finding_remark", "remark about the place"),
+}
 VERDICTS: Mapping[str, int] = {str(verdict).replace(" ", "_"): int(verdict) for verdict in Verdict}
 NONE = "none"  # The value of an attribute without one: some readers drop an attribute that is empty.
 SHRUNK, WITNESS = "shrunk from the random cases", "the witness of a formulation"  # The origins of a counterexample.

@@ -17,6 +17,7 @@ from contactverif.contract.case_summary import CaseSummary
 from contactverif.contract.property import (
     LEAST_CONTACT,
     NONE_UNDECIDED,
+    Finding,
     Measurement,
     Outcome,
     PropertyInfo,
@@ -30,7 +31,8 @@ from contactverif_reports.netcdf.stored_groups import Group
 _REALS = ("penalty", "largest_coordinate", "shortest_segment")
 # The kind of numpy's types of each variable; all others hold reals.
 _KINDS = dict.fromkeys(("verdict", "state", "n_slave_segments", "n_master_segments", "case_kind"), "i")
-_KINDS |= dict.fromkeys(("reason", "undecided", "broken", "place", "case_name"), "U")
+_TEXTS = ("reason", "undecided", "broken", *(name for name, _ in schema.FINDING.values()))
+_KINDS |= dict.fromkeys((*_TEXTS, "case_name"), "U")
 
 
 class OutcomeArrays:
@@ -62,8 +64,12 @@ class OutcomeArrays:
         if not np.isin(self.verdicts, known).all():
             raise ValueError(f"{prefix}verdict holds a code without a meaning")
         self._states = self._read("state")
-        self._texts = {name: self._read(name) for name in ("reason", "undecided", "broken", "place") if self._has(name)}
-        self._quantities = [quantity.name for quantity in info.quantities]
+        self._texts = {name: self._read(name) for name in _TEXTS if self._has(name)}
+        self._found, self._right = (
+            self._read(name, "component") if self._has(name) else np.empty((len(self.verdicts), 0))
+            for name in ("found", "right")
+        )
+        self._quantities = info.quantities
         self._details = _labels(dataset, "detail")
         self._values, self._tolerances, self._detail_values = (
             self._read(name, axis) if along else np.empty((len(self.verdicts), 0))
@@ -93,6 +99,8 @@ class OutcomeArrays:
         lacks_tolerance = (self._values != schema.NOT_MEASURED) & (self._tolerances == schema.NOT_MEASURED)
         if lacks_tolerance[planned & measured].any():
             raise ValueError(f"a value {place} has no tolerance")
+        if ((self._found == schema.NOT_MEASURED) != (self._right == schema.NOT_MEASURED)).any():
+            raise ValueError(f"what was found {place} is not as much as what is right")
         if self._dims:
             kinds = self._case_kinds[planned]
             if ((kinds < -1) | (kinds >= len(self._kinds) - 1)).any():
@@ -142,12 +150,11 @@ class OutcomeArrays:
         )
 
     def _measurement(self, number: int, *, idle: bool) -> Measurement:
+        pairs = zip(self._quantities, self._values[number].tolist(), self._tolerances[number].tolist(), strict=True)
         return Measurement(
-            _present(self._quantities, self._values[number].tolist()),
-            _present(self._quantities, self._tolerances[number].tolist()),
+            [quantity.check(value, bound) for quantity, value, bound in pairs if value != schema.NOT_MEASURED],
             undecided=self._text("undecided", number),
             broken=self._text("broken", number),
-            place=self._text("place", number),
             details=_present(self._details, self._detail_values[number].tolist()) if self._details else {},
             series={
                 name: freeze(values[number, :length], np.float64)
@@ -155,7 +162,20 @@ class OutcomeArrays:
                 if (length := _length(values[number]))
             },
             idle=idle,
+            finding=self._finding(number),
         )
+
+    def _finding(self, number: int) -> Finding | None:
+        words = {attribute: self._text(name, number) for attribute, (name, _) in schema.FINDING.items()}
+        if not words["place"]:
+            return None
+        found, right = (
+            tuple(value for value in values[number].tolist() if value != schema.NOT_MEASURED)
+            for values in (self._found, self._right)
+        )
+        if not found:  # As in reports of schema 2.
+            return Finding(words["place"], remark=words["remark"])
+        return Finding(found=found, right=right, **words)
 
     def _text(self, name: str, number: int) -> str:
         return str(self._texts[name][number]) if name in self._texts else ""
