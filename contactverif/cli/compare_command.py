@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -85,7 +86,7 @@ def compare(
     reference = _only_one("--against", against or [])
     reports = _reports_among(names or [])
     if reports:
-        _check_no_run_options(reference, sampling, place, workers, pictures, resume)
+        _check_no_run_options(sampling, place, workers, against=reference, pictures=pictures, resume=resume)
         nothing_worse = _compare_reports(reports, properties or [], out)
         raise typer.Exit(0 if nothing_worse else 1)
     options = VerifyOptions(
@@ -148,29 +149,10 @@ def _is_report(name: str) -> bool:
     return name.lower().endswith(REPORT) or (name not in formulation_names() and Path(name).is_file())
 
 
-def _check_no_run_options(
-    reference: str | None,
-    sampling: SamplingOptions,
-    place: PlaceOptions,
-    workers: WorkerOptions,
-    pictures: Path | None,
-    resume: Path | None,
-) -> None:
+def _check_no_run_options(*groups: Any, **options: Any) -> None:
     """Refuse the options of a run beside two reports, which have been judged already."""
-    values: dict[str, Any] = {
-        "against": reference,
-        "profile": sampling.profile,
-        "examples": sampling.examples,
-        "seed": sampling.seed,
-        "mesh": place.mesh,
-        "slave": place.slave,
-        "master": place.master,
-        "flip": place.flip or None,
-        "scene": place.scene,
-        "jobs": workers.jobs,
-        "pictures": pictures,
-        "resume": resume,
-    }
-    for option, value in values.items():
-        if value is not None:
+    for group in groups:
+        options |= {field.name: getattr(group, field.name) for field in fields(group)}
+    for option, value in options.items():
+        if value not in (None, False):
             raise MisuseError(f"--{option}", "two reports beside it", "formulations: a report has been judged already")

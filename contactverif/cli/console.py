@@ -1,6 +1,6 @@
 """The terminal: how wide it is, how text is printed, how a table looks, and which colour a result has.
 
-Rule for the next editor: whatever a command prints goes through `show`, `show_as_it_is` or `say`, which let no control
+Whatever a command prints goes through `show`, `show_as_it_is` or `say`, which let no control
 character of a plugin or a file reach the terminal.
 """
 

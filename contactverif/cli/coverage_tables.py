@@ -1,6 +1,6 @@
 """Tables of what the cases of a run were worth: shares of undecided and idle cases, and the cases of each kind.
 
-Rule for the next editor: as in `run_tables`, a table reads a `Run` from memory or from a file, and needs no more than
+As in `run_tables`, a table reads a `Run` from memory or from a file, and needs no more than
 80 columns.
 """
 

@@ -1,7 +1,7 @@
 """The table of a run in the terminal, and the line that sums it up.
 
-Rules for the next editor: a table reads a `Run` and does not ask whether it comes from memory or from a file. It needs
-no more than 80 columns. Every word in it that does not explain itself is explained in the legend below it.
+A table reads a `Run`, from memory or from a file, and needs no more than 80 columns. Every word in it that does not
+explain itself is explained in the legend below it.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """The options that several commands share, each defined once.
 
-A group of options is a frozen dataclass. Every field is one option, and its annotation holds what typer shows of it.
-A command takes the group as one parameter; `spell_out_groups` shows typer the single options and hands the command
-the group again.
-
-Rules for the next editor: two groups of one command have no field of the same name, and nothing that takes long to
-import is imported at the top, because every `--help` imports this file.
+A group of options is a frozen dataclass, each field an option. A command takes the group as one parameter, and
+`spell_out_groups` shows typer the single options. Two groups of one command have no field of the same name. Nothing
+that takes long to import is imported at the top, because every `--help` imports this file.
 """
 
 from __future__ import annotations

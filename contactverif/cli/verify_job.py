@@ -1,6 +1,6 @@
 """The job of a run of `verify` or `compare`: its options, checked and with everything settled that a journal must know.
 
-Rule for the next editor: an option that changes an outcome is a field of `VerifyOptions`, so that the journal has it.
+An option that changes an outcome is a field of `VerifyOptions`, so that the journal has it.
 """
 
 from __future__ import annotations

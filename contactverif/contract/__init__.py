@@ -1,5 +1,5 @@
 """The data that flows through the harness: interfaces, formulations, bodies, cases, properties, results.
 
-Rules for the next editor: this folder imports nothing else of the house. What flows is a frozen dataclass with
+This folder imports nothing else of the house. What flows is a frozen dataclass with
 read-only arrays. It is checked once, in its constructor, so that nobody who receives one has to check it again.
 """

@@ -1,7 +1,6 @@
 """The types of the arrays that flow through the house, and how an array is checked and made read-only.
 
-Rule for the next editor: what a plugin may keep or change must not be what others are judged on. Whoever passes an
-array on to a plugin, or takes one from it, passes or takes a copy.
+What a plugin may keep or change must not be what others are judged on: arrays go to it and come from it as copies.
 """
 
 from __future__ import annotations
@@ -27,20 +26,7 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
     """Return a contiguous read-only copy of an array.
 
-    The copy stands on immutable bytes, so that nobody can make it writeable again. An array that already does is
-    returned as it is.
-
-    Parameters
-    ----------
-    values : ArrayLike
-        An array of any shape.
-    dtype : type
-        The dtype of the copy.
-
-    Returns
-    -------
-    NDArray
-        The copy, of the same shape.
+    It stands on immutable bytes, so that nobody can make it writeable again. An array that already does is returned.
     """
     array = np.asarray(values, dtype=dtype)
     if _is_frozen(array):
@@ -75,17 +61,7 @@ def as_array(argument: str, values: ArrayLike) -> NDArray[Any]:
 
 
 def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """Return the values as a new array of floats.
-
-    Parameters
-    ----------
-    argument : str
-        The name of the values in messages.
-    values : ArrayLike
-        Real numbers.
-    shape : tuple[int, ...]
-        The shape that is needed; −1 stands for any length.
-    """
+    """Return real numbers as a new array of floats of a shape, in which −1 stands for any length."""
     raw = as_array(argument, values)
     if raw.dtype.kind not in "fiu":
         raise MisuseError(argument, f"dtype {raw.dtype}", "numbers")

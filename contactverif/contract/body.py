@@ -1,7 +1,7 @@
 """An elastic body as data: mesh, material, supports, loads, and the part of its boundary that may touch something.
 
-Rules for the next editor: whatever can be wrong with a body is found here, in the constructor, once. What a body does
-under load is in `contactverif.mechanics.bulk`. Vectors of supports and loads are in the body's own axes, so that a
+Whatever can be wrong with a body is found here, in the constructor, once. What a body does under load is in
+`contactverif.mechanics.bulk`. Vectors of supports and loads are in the body's own axes, so that a
 roller on an inclined side is a fixed component like any other.
 """
 

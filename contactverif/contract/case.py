@@ -1,8 +1,7 @@
 """A case: one interface in one state with one penalty, on which a property judges a formulation.
 
-Rules for the next editor: a case is complete. Whoever has its arrays can judge it again, in another process and with
-another version of hypothesis; so nothing that a judgement depends on is kept outside, and `to_arrays` and `from_arrays`
-agree bit by bit. The lengths below (`diameter`, `shortest_segment`, …) are those of the tolerances.
+A case is complete: its arrays can be judged again, in another process and with another version of hypothesis. So
+`to_arrays` and `from_arrays` agree bit by bit. Lengths such as `diameter` are those of the tolerances.
 """
 
 from __future__ import annotations

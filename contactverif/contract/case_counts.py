@@ -1,6 +1,6 @@
 """The counts that say what a number of cases is worth: judged, failed, undecided, and idle ones.
 
-Rule for the next editor: a case is judged or undecided, never both. Idle and failed cases are among the judged ones.
+A case is judged or undecided, never both. Idle and failed cases are among the judged ones.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The errors that contactverif raises on purpose, told apart by who has to act: the caller or the author of the plugin.
 
-Rule for the next editor: an error of a caller is a `MisuseError`, an error of a plugin is a `ContractError`. The
-message of a `MisuseError` names the argument, what was found there and what is needed, so that the caller can act.
+An error of a caller is a `MisuseError`, whose message says what to change; an error of a plugin is a `ContractError`.
 """
 
 from __future__ import annotations

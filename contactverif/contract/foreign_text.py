@@ -1,16 +1,8 @@
-r"""Foreign text, made fit to be shown: what a plugin, a file or a command line brought may hold anything.
+r"""Text of a plugin, a file or a command line, made fit to be shown: cut, and control characters spelled out.
 
-An escape sequence in a name can clear a terminal, a line break can forge a line of a table, a message may have 20 MB.
-Here, and nowhere else, such text becomes harmless: control characters, lone surrogates and characters that nobody sees
-or that turn the direction of reading are spelled out (``\x1b``, ``\u202e``), and long text is cut.
-
-Rules for the next editor:
-
-- The classes of cases and results call `clean` or `refuse` in their constructors. So tables, pages, figures, file names
-  and pytest's texts get clean text, whether it comes from memory or from a file.
-- The terminal, pages and figures call `printable` for all that they show. It is the last guard, for text that came
-  another way.
-- Nothing here calls a method of an object that a plugin made, but for `str(error)`, which may raise.
+The classes of cases and results call `clean` or `refuse` in their constructors, so that all that is written from them
+is clean. The terminal, pages and figures call `printable` as the last guard. Nothing here calls a method of an object
+that a plugin made, but for `str(error)`, which may raise.
 """
 
 from __future__ import annotations
@@ -35,14 +27,7 @@ _BREAKS = re.compile(r"[ \t]*(?:\r?\n|\t)[ \t\r\n]*")
 
 
 def one_line(text: str, longest: int = LONGEST_LINE) -> str:
-    r"""Return foreign text as one line without control characters, cut where it is too long.
-
-    Parameters
-    ----------
-    text : str
-        Any text.
-    longest : int
-        The number of characters after which it is cut; its length is stated behind the cut.
+    r"""Return foreign text as one line without control characters, cut behind `longest` characters.
 
     Examples
     --------

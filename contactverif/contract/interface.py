@@ -1,8 +1,7 @@
 """The two facing meshes of a contact problem: how segments hang together, and where their nodes are.
 
-Rules for the next editor: whatever can be wrong with a mesh is found here, in the constructors, once. A formulation, an
-oracle or a property may rely on every statement of the two docstrings below and checks none of them again. `Surface`
-knows how segments hang together and nothing of positions; `Interface` adds the reference positions.
+Whatever can be wrong with a mesh is found here, in the constructors, once; nobody checks it again. `Surface` knows how
+segments hang together and nothing of positions; `Interface` adds the reference positions.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from contactverif.contract.errors import MisuseError
 class Surface:
     """One side of the interface: chains of straight segments, each with the body on its left.
 
-    Whoever walks from the first to the second node of a segment has the body on the left and the other surface on the
+    On the way from the first to the second node of a segment the body is on the left and the other surface on the
     right. A surface consists of any number of chains, open or closed. A node belongs to at most two segments.
 
     Attributes

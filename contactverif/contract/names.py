@@ -1,7 +1,6 @@
 """The spelling of names with options on the command line, `NAME:OPTION=VALUE,OPTION=VALUE`, and its error messages.
 
-Formulations and scenes use the same spelling. Rule for the next editor: a name that does not exist is answered with the
-nearest names that do, everywhere by `unknown_name_error`.
+Formulations and scenes use the same spelling. A name that does not exist is answered with the nearest names that do.
 """
 
 from __future__ import annotations

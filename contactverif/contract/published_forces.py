@@ -1,7 +1,6 @@
 """Forces that a formulation states of itself: fractions as text, on the nodes of a named flat case.
 
-Rule for the next editor: the numbers stay rational until somebody compares them, so that a table of a publication is
-copied as it is printed, `5/3` and not `1.667`.
+The numbers stay rational, so that a table of a publication is copied as it is printed, `5/3` and not `1.667`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
 """The model of what a run found: a `Row` for each formulation and property, all rows in a `Run`.
 
-Rules for the next editor:
-
-- This is the only model. The runner makes a `Run`, a report stores it, and the reader makes it again from the file.
-- A table, a page or a comparison reads a `Run` and never asks where it comes from.
-- Whatever one of them needs is stored; what follows from other attributes is computed here and only here.
+The runner makes a `Run`, a report stores it, and the reader makes it again from the file; a table, a page or a
+comparison never asks where it comes from. What follows from other attributes is computed here and only here.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Contact by construction: half of a slave segment lies over the master, and below it.
 
 A formulation looks for contact at nodes, at points inside segments, or on whole segments. Half of a segment, from a
-node to the middle, has points of all of them. Rule for the next editor: a state that is in contact already stays as it
-is, so that cases go on shrinking to one segment a side without any motion.
+node to the middle, has points of all of them. A state that is in contact already stays as it is, so that cases go on
+shrinking to one segment a side without any motion.
 """
 
 from __future__ import annotations
@@ -19,16 +19,9 @@ SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the large
 
 
 def extend_line(line: FloatArray, slave: Sequence[float], room: float) -> FloatArray:
-    """Return the broken line (n, 2), from 0 to the right, long enough for half of the slave's first or last segment.
+    """Return the broken line (n, 2), from 0 to the right, long enough for half of the first or last slave segment.
 
-    Parameters
-    ----------
-    line : FloatArray, shape (n, 2)
-        The master from left to right.
-    slave : Sequence[float]
-        Lengths of the slave segments.
-    room : float
-        A length that is left free at the right end.
+    `slave` has the lengths of its segments; `room` is a length that is left free at the right end.
     """
     needed = max(slave[0], slave[-1]) / 2 + 2 * room
     if line[-1, 0] >= needed:
@@ -37,16 +30,9 @@ def extend_line(line: FloatArray, slave: Sequence[float], room: float) -> FloatA
 
 
 def covered_start(start: float, slave: Sequence[float], width: float) -> float:
-    """Return where the slave starts so that half of one of its segments lies between 0 and `width`.
+    """Return where a slave of these lengths starts so that half of one of its segments lies between 0 and `width`.
 
-    Parameters
-    ----------
-    start : float
-        The place that was drawn. It stays if half of some segment is covered there.
-    slave : Sequence[float]
-        Lengths of the slave segments; half of the first or of the last one fits into the width.
-    width : float
-        The length of the master that may be used.
+    Half of its first or last segment fits into the width. The start stays if half of some segment is covered there.
     """
     x = start + np.concatenate([[0.0], np.cumsum(slave)])
     if any(True for _ in _covered_halves(x, 0.0, width)):
@@ -58,16 +44,9 @@ def covered_start(start: float, slave: Sequence[float], width: float) -> float:
 
 
 def sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
-    """Return the slave, lowered as a whole until half of one of its segments is below the line by `depth` or more.
+    """Return the slave (n, 2), lowered as a whole until half of a segment is below the line (m, 2) by `depth` or more.
 
-    Parameters
-    ----------
-    slave : FloatArray, shape (n, 2)
-        The slave's points from left to right.
-    line : FloatArray, shape (m, 2)
-        The master's points from left to right.
-    depth : float
-        The least penetration, a length.
+    Both run from left to right.
     """
     heights = []
     for left, right in _covered_halves(slave[:, 0], line[0, 0], line[-1, 0]):
@@ -80,26 +59,10 @@ def sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
 
 
 def radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outside: bool, closed: bool) -> float:
-    """Return the factor for the slave's distances from the centre by which half of a segment of it penetrates.
+    """Return the factor for the distances of the slave (n, 2) from the origin by which half of a segment penetrates.
 
-    Parameters
-    ----------
-    slave : FloatArray, shape (n, 2)
-        The slave's points around the centre, which is the origin.
-    polygon : FloatArray, shape (m, 2)
-        The master's points, counter-clockwise; it is convex.
-    depth : float
-        The least penetration, a length.
-    outside : bool
-        The master's body is outside the polygon, else inside.
-    closed : bool
-        Both chains are closed.
-
-    Returns
-    -------
-    float
-        1 if half of a segment penetrates already, or none can; else more than 1 if the body is outside, and less if it
-        is inside.
+    The master's polygon (m, 2) is convex and runs counter-clockwise; its body is outside of it, or inside. The factor
+    is 1 if half of a segment penetrates by `depth` already, or none can; else above 1 outside, and below 1 inside.
     """
     last = None if closed else -1
     begin, along = polygon[:last], (np.roll(polygon, -1, axis=0) - polygon)[:last]

@@ -53,16 +53,9 @@ def shortest(points: FloatArray) -> float:
 def assemble_panels(
     panels: Sequence[Panel], motion: Motion, shuffle: int = 0
 ) -> tuple[Interface, FloatArray, FloatArray]:
-    """Assemble panels to an interface and its state, in a row, far apart.
+    """Assemble panels in a row, far apart: the interface, scaled; its state z, scaled and moved; and x before that.
 
-    Returns
-    -------
-    interface : Interface
-        The interface, scaled but not moved.
-    z : FloatArray, shape (n_unknowns,)
-        The state, scaled and moved.
-    along : FloatArray, shape (n_nodes,)
-        The x of the nodes before the motion, scaled.
+    The shuffle 0 numbers nodes and segments as one walks along them; any other number is a shuffle of its own.
     """
     offsets = _offsets(panels)
     slaves, masters, references = (
@@ -77,14 +70,9 @@ def assemble_panels(
 def assemble_chains(
     slaves: Sequence[Chain], masters: Sequence[Chain], references: Sequence[Chain], scale: float, shuffle: int = 0
 ) -> tuple[Interface, IntArray]:
-    """Return the interface of these chains.
+    """Return the scaled interface of these chains, and the place (n_nodes,) of each node on the walk along them.
 
-    Returns
-    -------
-    interface : Interface
-        The interface in its reference configuration, scaled.
-    order : IntArray, shape (n_nodes,)
-        The place of each node on the walk along the slave's chains, then the master's.
+    The walk goes along the slave's chains, then the master's. The master is where it was.
     """
     n_slave, n_master = (sum(len(chain.points) for chain in side) for side in (slaves, masters))
     slave, master = _segments(slaves, 0), _segments(masters, n_slave)

@@ -1,6 +1,6 @@
 """Sketches: a few segments drawn by hand, with one slave point that projects onto the master in a certain way.
 
-Rule for the next editor: a sketch stands on a lattice so coarse that `ExactTurn` moves it without rounding, even to an
+A sketch stands on a lattice so coarse that `ExactTurn` moves it without rounding, even to an
 offset of 2^20. Coordinates are below 2^8 and multiples of 2^-32, so what a sketch shows exactly (a tie, a hit node)
 stays exact. Only a sketch whose kind survives rounding may set `exact` to False.
 """

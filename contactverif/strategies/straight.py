@@ -3,7 +3,7 @@
 The slave's depth grows along it, and all of it lies over the flat part, seen along either normal. So each rule for gaps
 sees the same straight line opposite, and the exact force is an integral of a linear gap.
 
-Rule for the next editor: everything stands on a lattice of 2^-24 with lengths below 2^8, so that `ExactTurn` rounds
+Everything stands on a lattice of 2^-24 with lengths below 2^8, so that `ExactTurn` rounds
 nothing: straight stays straight, and flat stays flat, bit for bit.
 """
 

@@ -4,7 +4,7 @@ A decision is wrong if the segment is not one of the exact nearest ones, or the 
 exceeds 4u(L + |P − A|), with the length L and the first node A of the segment. A wrong segment with the right sign that
 is farther by no more than that, for both segments together, is the work of roundoff; anything else is a mistake.
 
-Rule for the next editor: the decision is made in rationals. Floats only measure how far an answer is off.
+The decision is made in rationals. Floats only measure how far an answer is off.
 """
 
 from __future__ import annotations
