@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from contactverif.problems.catalogue import load_scene
     from contactverif.problems.named_states import named_case
     from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
+    from contactverif.run.judge import judge_case
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import judge_case
     from contactverif.run.runner import run as verify
 
 __version__ = "0.1.0"

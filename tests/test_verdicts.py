@@ -50,8 +50,9 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import projection_cases
 from contactverif.problems.named_states import named_case
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties, property_ids, standalone_names
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import run
 
 SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verify --all --profile ci` asks.
 

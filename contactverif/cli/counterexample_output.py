@@ -16,7 +16,7 @@ from contactverif.contract.names import parse_name
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
-from contactverif.run.one_case import forces_on
+from contactverif.run.judge import forces_on
 from contactverif.run.registry import formulation_names
 from contactverif_reports.draw import as_text, draw_case
 

@@ -17,8 +17,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
 from contactverif.problems.catalogue import load_scene
-from contactverif.run.one_case import judge_if_applicable, the_formulation, the_property
-from contactverif.run.registry import formulation_names, load_formulation
+from contactverif.run.judge import judge_if_applicable
+from contactverif.run.registry import formulation_names, load_formulation, the_formulation, the_property
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw import as_text
 from contactverif_reports.draw.solved_scene import SolvedScene

@@ -22,9 +22,9 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
+    from contactverif.run.draw import Sampling
     from contactverif.run.profiles import Profile
     from contactverif.run.run_journal import Journal, Plan
-    from contactverif.run.sampling import Sampling
 
 VERIFY, COMPARE = "verify", "compare"
 
@@ -95,7 +95,7 @@ class VerifyJob:
     @property
     def sampling(self) -> Sampling:
         """The size and the seed of the run, and the place where it asks."""
-        from contactverif.run.sampling import Sampling
+        from contactverif.run.draw import Sampling
 
         assert self.profile.seed is not None
         place = self.interface if self.scene is None else self.scene.interface
@@ -241,8 +241,7 @@ def make_plan(command: str, options: VerifyOptions, profile: Profile) -> Plan:
 
 def versions_of(options: VerifyOptions) -> dict[str, str]:
     """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
-    from contactverif.run.code_digests import code_digests
-    from contactverif.run.provenance import collect_versions
+    from contactverif.run.provenance import code_digests, collect_versions
 
     return collect_versions() | code_digests(options.names, options.properties)
 

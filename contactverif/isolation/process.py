@@ -41,7 +41,7 @@ _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
 _CODE = """import sys; sys.path[:] = {path!r}
 from contactverif.isolation.worker import main; main({end}, {progress}, {memory})"""
-# One thread for linear algebra, as in the judge's process (`contactverif.run.one_thread`): the same bits.
+# One thread for linear algebra, as in the judge's process (`contactverif.run.judge.one_thread`): the same bits.
 _THREADS = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM")}
 # A plugin that limits the size of files would cut the compiled modules of the harness, which all runs share.
 _NO_TRACES = {"PYTHONDONTWRITEBYTECODE": "1"}

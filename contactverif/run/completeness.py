@@ -13,8 +13,7 @@ from itertools import product
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import CaseSource, draw_cases
-from contactverif.run.sampling import Sampling
+from contactverif.run.draw import CaseSource, Sampling, draw_cases
 
 _WITHOUT_CASES = (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED)
 

@@ -16,7 +16,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import BLOCK, SHRINK_CALLS, draw_case, draw_cases
+from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling, draw_case, draw_cases
+from contactverif.run.judge import call_first
 from contactverif.run.open_row import OpenRow
 from contactverif.run.outcome_store import WHOLE
 from contactverif.run.packing import CaseChunk
@@ -25,7 +26,6 @@ from contactverif.run.pieces import (
     LIST_CHUNK,
     DrawnCases,
     JudgedCases,
-    call_first,
     draw_chunks,
     in_chunks,
     judge_and_note,
@@ -33,7 +33,6 @@ from contactverif.run.pieces import (
     shrink_case,
 )
 from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
-from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress, Reporter, Task, TaskQueue
 from contactverif.run.workers import Team
 
@@ -113,7 +112,7 @@ class Conductor:
 
     def _begin_block(self, group: Sequence[OpenRow], number: int) -> None:
         """Take a block from the journal, or plan to draw it."""
-        block = self._journal.block(block_name(self._sampling, group[0].question), number)
+        block = self._journal.block(self._sampling.block_name(group[0].question), number)
         if block is None or not self._add_judged_block(group, block):
             self._tasks.add_first([self._drawing(group, number)])
         elif not block.last:
@@ -152,7 +151,7 @@ class Conductor:
         if number == 0:
             for chunk in answer.chunks[: -(-WHOLE // CHUNK)]:
                 chunk.keep()
-        name = block_name(self._sampling, group[0].question)
+        name = self._sampling.block_name(group[0].question)
         block = BlockRecord(name, number, answer.count, answer.exhausted, answer.last)
         self._journal.add_block(block)
         planned = self._count_planned(block)
@@ -223,12 +222,6 @@ def groups_of(sampling: Sampling, rows: Sequence[OpenRow]) -> dict[tuple[str, bo
     for row in rows:
         groups.setdefault(sampling.group(row.question), []).append(row)
     return groups
-
-
-def block_name(sampling: Sampling, question: Property) -> str:
-    """Return the name of a property's cases in a journal."""
-    key, bodies = sampling.group(question)
-    return f"{key} {'bodies' if bodies else 'interfaces'}"
 
 
 def with_case(sampling: Sampling, question: Property, number: int, outcome: Outcome) -> Outcome:

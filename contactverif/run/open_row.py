@@ -14,8 +14,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import CaseSource
-from contactverif.run.judging import badness
+from contactverif.run.draw import CaseSource
+from contactverif.run.judge import badness
 from contactverif.run.outcome_store import WHOLE, OutcomeStore
 from contactverif.run.packing import CaseChunk
 from contactverif.run.pieces import Shrinking

@@ -6,22 +6,17 @@ result. Rule for the next editor: a piece knows nothing of other pieces, and it 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-import numpy as np
-
 from contactverif.contract.case import Case
-from contactverif.contract.errors import ContractError
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
-from contactverif.problems.named_states import named_case
-from contactverif.run import driver, judging
+from contactverif.run import draw, judge
+from contactverif.run.draw import Sampling
 from contactverif.run.packing import CaseChunk
 from contactverif.run.run_journal import Notes
-from contactverif.run.sampling import Sampling
-from contactverif.run.sign_check import has_opposite_sign
 
 CHUNK = 25  # The number of drawn cases that are judged in one piece.
 SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
@@ -59,7 +54,7 @@ def draw_chunks(sampling: Sampling, question: Property, number: int, count: Coun
     """Draw a block of the cases of a property, and of all properties with the same strategy."""
     source = sampling.source(question)
     assert source is not None
-    block = driver.draw_block(
+    block = draw.draw_block(
         source, seed=sampling.key(question), examples=sampling.examples, number=number, progress=count
     )
     return DrawnCases(in_chunks(block.cases, CHUNK), block.exhausted, block.last)
@@ -134,7 +129,7 @@ def judge_chunk(
         if place in earlier:
             outcomes.append(earlier[place])
             continue
-        outcome = judging.judge_case(question, case, subject)
+        outcome = judge.judge_case(question, case, subject)
         outcomes.append(replace(outcome, case_or_summary=outcome.summary))
         note(place, outcomes[-1])
         if count is not None:
@@ -177,46 +172,15 @@ def shrink_case(
         calls += 1
         if count is not None:
             count(calls)
-        outcome = judging.judge_case(question, case, subject)
-        bad = judging.badness(question.info, outcome)
+        outcome = judge.judge_case(question, case, subject)
+        bad = judge.badness(question.info, outcome)
         if bad[0] != goal.kind or bad < goal.least:
             return False
         smallest = outcome
         return True
 
-    driver.shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    draw.shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
     return smallest
-
-
-def call_first(subject: Subject, parts: Collection[str]) -> bool:
-    """Call a formulation for the first time, and return whether its forces have the opposite sign.
-
-    Parameters
-    ----------
-    subject : Subject
-        The formulation. Many compile their kernels in the first call.
-    parts : Collection[str]
-        The optional parts that the run will need; no other part is called.
-
-    Returns
-    -------
-    bool
-        As `has_opposite_sign` says. What else goes wrong here, the properties will say.
-    """
-    opposite = has_opposite_sign(subject)
-    case = named_case("c")
-    try:
-        with np.errstate(all="ignore"):
-            formulation = subject.for_case(case)
-            state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
-            pairing = formulation.pair(case.interface, state.z)
-            if "tangent" in parts:
-                formulation.tangent(case.interface, pairing, state.z)
-            if "contact_points" in parts:
-                formulation.contact_points(case.interface, pairing, state.z)
-    except ContractError:
-        pass
-    return opposite
 
 
 def needed_parts(questions: Mapping[str, Property], subject: Subject) -> frozenset[str]:

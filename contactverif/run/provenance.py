@@ -1,39 +1,33 @@
-"""The origin of a run: versions, commit, machine, time and command, as text for the root of a report."""
+"""The origin of a run: versions, commit, machine, time and command for a report, digests of code for a journal."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import platform
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.names import parse_name
+from contactverif.run.registry import FORMULATIONS, PROPERTIES
+
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
+_CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
+_DIGITS = 16
 
 
 def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
-    """Return the versions, the commit, the machine, the time, the command and the size of a run.
-
-    Parameters
-    ----------
-    profile : str
-        The name of the profile.
-    examples : int
-        The number of planned cases of each property.
-    seed : int
-        The seed of all cases.
-
-    Returns
-    -------
-    dict[str, str]
-        {attribute of the report: value}.
-    """
+    """Return {attribute of the report: value}: versions, commit, machine, time, command and the size of a run."""
     return {
         **collect_versions(),
         "blas": _blas(),
@@ -97,3 +91,48 @@ def _commit() -> str:
     except (OSError, subprocess.TimeoutExpired):
         return "unknown"
     return answer.stdout.strip() if answer.returncode == 0 else "unknown"
+
+
+def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict[str, str]:
+    """Return {package: digest of its code} of the harness and of all plugins that the names refer to.
+
+    A version says too little while an author works on a plugin: a run goes on only with the same code.
+    """
+    plugins = {_plugin_name(part) for text in formulations for part in text.split("/")}
+    modules = {"contactverif"}
+    modules |= {entry.module for entry in metadata.entry_points(group=FORMULATIONS) if entry.name in plugins}
+    modules |= {entry.module for entry in metadata.entry_points(group=PROPERTIES) if entry.name in properties}
+    packages = sorted({module.partition(".")[0] for module in modules})
+    return {f"code of {package}": _digest(_files_of(package)) for package in packages}
+
+
+def _plugin_name(text: str) -> str:
+    try:
+        return parse_name("formulation", text, "")[0]
+    except MisuseError:  # The registry will say what is wrong.
+        return text
+
+
+def _files_of(package: str) -> list[tuple[str, Path]]:
+    """Return (name, file) of all code of a package, in an order that no machine changes; nothing is imported."""
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return []
+    if spec.submodule_search_locations is None:  # A module by itself.
+        return [(package, Path(str(spec.origin)))]
+    folders = map(Path, spec.submodule_search_locations)
+    return sorted((path.relative_to(folder).as_posix(), path) for folder in folders for path in folder.rglob("*"))
+
+
+def _digest(files: Iterable[tuple[str, Path]]) -> str:
+    total = sha256()
+    for name, path in files:
+        if path.suffix not in _CODE or not path.is_file():
+            continue
+        content = path.read_bytes()
+        total.update(f"{name} {len(content)} ".encode())
+        total.update(content)
+    return total.hexdigest()[:_DIGITS]

@@ -160,6 +160,24 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     return tuple(load_property(name, installed) for name in _matches(globs, installed))
 
 
+def the_formulation(name: str, limits: Limits | None = None) -> Subject:
+    """Return the formulation of that name, as `load_formulation` does; one that does not load is a mistake here."""
+    subject = load_formulation(name, limits)
+    if isinstance(subject, NotLoaded):
+        raise MisuseError("formulation", f"{name}, which does not load ({subject.reason})", "one that loads")
+    return subject
+
+
+def the_property(property_id: str) -> Property:
+    """Return the property of that id; one that does not load is a mistake here."""
+    if property_id not in property_ids():  # A pattern is no id.
+        raise unknown_name_error("property", property_id, property_ids())
+    (question,) = load_properties([property_id])
+    if isinstance(question, NotLoaded):
+        raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
+    return question
+
+
 def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
     """Return the ids of the properties that `load_properties` loads; it imports none of them.
 

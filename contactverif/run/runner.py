@@ -26,18 +26,16 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, STATED_PARTS, Subject
 from contactverif.run.conductor import Conductor
-from contactverif.run.driver import CaseSource
-from contactverif.run.judging import judge_case
+from contactverif.run.draw import CaseSource, Sampling
 from contactverif.run.open_row import OpenRow
 from contactverif.run.profiles import PROFILES, Profile, profile_named
 from contactverif.run.provenance import collect_provenance
 from contactverif.run.run_journal import Journal
-from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress
 from contactverif.run.witnesses import find_witness
 from contactverif.run.workers import Team
 
-__all__ = ["PROFILES", "Profile", "Progress", "RunStopped", "judge_case", "profile_named", "run"]
+__all__ = ["PROFILES", "Profile", "Progress", "RunStopped", "profile_named", "run"]
 
 _Kind = TypeVar("_Kind")
 

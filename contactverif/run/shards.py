@@ -20,15 +20,14 @@ import msgspec
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
-from contactverif.run.conductor import Conductor, block_name, groups_of
-from contactverif.run.driver import BLOCK, draws_blocks, number_of_blocks
+from contactverif.run.conductor import Conductor, groups_of
+from contactverif.run.draw import BLOCK, Sampling, draws_blocks, number_of_blocks
 from contactverif.run.journal import begin_journal, read_record, write_record
 from contactverif.run.open_row import OpenRow
 from contactverif.run.packing import CaseChunk
 from contactverif.run.pieces import LIST_CHUNK, DrawnCases, JudgedCases, in_chunks
 from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Plan, check_versions, read_plan
 from contactverif.run.runner import check_once, open_rows
-from contactverif.run.sampling import Sampling
 from contactverif.run.tasks import Progress, Task
 from contactverif.run.workers import Team
 
@@ -140,7 +139,7 @@ class ShardConductor(Conductor):
     def _begin_block(self, group: Sequence[OpenRow], number: int) -> None:
         """Plan to draw a block, unless the journal has all of it, or there is no such block."""
         question = group[0].question
-        block = self._journal.block(block_name(self._sampling, question), number)
+        block = self._journal.block(self._sampling.block_name(question), number)
         if block is not None and all(self._has_all(row, block) for row in group):
             return
         if block is None and number > 0 and not self._draws_blocks(question):
@@ -154,11 +153,12 @@ class ShardConductor(Conductor):
     def _draws_blocks(self, question: Property) -> bool:
         source, sampling = self._sampling.source(question), self._sampling
         assert source is not None
+        assert not isinstance(source, tuple)
         return draws_blocks(source, seed=sampling.key(question), examples=sampling.examples)
 
     def _add_drawn(self, group: Sequence[OpenRow], number: int, answer: DrawnCases) -> None:
         """Plan the judging of a block."""
-        name = block_name(self._sampling, group[0].question)
+        name = self._sampling.block_name(group[0].question)
         self._journal.add_block(BlockRecord(name, number, answer.count, answer.exhausted, answer.last))
         self._tasks.add_first(
             [task for row in group for task in self._judge_chunks(row, answer.chunks, number * BLOCK)]

@@ -7,7 +7,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
-from contactverif.run.driver import CaseSource
+from contactverif.run.draw import CaseSource
 
 
 def find_witness(subject: Subject, question: Property, source: CaseSource) -> Case:

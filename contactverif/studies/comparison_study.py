@@ -17,10 +17,10 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.conductor import with_case
+from contactverif.run.draw import Sampling
 from contactverif.run.profiles import Profile
 from contactverif.run.run_journal import Journal
 from contactverif.run.runner import Progress, run
-from contactverif.run.sampling import Sampling
 from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 

@@ -18,8 +18,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import judge_case
 from contactverif_paper.figure_style import TWO_COLUMNS, add_legend, line_style, new_figure, new_panels, use_decades
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
 from contactverif_paper.paper_item import OURS, Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement

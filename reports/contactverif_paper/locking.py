@@ -26,8 +26,8 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import judge_case
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import TWO_COLUMNS, add_legend, line_style, new_figure, new_panels
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of

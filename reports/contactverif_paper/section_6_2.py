@@ -20,8 +20,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import judge_case
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement

@@ -26,9 +26,9 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
 from contactverif.mechanics.trace import Record, Trace
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import judge_case
 
 
 @dataclass(frozen=True)

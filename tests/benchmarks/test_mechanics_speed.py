@@ -18,7 +18,7 @@ from contactverif.mechanics.bulk import assemble_stiffness, condense, forget_con
 from contactverif.mechanics.scene import forget_bodies
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.uniform_stress import stress_error
-from contactverif.run.judging import judge_case
+from contactverif.run.judge import judge_case
 
 N_MESHES = 10
 ROUNDOFF = 1e-11  # The stress error of the plain script and of ours.

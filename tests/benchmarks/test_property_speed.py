@@ -11,10 +11,9 @@ from subjects import load_property, load_subject
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
-from contactverif.run.judging import judge_case
+from contactverif.run.draw import Sampling, draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
-from contactverif.run.sampling import Sampling
 from contactverif.studies.bench.cell_runs import time_yardstick
 
 FORMULATIONS = ("vts-ppt", "mortar-lm", "nts")  # The first to which the property applies is judged.

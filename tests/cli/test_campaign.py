@@ -24,7 +24,7 @@ N = 3
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif` with blocks of ten cases."""
-    for module in ("driver", "conductor", "shards"):
+    for module in ("draw", "conductor", "shards"):
         monkeypatch.setattr(f"contactverif.run.{module}.BLOCK", 10)
     return asking(monkeypatch, capsys)
 
@@ -57,7 +57,7 @@ def test_the_merged_report_is_that_of_one_run(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
 ) -> None:
     """It is so, too, where hypothesis' engine draws all cases at once, and for a shard that was killed."""
-    monkeypatch.setattr("contactverif.run.driver.AVAILABLE", in_blocks)
+    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "" if in_blocks else "another version")
     single = ask("verify", *WORDS, "--out", tmp_path / "single.nc")
     shards = tmp_path / "shards"
     for number in (3, 1, 2):

@@ -10,7 +10,7 @@ from asking import Answer, Ask, asking
 
 from contactverif.cli.counterexample_output import announce_stored
 from contactverif.contract.errors import MisuseError
-from contactverif.run.one_case import the_property
+from contactverif.run.registry import the_property
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.problems.named_states import named_case
-from contactverif.run import judging
+from contactverif.run import judge as judging
 from contactverif.run.registry import load_formulation
 from contactverif.studies import solved_scenes as pictures
 from contactverif_reports.netcdf.write import write

@@ -149,7 +149,7 @@ def test_a_mistake_leaves_the_report_of_an_earlier_run_where_it_was(ask: Ask, tm
 def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     report = tmp_path / "r.nc"
     kill_at(1, [*RUN, "--out", str(report)], tmp_path / "r.nc.journal")
-    monkeypatch.setattr("contactverif.run.code_digests._digest", lambda files: "another")
+    monkeypatch.setattr("contactverif.run.provenance._digest", lambda files: "another")
     answer = ask("verify", "--resume", report)
     assert answer.status == 2
     assert answer.err.startswith("contactverif: --resume: found code of contactverif")

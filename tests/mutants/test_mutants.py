@@ -12,8 +12,9 @@ from wrong import MUTANTS, SURVIVORS
 
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties, property_ids
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import run
 
 
 def load_property(property_id: str) -> Property:

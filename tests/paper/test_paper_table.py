@@ -18,8 +18,8 @@ from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import judge_case
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")

@@ -13,7 +13,7 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import scene_of
 from contactverif.problems.hertz_box import COARSEST, HertzBox, exact_forces
 from contactverif.problems.hertz_errors import HertzStudy, hertz_errors
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.accuracy_hertz import ACCURACY_HERTZ, LIMITS, MESHES, PENALTIES, hertz_cases
 
 CASES = {case.name: case for case in hertz_cases()}

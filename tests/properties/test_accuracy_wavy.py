@@ -16,7 +16,7 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.wavy import LOWER, UPPER
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.accuracy_wavy import ACCURACY_WAVY
 from contactverif_properties.accuracy_wavy_curved import ACCURACY_WAVY_CURVED, promise_without_locking
 from contactverif_properties.shared.wave_study import (

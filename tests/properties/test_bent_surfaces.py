@@ -15,7 +15,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 

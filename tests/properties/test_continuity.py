@@ -19,8 +19,8 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.continuity import CONTINUITY, N_STEPS, find_jumps, measure_continuity
 

@@ -20,7 +20,8 @@ from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.problems.uniform_stress import stress_error
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.dead_zone import DEAD_ZONE
 from contactverif_properties.flat_solve import FLAT_SOLVE

@@ -18,7 +18,8 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import pressure_of, two_blocks
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
 from contactverif_properties.flat_solve import FLAT_SOLVE
@@ -114,7 +115,7 @@ def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
 
 
 def test_every_variant_is_drawn() -> None:
-    from contactverif.run.driver import draw_cases
+    from contactverif.run.draw import draw_cases
 
     strategy = variant_cases()
     assert strategy is not None

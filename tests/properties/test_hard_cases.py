@@ -16,8 +16,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import run
 from contactverif_properties.hard_dead_zone import covered_share
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]

@@ -14,8 +14,8 @@ from handmade import Handmade, case, subject
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import judge_case
 from contactverif_properties.flat_transmission import FLAT_TRANSMISSION, FORCE_ERROR
 from contactverif_properties.force_balance import FORCE_BALANCE
 from contactverif_properties.moment_balance import MOMENT_BALANCE

@@ -16,7 +16,7 @@ from contactverif.mechanics.changed_scenes import snap
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.newton_attainable import (
     ADDED,
     ERROR,

@@ -21,7 +21,8 @@ from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif_properties.newton_attainable import NEWTON_ATTAINABLE
 from contactverif_properties.newton_history import NEWTON_HISTORY, SERIES, measure_history
 from contactverif_properties.newton_order import DISTANCES, NEWTON_ORDER, fit_order, measure_order, spectral_radius

@@ -14,8 +14,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton_units import NEWTON_UNITS, STEPS, measure_units
 

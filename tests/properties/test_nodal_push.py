@@ -11,7 +11,7 @@ from subjects import load_subject
 from contactverif import Interface, Subject
 from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_nts import vts_ppt
 from contactverif_properties.nodal_push import NODAL_PUSH
 

@@ -13,7 +13,7 @@ from subjects import load_subject
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.objectivity import OBJECTIVITY, measure_objectivity
 
 SEEDS = range(1, 30)

@@ -24,8 +24,9 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case, run
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif_nts import force_tables
 from contactverif_properties.shared.patch_class import LOST_END
 

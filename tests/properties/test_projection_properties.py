@@ -18,8 +18,8 @@ from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 
 IDS = ("projection.segment", "projection.place", "projection.activity", "projection.area", "projection.forces")
 

@@ -11,7 +11,7 @@ from handmade import Handmade, case, over_a_node, subject
 
 from contactverif.contract.property import Measurement, Quantity, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.purity import (
     BATCHED,
     IN_ONE_CALL,

@@ -18,8 +18,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif_properties.remote import BEHIND, FAR, REMOTE
 from contactverif_properties.renumbering import CLOSED, RENUMBERING, renumbering_cases
 from contactverif_properties.shared.relabelled import exchange_roles, mirrored, renumber

@@ -10,7 +10,8 @@ from handmade import Springs, case, subject
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Traits
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif_properties.scaling import FORCES, SCALING, TANGENT, measure_scaling
 
 SEEDS = range(1, 30)

@@ -11,7 +11,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.stability_inf_sup import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")

@@ -19,8 +19,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case, run
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration

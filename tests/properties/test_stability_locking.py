@@ -23,7 +23,8 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
-from contactverif.run.runner import judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif_properties.shared.wave_answer import answer_to_wave
 from contactverif_properties.stability_locking import DRIFT, ROUGHNESS
 

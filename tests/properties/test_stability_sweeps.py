@@ -16,8 +16,9 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import run
 from contactverif_properties.shared.exact_motions import ExactMotion
 from contactverif_properties.shared.sweep_measurement import CONDITION, ERROR, FORCE_ERROR
 from contactverif_properties.stability_stiffness import STABILITY_STIFFNESS

@@ -15,8 +15,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case, run
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import run
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.stability_translation import (

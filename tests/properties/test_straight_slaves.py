@@ -18,8 +18,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
-from contactverif.run.runner import judge_case
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
 from contactverif_properties.shared.same_answer import BITS
 

@@ -11,7 +11,7 @@ from handmade import Handmade, case, over_a_node, subject
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Traits
-from contactverif.run.runner import judge_case
+from contactverif.run.judge import judge_case
 from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
 from contactverif_properties.tangent_directional import (

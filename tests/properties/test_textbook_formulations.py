@@ -9,9 +9,9 @@ from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
-from contactverif.run.runner import judge_case
 
 FORMULATIONS = (CentredSprings, QuadraticSprings, NodalMultipliers, ClippedCells, WeightedGaps)
 FAMILIES = ("stability", "projection", "hard")

@@ -18,8 +18,9 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.problems.named_states import named_case
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import judge_case, run
+from contactverif.run.runner import run
 from contactverif_mortar import mortar, mortar_lm
 from contactverif_properties.nodal_push import NODAL_PUSH, allowed_pushes
 from contactverif_properties.shared.openings import lift_slave

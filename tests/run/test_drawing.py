@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,14 +19,11 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run import driver
-from contactverif.run.driver import BLOCK, draw_block, draw_case, draw_cases, shrink
-from contactverif.run.engine import shrink_choices
+from contactverif.run.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
+from contactverif.run.hypothesis_draws import draw_different, find_difference, shrink_choices
 from contactverif.run.outcome_store import WHOLE
-from contactverif.run.quick_draws import draw_different
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import run
-from contactverif.run.sampling import strategy_name
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])
 ERROR = Quantity("error", "1", "1e-6", "a number for a test")
@@ -192,7 +190,7 @@ def test_a_run_of_many_cases_keeps_few_of_them() -> None:
 def test_without_the_inside_of_hypothesis_its_engine_draws_and_shrinks(
     monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:
-    monkeypatch.setattr(driver, "AVAILABLE", False)
+    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "another version")
     planned = draw_cases(source, seed="1", examples=40)
     assert len(planned.cases) == 40
     judged: list[Case] = []
@@ -205,3 +203,12 @@ def test_a_strategy_with_few_cases_gives_all_of_them_in_many_examples() -> None:
     few = replace(ANY, cases=lambda _: st.integers(1, 30).map(a_case))
     [row] = run([SILENT], [few], examples=3 * BLOCK, seed=1).rows
     assert (row.verdict, row.planned, row.judged) == (Verdict.PASS, 30, 30)
+
+
+def test_this_version_of_hypothesis_draws_what_is_stored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every environment of tox asks its own version."""
+    assert find_difference() == ""
+    for name, value in (("_STORED_PARTS", [0]), ("ConjectureData", object)):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"contactverif.run.hypothesis_draws.{name}", value)
+            assert re.match(r"hypothesis [\d.]+ (draws otherwise|has another inside)", find_difference.__wrapped__())

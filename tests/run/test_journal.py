@@ -20,6 +20,7 @@ from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
 from contactverif.run import pieces
 from contactverif.run.completeness import find_gap
+from contactverif.run.draw import Sampling
 from contactverif.run.journal import begin_journal, hold_journal, journal_folder, read_messages, remove_journal
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run_journal import (
@@ -32,7 +33,6 @@ from contactverif.run.run_journal import (
     read_plan,
 )
 from contactverif.run.runner import Progress, RunStopped, run
-from contactverif.run.sampling import Sampling
 
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
@@ -171,7 +171,7 @@ def test_a_block_that_is_judged_is_not_drawn(
     unbroken: tuple[Run, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Only a block of which cases stay whole is drawn again, and what stays whole stays so."""
-    monkeypatch.setattr("contactverif.run.driver.BLOCK", 10)
+    monkeypatch.setattr("contactverif.run.draw.BLOCK", 10)
     monkeypatch.setattr("contactverif.run.conductor.BLOCK", 10)
     monkeypatch.setattr("contactverif.run.open_row.WHOLE", 10)
     plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))

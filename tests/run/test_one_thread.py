@@ -12,12 +12,11 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from contactverif import load_properties, named_case
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property
-from contactverif.run.driver import draw_cases, shrink
-from contactverif.run.sampling import Sampling
+from contactverif.run.draw import Sampling, draw_cases, shrink
 
 # A run that judged something before scipy's own BLAS was there.
 LATE = """
-from contactverif.run.one_thread import one_thread
+from contactverif.run.judge import one_thread
 with one_thread():
     pass
 import scipy.linalg

@@ -23,7 +23,8 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run import witnesses as witnesses_module
-from contactverif.run.runner import PROFILES, Progress, judge_case, run
+from contactverif.run.judge import judge_case
+from contactverif.run.runner import PROFILES, Progress, run
 
 ERROR = Quantity("error", "1", "1e-6", "a number for a test")
 
@@ -239,7 +240,7 @@ def test_cases_depend_on_no_loaded_module_and_nothing_is_written(tmp_path: Path)
         "import sys\n"
         "if sys.argv[1] == 'with': import of_a_user\n"
         "from hypothesis import strategies as st\n"
-        "from contactverif.run.driver import draw_cases\n"
+        "from contactverif.run.draw import draw_cases\n"
         "strategy = st.lists(st.one_of(st.integers(1000, 8000), st.floats(0, 1)), max_size=9)\n"
         "print(draw_cases(strategy, seed='1', examples=200).cases)\n"
     )

@@ -13,7 +13,7 @@ from contactverif.contract.case import Case
 from contactverif.oracle import is_of_class
 from contactverif.problems.class_scenes import normal_scenes, single_scenes
 from contactverif.problems.named_states import named_case
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
 from contactverif.strategies import normal_cases, overhung_cases, single_cases
 
 FIXED = settings(derandomize=True, database=None, max_examples=2000)

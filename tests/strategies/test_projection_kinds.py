@@ -14,7 +14,7 @@ from contactverif.contract.interface import Interface
 from contactverif.oracle import is_of_kind, kind_of, project_point
 from contactverif.oracle.projection_kinds import KIND_TESTS
 from contactverif.problems.named_states import named_case
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
 from contactverif.strategies.projections import KINDS, cases_of_kind, projection_states
 
 FIXED = settings(derandomize=True, database=None, deadline=None, phases=[Phase.generate, Phase.shrink])

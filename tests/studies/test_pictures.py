@@ -18,8 +18,8 @@ from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import load_scene
 from contactverif.problems.named_states import named_case
-from contactverif.run.driver import draw_cases
-from contactverif.run.one_case import forces_on
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import forces_on
 from contactverif.run.registry import load_formulation
 from contactverif.strategies.solids import block_cases
 from contactverif.studies.solved_scenes import solve_scene

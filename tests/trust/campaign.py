@@ -17,9 +17,9 @@ from tables import fill
 
 from contactverif.contract.property import Property, Verdict, checked_numbers
 from contactverif.contract.subject import Subject
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import judge_case
 
 FILE = "campaign.csv"
 EXAMPLES = {1: 60, 2: 30}  # {seed: random cases of each property and formulation}

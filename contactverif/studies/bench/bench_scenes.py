@@ -22,7 +22,7 @@ from contactverif.problems import blocks, kinked_patch, ring_errors, wavy_errors
 from contactverif.problems.hertz_errors import NEARLY_BALANCED, HertzStudy, errors_of_solution
 from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
 from contactverif.problems.wavy import COLUMNS, UPPER, WavyProblem, wavy_scene
-from contactverif.run.driver import draw_cases
+from contactverif.run.draw import draw_cases
 from contactverif.strategies.solids import block_cases
 from contactverif_reports.bench.results import RANDOM, Cell
 

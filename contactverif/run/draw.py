@@ -1,16 +1,9 @@
-"""The planned cases of a strategy, block by block, and the search for a smaller case that fails.
+"""The planned cases of a run: drawn block by block before one of them is judged, and shrunk where one fails.
 
-The planned cases are drawn before one of them is judged, by functions that never fail. So every formulation of a run is
-judged on the same cases, and a failure ends nothing early. Hypothesis sees a formulation only while it shrinks.
-
-A block is drawn without the blocks before it, so that a run of a million cases never holds them all. The cases of a
-block are different; two blocks may, rarely, have a case in common.
-
-A property may have a strategy for each kind of situation. Then the kinds take turns, so that each gets the same share
-of the planned cases.
-
-A property may have a finite list of named cases instead of a strategy. Then all of them are planned, whatever the
-number of examples, and none is shrunk: its name says what it is.
+The cases of a property depend on the seed of the run and on its strategy alone. So the choice of properties and
+formulations, their order and the number of processes change no case, and properties with the same strategy have the
+same cases. A block is drawn without the blocks before it, so that a run of a million cases never holds them all. The
+cases of a block are different; two blocks may, rarely, have a case in common.
 """
 
 from __future__ import annotations
@@ -18,66 +11,86 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
-from contactverif.run.engine import draw_all, reproducible, shrink_choices, shrink_drawn
-from contactverif.run.quick_draws import AVAILABLE, Draw, draw_different
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Property
+from contactverif.run.hypothesis_draws import (
+    Draw,
+    draw_all,
+    draw_different,
+    find_difference,
+    reproducible,
+    shrink_choices,
+    shrink_drawn,
+)
+from contactverif.run.judge import one_thread
 
-# A strategy, a strategy for each kind of situation, or a finite list of named cases.
-CaseSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]] | tuple[Case, ...]
+# A strategy, or a strategy for each kind of situation: the kinds take turns, so that each gets the same share.
+RandomSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]]
+# Or a finite list of named cases: all of them are planned, whatever the number of examples, and none is shrunk.
+CaseSource = RandomSource | tuple[Case, ...]
 
 BLOCK = 500  # The number of cases that are drawn, and kept in memory, at a time.
-# The largest number of judgements for one counterexample. Hypothesis itself stops after 500 shrinks or 300 s.
+# The largest number of judgements for one counterexample. It counts calls and not seconds, so that a slow machine ends
+# at the same case as a fast one. Hypothesis itself stops after 500 shrinks or 300 s.
 SHRINK_CALLS = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedCases:
-    """Some or all of the planned cases of a strategy.
+class Sampling:
+    """The size and the seed of a run, and the place where it asks."""
 
-    Attributes
-    ----------
-    cases : tuple[Case, ...]
-        The cases in the order in which they were drawn.
-    exhausted : bool
-        Whether the strategy has no other cases, so that there may be fewer or more than were asked for.
-    last : bool
-        Whether no further block follows.
-    """
+    examples: int  # The number of cases of each property.
+    seed: int
+    interface: Interface | None = None  # The interface on which everything is checked; None for random ones.
+    scene: Case | None = None  # The scene on which bodies are checked; None for random ones.
+
+    def source(self, question: Property) -> CaseSource | None:
+        """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
+        if question.bodies and self.interface is not None and self.scene is None:
+            return None
+        with one_thread():
+            return cast("CaseSource | None", question.cases(self.scene if question.bodies else self.interface))
+
+    def key(self, question: Property) -> str:
+        """Return the seed of the cases of a property, which properties with the same strategy have in common."""
+        return f"{self.seed}/{strategy_name(question)}"
+
+    def group(self, question: Property) -> tuple[str, bool]:
+        """Return what properties have in common if their cases are the same: the seed, and what makes them."""
+        return self.key(question), question.bodies
+
+    def block_name(self, question: Property) -> str:
+        """Return the name of the cases of a property in a journal."""
+        return f"{self.key(question)} {'bodies' if question.bodies else 'interfaces'}"
+
+
+def strategy_name(question: Property) -> str:
+    """Return the stored name of the strategy of a property (`random_source`), or else the id of the property."""
+    return name_of_source(question.cases) or question.id
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCases:
+    """Some or all of the planned cases of a strategy, in the order in which they were drawn."""
 
     cases: tuple[Case, ...]
-    exhausted: bool
-    last: bool = True
+    exhausted: bool  # The strategy has no other cases, so there may be fewer or more than were wanted.
+    last: bool = True  # No further block follows.
 
 
 def draw_cases(
     source: CaseSource, *, seed: str, examples: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
-    """Draw all planned cases.
+    """Draw all planned cases; the first is the simplest that the strategy makes. Kinds follow one another in turn.
 
-    Parameters
-    ----------
-    source : CaseSource
-        The strategy, the strategies by kind, or the finite list. A case that a strategy filters out is not counted.
-    seed : str
-        The same seed gives the same cases.
-    examples : int
-        The number of cases. There are fewer if the strategy has fewer.
-    progress : Callable[[int], None] | None
-        Called with the number of cases after each.
-
-    Returns
-    -------
-    PlannedCases
-        The cases; the first is the simplest that the strategy makes. Kinds follow one another in turn.
-
-    Raises
-    ------
-    MisuseError
-        If a case of a finite list has no name, or two have the same.
+    A case that a strategy filters out is not counted. There are fewer if the strategy has fewer.
     """
     cases: list[Case] = []
     for number in range(number_of_blocks(examples)):
@@ -96,12 +109,9 @@ def number_of_blocks(examples: int) -> int:
 def draw_block(
     source: CaseSource, *, seed: str, examples: int, number: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
-    """Draw one block of the planned cases; the parameters of `draw_cases`, and the number of the block from 0.
-
-    Where the harness cannot draw by itself, the first block has all cases.
-    """
+    """Draw one block of the planned cases, numbered from 0. Where the engine draws, the first block has all cases."""
     if isinstance(source, tuple):
-        _check_names([case.name for case in source])
+        check_names(source)
         return PlannedCases(source, exhausted=True)
     report = progress or (lambda _: None)
     past = number * BLOCK
@@ -113,9 +123,9 @@ def draw_block(
     return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
 
 
-def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
+def draws_blocks(source: RandomSource, *, seed: str, examples: int) -> bool:
     """Return whether a strategy is drawn block by block; otherwise the first block has all cases."""
-    return not isinstance(source, tuple) and _block_of(source, seed, examples, 0) is not None
+    return _block_of(source, seed, examples, 0) is not None
 
 
 def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
@@ -128,27 +138,60 @@ def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> C
     return draws[number % BLOCK].case
 
 
-def _block_of(
-    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]], seed: str, examples: int, number: int
-) -> list[Draw] | None:
+def shrink(
+    source: CaseSource,
+    *,
+    seed: str,
+    examples: int,
+    first: int,
+    fails: Callable[[Case], bool],
+    limit: int = SHRINK_CALLS,
+) -> None:
+    """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
+
+    `first` is the number of the first case that fails. The cases before it are not judged again. A formulation that
+    answers differently each time ends the search early. A case of a kind is shrunk to another one of its kind.
+    """
+    if isinstance(source, tuple):
+        return
+    draws = _block_of(source, seed, examples, first)
+    if draws is not None:
+        strategies = _strategies_in_turn(source)
+        _, strategy = strategies[first % len(strategies)]
+        shrink_choices(strategy, draws[first % BLOCK].stored_choices(), seed=seed, fails=fails, limit=limit)
+    elif isinstance(source, Mapping):
+        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=lambda _: None)
+        n, place = _deal(parts)[first]
+        kind, share = _shares(source, examples)[n]
+        strategy = _strategy_of_kind(source, kind)
+        shrink_drawn(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
+    else:
+        shrink_drawn(source, seed=seed, examples=examples, first=first, fails=fails, limit=limit)
+
+
+def check_names(cases: Sequence[Case]) -> None:
+    """Check that each case of a finite list can be told from the others by its name."""
+    for name, times in Counter(case.name for case in cases).items():
+        if not name or times > 1:
+            actual = f"{times} times {name!r}" if name else "a case without a name"
+            raise MisuseError("cases", actual, "a finite list whose cases have a name each, all different")
+
+
+def _block_of(source: RandomSource, seed: str, examples: int, number: int) -> list[Draw] | None:
     """Return the block that the case with this number belongs to; None if hypothesis' engine draws it."""
     block = number // BLOCK
     return _draw_block(source, seed, block, min(BLOCK, examples - block * BLOCK), lambda _: None)
 
 
 def _draw_block(
-    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
-    seed: str,
-    number: int,
-    size: int,
-    progress: Callable[[int], None],
+    source: RandomSource, seed: str, number: int, size: int, progress: Callable[[int], None]
 ) -> list[Draw] | None:
     """Return the first `size` cases of a block; None if hypothesis' engine must draw all blocks.
 
     A strategy with few different cases may run out. Only the engine knows whether it has more, so it draws all of them;
     where that shows late, the block is short.
     """
-    if not AVAILABLE:
+    if find_difference():
         return None
     strategies = _strategies_in_turn(source)
     streams = [
@@ -170,9 +213,7 @@ def _counted_from(past: int, progress: Callable[[int], None]) -> Callable[[int],
     return lambda count: progress(past + count)
 
 
-def _strategies_in_turn(
-    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
-) -> list[tuple[str, SearchStrategy[Case]]]:
+def _strategies_in_turn(source: RandomSource) -> list[tuple[str, SearchStrategy[Case]]]:
     """Return each kind and its strategy; one without a name if there are no kinds."""
     if isinstance(source, Mapping):
         return [(kind, _strategy_of_kind(source, kind)) for kind in source]
@@ -180,11 +221,7 @@ def _strategies_in_turn(
 
 
 def _draw_with_engine(
-    source: SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]],
-    *,
-    seed: str,
-    examples: int,
-    progress: Callable[[int], None],
+    source: RandomSource, *, seed: str, examples: int, progress: Callable[[int], None]
 ) -> PlannedCases:
     """Return all cases, drawn by hypothesis' engine."""
     if not isinstance(source, Mapping):
@@ -230,61 +267,3 @@ def _shares(kinds: Mapping[str, object], examples: int) -> list[tuple[str, int]]
     least, more = divmod(examples, len(kinds))
     shares = [(kind, least + (place < more)) for place, kind in enumerate(kinds)]
     return [(kind, share) for kind, share in shares if share]
-
-
-def _check_names(names: list[str]) -> None:
-    """Check that each case of a finite list can be told from the others by its name."""
-    for name, times in Counter(names).items():
-        if not name or times > 1:
-            actual = f"{times} times {name!r}" if name else "a case without a name"
-            raise MisuseError("cases", actual, "a finite list whose cases have a name each, all different")
-
-
-def shrink(
-    source: CaseSource,
-    *,
-    seed: str,
-    examples: int,
-    first: int,
-    fails: Callable[[Case], bool],
-    limit: int = SHRINK_CALLS,
-) -> None:
-    """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
-
-    A formulation that answers differently each time ends the search early. Of a finite list nothing is smaller. A case
-    of a kind is shrunk to another one of its kind.
-
-    Parameters
-    ----------
-    source : CaseSource
-        The source of the planned cases.
-    seed, examples : str or int
-        The arguments of `draw_cases`, so that the block of the case is drawn again.
-    first : int
-        The number of the first case that fails. The cases before it are not judged again.
-    fails : Callable[[Case], bool]
-        The judgement of a case.
-    limit : int
-        The largest number of judgements. It counts calls and not seconds, so that a slow machine ends at the same case
-        as a fast one.
-
-    Raises
-    ------
-    Exception
-        If `fails` raises it.
-    """
-    if isinstance(source, tuple):
-        return
-    draws = _block_of(source, seed, examples, first)
-    if draws is not None:
-        strategies = _strategies_in_turn(source)
-        _, strategy = strategies[first % len(strategies)]
-        shrink_choices(strategy, draws[first % BLOCK].stored_choices(), seed=seed, fails=fails, limit=limit)
-    elif isinstance(source, Mapping):
-        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=lambda _: None)
-        n, place = _deal(parts)[first]
-        kind, share = _shares(source, examples)[n]
-        strategy = _strategy_of_kind(source, kind)
-        shrink_drawn(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
-    else:
-        shrink_drawn(source, seed=seed, examples=examples, first=first, fails=fails, limit=limit)

@@ -1,0 +1,171 @@
+"""The judgement of one case, and the order of outcomes from harmless to bad.
+
+Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
+from contactverif.contract.subject import Subject
+from contactverif.problems.named_states import named_case
+
+STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
+
+
+def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
+    """Judge one case, a new one or one that was stored. Whatever the plugin does is an outcome.
+
+    Parameters
+    ----------
+    question : Property
+        The property to check.
+    case : Case
+        The case to check it on.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Outcome
+        Verdict, reason and numbers.
+
+    Raises
+    ------
+    Exception
+        Any error of the harness or the property itself, with the case as a note.
+    """
+    start = perf_counter()
+
+    def outcome(verdict: Verdict, reason: str, *, breach: bool = False) -> Outcome:
+        return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
+
+    try:
+        with one_thread(), np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
+            measurement = question.measure(case, subject)
+            verdict, reason = judge(question, measurement)
+    except PluginError as error:
+        verdict = Verdict.UNDECIDED if error.cause == "not asked" else Verdict.CRASHED
+        return outcome(verdict, f"{error.cause}: {error}")
+    except NonFiniteError as error:
+        return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
+    except ContractError as error:
+        return outcome(Verdict.FAIL, f"breaks the contract: {error}", breach=True)
+    except Exception as error:
+        error.add_note(f"while judging {question.id} of {subject.name} on {case!r}")
+        raise
+    return replace(outcome(verdict, reason), measurement=measurement)
+
+
+def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
+    """Judge a case; if the property does not apply to the formulation, return an outcome that says so."""
+    if reason := question.refusal(subject.traits):
+        return Outcome(case, Verdict.NOT_APPLICABLE, reason)
+    if missing := question.needs - subject.provides:
+        return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
+    return judge_case(question, case, subject)
+
+
+def badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
+    """Return a key that orders outcomes: crashes, breaches of the contract, failures by how far beyond tolerance."""
+    if outcome.verdict is Verdict.CRASHED:
+        return 3, inf
+    if outcome.verdict is not Verdict.FAIL:
+        return 0, 0.0
+    if outcome.breach:
+        return 2, inf
+    if outcome.measurement is None or outcome.measurement.broken:
+        return 1, inf
+    return 1, max((number.ratio for number in checked_numbers(info, outcome.measurement)), default=inf)
+
+
+def forces_on(case: Case, subject: Subject) -> FloatArray | None:
+    """Return nodal forces (n_nodes, dim) to draw; None if the plugin returns none or has multipliers."""
+    try:
+        formulation = subject.for_case(case)
+        if formulation.n_multipliers(case.interface):
+            return None
+        forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+    except ContractError:
+        return None
+    nodal: FloatArray = -forces.reshape(case.interface.nodes.shape)
+    return nodal
+
+
+def call_first(subject: Subject, parts: Collection[str]) -> bool:
+    """Call a formulation for the first time, and return whether its forces have the opposite sign.
+
+    Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
+    is called. What else goes wrong here, the properties will say.
+    """
+    opposite = has_opposite_sign(subject)
+    case = named_case("c")
+    try:
+        with np.errstate(all="ignore"):
+            formulation = subject.for_case(case)
+            state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
+            pairing = formulation.pair(case.interface, state.z)
+            if "tangent" in parts:
+                formulation.tangent(case.interface, pairing, state.z)
+            if "contact_points" in parts:
+                formulation.contact_points(case.interface, pairing, state.z)
+    except ContractError:
+        pass
+    return opposite
+
+
+def has_opposite_sign(subject: Subject) -> bool:
+    """Return whether the forces of a formulation pull the slave towards the master in all of `STATES`.
+
+    A residual with all signs turned round is the most frequent mistake of a first plugin. Then nearly every property
+    fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
+    """
+    if subject.traits.enforcement == "barrier":  # It is not defined in penetration.
+        return False
+    try:
+        return all(_push(subject, named_case(name)) < 0 for name in STATES)
+    except ContractError:
+        return False
+
+
+def _push(subject: Subject, case: Case) -> float:
+    """Return the total force on the slave along the master's outward normal; multipliers, if any, press."""
+    formulation, interface = subject.for_case(case), case.interface
+    pressure = case.penalty * case.parameter("penetration")
+    state = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure))
+    residual = formulation.residual(interface, formulation.pair(interface, state.z), state.z)
+    x, y = case.parameters["direction"]
+    slave = -residual[: interface.n_unknowns].reshape(-1, 2)[: interface.n_slave_nodes]
+    return float((slave @ np.array([-y, x])).sum())
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Return a context in which numpy and scipy compute on one thread, to judge cases and to make them.
+
+    The matrices of a case are small: threads of BLAS that share one wait for each other longer than they compute. One
+    thread also gives the same last bit on any number of cores. Exact solutions are solved once and remembered, so what
+    makes a case needs one thread, too.
+    """
+    context: AbstractContextManager[Any] = _blas().limit(limits=1, user_api="blas")
+    return context
+
+
+@cache
+def _blas() -> Any:
+    """Return what knows the libraries that are loaded; to look for them takes some milliseconds."""
+    import_module("scipy.linalg")  # It brings a BLAS of its own, which would not be found later.
+    return ThreadpoolController()
