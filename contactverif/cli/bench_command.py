@@ -41,7 +41,7 @@ def bench(
     all_: Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")] = False,
     scene: Annotated[
         list[str] | None,
-        typer.Option(help="Only this scene: wavy, hertz, rings, kinked, random. Repeatable.", metavar="NAME"),
+        typer.Option(help="Only this scene: a problem such as wavy, or random. Repeatable.", metavar="NAME"),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Take the two coarsest meshes, one penalty, six random scenes.")

@@ -9,22 +9,14 @@ from rich.table import Table
 from rich.text import Text
 
 from contactverif.cli.console import plain_table
-from contactverif_reports.bench.results import PARTS, SCENES, BenchResults, Outcome
+from contactverif_reports.bench.results import PARTS, BenchResults, Outcome
 from contactverif_reports.bench.slowdown import SLOWER, Slowdown
 from contactverif_reports.bench.work_precision import REFERENCE, TARGETS, cost_ratio, time_to_reach
 
 
 def targets_table(results: BenchResults, scene: str) -> Table:
-    """Return the time to reach each error on a scene, in milliseconds, and the parts of the time.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    scene : str
-        The scene.
-    """
-    table = plain_table(f"{scene}: {SCENES[scene]}")
+    """Return the time to reach each error on a scene, in milliseconds, and the parts of the time."""
+    table = plain_table(f"{scene}: {results.label(scene)}")
     table.padding = (0, 1, 0, 0)
     table.add_column("formulation", overflow="fold")
     for target in TARGETS:

@@ -35,30 +35,24 @@ GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 ti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A solved scene, as its errors need it.
+    """A solved scene, as its errors need it, whoever solved it."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The scene, with the distributed penalty ε̂ that it was solved with.
-    trace : Trace
-        Newton's method, iterate by iterate.
-    state : Case
-        The last iterate: positions, multipliers behind them.
-    forces : FloatArray, shape (n_nodes, 2)
-        The forces by which the formulation pushes the nodes, minus its residual.
-    points : ContactPoints | None
-        The contact points; None if the plugin reports none.
-    nodal : bool
-        True if pressures of points are nodal forces (trait `penalty="nodal"`).
-    """
+    scene: Scene  # It has the distributed penalty ε̂ that it was solved with.
+    state: Case  # The positions, multipliers behind them.
+    forces: FloatArray  # (n_nodes, 2), by which contact pushes the nodes
+    points: ContactPoints | None = None  # None if none are reported
+    nodal: bool = False  # Pressures of points are nodal forces (trait `penalty="nodal"`).
+    trace: Trace | None = None  # Newton's method, iterate by iterate; None if another code solved the scene.
 
-    scene: Scene
-    trace: Trace
-    state: Case
-    forces: FloatArray
-    points: ContactPoints | None
-    nodal: bool
+    @classmethod
+    def from_displacements(cls, scene: Scene, displacements: FloatArray) -> Solution:
+        """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
+
+        The forces are those that the bodies need for these displacements, supports included.
+        """
+        state = Case(scene.interface, (scene.interface.nodes + displacements).reshape(-1), scene.penalty)
+        q = scene.transformation.T @ displacements.reshape(-1)
+        return cls(scene, state, scene.nodal_forces(np.asarray(q)))
 
     @property
     def interface(self) -> Interface:
@@ -72,9 +66,23 @@ class Solution:
         return moves
 
     @property
+    def n_iterations(self) -> int:
+        """The number of iterations of Newton's method."""
+        return self.trace.n_iterations if self.trace is not None else 0
+
+    @property
+    def end(self) -> str:
+        """How Newton's method ended, in words."""
+        return self.trace.end.label if self.trace is not None else ""
+
+    @property
     def balanced(self) -> bool:
         """True if Newton's method found a solution (up to BALANCED), or came as near to one as roundoff lets it."""
-        return self.trace.end in (End.CONVERGED, End.STAGNATED)
+        return self.trace is None or self.trace.end in (End.CONVERGED, End.STAGNATED)
+
+    def is_balanced_to(self, force: float) -> bool:
+        """Return whether it is a solution, or out of balance by no more than a force."""
+        return self.balanced or (self.trace is not None and bool(self.trace.residuals[-1] <= force))
 
 
 def solve_for_accuracy(
@@ -92,11 +100,6 @@ def solve_for_accuracy(
         The first iterate; by default the first guess of the scene.
     step : float | None
         The step of differences where the formulation has no tangent, a length that is small against the penetration.
-
-    Returns
-    -------
-    Solution
-        The last iterate of Newton's method, whether or not it converged.
     """
     interface = scene.interface
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
@@ -127,11 +130,6 @@ def solve_in_tries(
         The step of differences, as in `solve_for_accuracy`.
     keep_matrix : bool
         True saves matrices, for whoever asks for the solution and not for Newton's method, see `solve`.
-
-    Returns
-    -------
-    tuple[Trace, ...]
-        One or two tries; the last one counts.
     """
     ways = (True, False) if "tangent" in formulation.provides else (True,)
     traces = []
@@ -152,23 +150,13 @@ def solve_in_tries(
 
 
 def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -> Solution:
-    """Return the last iterate of Newton's method with its forces and contact points.
-
-    Parameters
-    ----------
-    trace : Trace
-        The trace.
-    formulation : CheckedFormulation
-        The formulation that made it.
-    nodal : bool
-        True if pressures of points are nodal forces (trait `penalty="nodal"`).
-    """
+    """Return the last iterate of Newton's method with its forces and contact points."""
     scene, interface, z = trace.scene, trace.scene.interface, trace.z
     state = Case(interface, z, scene.penalty, name=scene.name, n_multipliers=len(trace.multipliers))
     pairing = formulation.pair(interface, z)
     forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
     points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
-    return Solution(scene, trace, state, forces, points, nodal)
+    return Solution(scene, state, forces, points, nodal, trace)
 
 
 def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:

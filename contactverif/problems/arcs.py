@@ -26,19 +26,6 @@ SEGMENTS = (3, 4)  # Numbers of segments of slave and master on the coarsest mes
 class Arcs:
     """Two concentric arcs.
 
-    Attributes
-    ----------
-    radius : float
-        The radius of the master, a length.
-    depth : float
-        The penetration d > 0, a length.
-    convex_slave : bool
-        True if the slave's body lies inside its arc, else around it.
-    slave, master : tuple[float, float]
-        The angles at which each begins and ends, in degrees.
-    penalty : float
-        The distributed stiffness ε̂.
-
     Examples
     --------
     >>> from contactverif.problems.arcs import Arcs
@@ -47,12 +34,12 @@ class Arcs:
     (4.1, 1.0)
     """
 
-    radius: float = 4.0
-    depth: float = 0.1
-    convex_slave: bool = True
-    slave: tuple[float, float] = (10.0, 80.0)
+    radius: float = 4.0  # The radius of the master, a length.
+    depth: float = 0.1  # The penetration d > 0, a length.
+    convex_slave: bool = True  # True if the slave's body lies inside its arc, else around it.
+    slave: tuple[float, float] = (10.0, 80.0)  # The angles at which each begins and ends, in degrees.
     master: tuple[float, float] = (0.0, 90.0)
-    penalty: float = 10.0
+    penalty: float = 10.0  # The distributed stiffness ε̂.
 
     @property
     def slave_radius(self) -> float:
@@ -78,20 +65,7 @@ class Arcs:
         return force
 
     def case(self, refine: int = 1, name: str = "") -> Case:
-        """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike.
-
-        Parameters
-        ----------
-        refine : int
-            The factor of the numbers of segments.
-        name : str
-            The name of the case.
-
-        Returns
-        -------
-        Case
-            The state of both arcs. The reference has the slave on the master's arc.
-        """
+        """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike."""
         shares = np.linspace(0, 1, SEGMENTS[0] * refine + 1), np.linspace(0, 1, SEGMENTS[1] * refine + 1)
         slave = _directions(self.slave, shares[0])
         master = _directions(self.master, shares[1] + GRADE * shares[1] * (1 - shares[1]))

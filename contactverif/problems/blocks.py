@@ -155,21 +155,7 @@ def overhangs(case: Case) -> bool:
 
 
 def pressure_of(case: Case, penalty: float) -> float:
-    """Return the exact contact pressure of a uniform scene, force per length.
-
-    Parameters
-    ----------
-    case : Case
-        A case for which `is_uniform` holds.
-    penalty : float
-        The distributed stiffness ε̂; infinite for multipliers.
-
-    Returns
-    -------
-    float
-        The pressure that loads the scene; under an approach Δ it is p = Δ / (H1/M1 + H2/M2 + 1/ε̂), with the heights H
-        and the oedometric moduli M of both blocks.
-    """
+    """Return the exact contact pressure of a uniform scene, force per length."""
     if "pressure" in case.parameters:
         return case.parameter("pressure")
     return case.parameter("approach") / (float(case.parameters["compliance"].sum()) + 1 / penalty)
@@ -177,15 +163,6 @@ def pressure_of(case: Case, penalty: float) -> float:
 
 def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:
     """Return the unknowns q (n_free,) of the exact solution of a uniform scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        A scene from `two_blocks` whose pressure is known.
-    pressure : float
-        The exact contact pressure p.
-    penalty : float
-        The distributed stiffness ε̂.
 
     Returns
     -------

@@ -39,48 +39,24 @@ _QUARTER_TURNS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1
 
 @dataclass(frozen=True, slots=True)
 class NamedScene:
-    """The description of a scene.
+    """The description of a scene."""
 
-    Attributes
-    ----------
-    summary : str
-        What the scene shows, in one line.
-    source : str
-        The place in the paper; empty if the scene is ours.
-    assumptions : str
-        What the paper does not print; for a scene of ours, why it is as it is.
-    """
-
-    summary: str
-    source: str
-    assumptions: str
+    summary: str  # What the scene shows, in one line.
+    source: str  # The place in the paper; empty if the scene is ours.
+    assumptions: str  # What the paper does not print; for a scene of ours, why it is as it is.
 
 
 @dataclass(frozen=True, slots=True)
 class NamedBlocks(NamedScene):
-    """The description of two blocks, upright, in the paper's units. The pressure between them is uniform.
+    """The description of two blocks, upright, in the paper's units. The pressure between them is uniform."""
 
-    Attributes
-    ----------
-    slave, master : Sequence[float]
-        The lengths of the segments from left to right.
-    slave_from, master_from : float
-        The x at which the segments begin.
-    height : float
-        The height of each block.
-    pressure : float
-        The pressure on top.
-    rigid_master : bool
-        True if the master is a rigid floor.
-    """
-
-    slave: Sequence[float]
+    slave: Sequence[float]  # The lengths of the segments from left to right.
     master: Sequence[float]
-    slave_from: float = 0.0
+    slave_from: float = 0.0  # The x at which the segments begin.
     master_from: float = 0.0
-    height: float = 4.0
-    pressure: float = 100.0
-    rigid_master: bool = False
+    height: float = 4.0  # The height of each block.
+    pressure: float = 100.0  # The pressure on top.
+    rigid_master: bool = False  # True if the master is a rigid floor.
 
 
 BLOCKS: Mapping[str, NamedBlocks] = {
@@ -175,13 +151,7 @@ SCENES: Mapping[str, NamedScene] = {
 
 
 def load_scene_case(text: str) -> Case:
-    """Return the scene that the text names as a case; see `load_scene`.
-
-    Raises
-    ------
-    MisuseError
-        If the name, an option or a value does not exist.
-    """
+    """Return the scene that the text names as a case; see `load_scene`."""
     return load_scene(text, "scene").case()
 
 
@@ -228,25 +198,7 @@ def load_scene(text: str, argument: str = "--scene") -> Scene:
 
 
 def make_scene(name: str, **options: Any) -> Scene:
-    """Return a scene by its name, with options as keywords.
-
-    Parameters
-    ----------
-    name : str
-        A key of `SCENES`.
-    **options : Any
-        The options: `options_of` lists them, `make_blocks` and `make_disk` describe them.
-
-    Returns
-    -------
-    Scene
-        The scene.
-
-    Raises
-    ------
-    MisuseError
-        If the name, an option or a value does not exist.
-    """
+    """Return a scene by its name, with options as keywords."""
     if name not in SCENES:
         raise unknown_name_error("scene", name, SCENES)
     defaults = options_of(name)
@@ -298,16 +250,6 @@ def make_disk(
     lowered : float | None
         The depth to which the disk is pushed in the first guess. By default the contact is then about as wide as in the
         solution.
-
-    Returns
-    -------
-    Scene
-        The disk (slave) on the foundation (master).
-
-    Raises
-    ------
-    MisuseError
-        If the force is so large, or the penalty so soft, that the contact is wider than the fine part of the meshes.
     """
     problem = DiskProblem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
     return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
@@ -350,11 +292,6 @@ def make_blocks(
         The support of the vertical sides. Free sides strain, so that the contact area changes.
     lowered : float | None
         The depth to which the slave is pushed in the first guess: 0 begins where the blocks touch. By default p/ε̂.
-
-    Returns
-    -------
-    Scene
-        The two blocks.
     """
     drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure

@@ -50,30 +50,14 @@ _CORNER = pi / 4  # The blocks below, above, left and right of that square see i
 
 @dataclass(frozen=True, slots=True)
 class DiskProblem:
-    """The data of a disk that is pressed on a foundation; by default the paper's.
+    """The data of a disk that is pressed on a foundation; by default the paper's."""
 
-    Attributes
-    ----------
-    radius : float
-        The radius R of the disk, a length.
-    young : tuple[float, float]
-        Young's moduli of disk and foundation, force per length squared.
-    poisson : float
-        Poisson's ratio of both bodies.
-    force : float
-        The force F on top of the disk, per unit of thickness.
-    penalty : float
-        The distributed stiffness ε̂, force per length per length of penetration.
-    width, depth : float
-        The width and the depth of the foundation, lengths; 2R and R by default.
-    """
-
-    radius: float = 10.0
-    young: tuple[float, float] = (1e8, 1e9)
-    poisson: float = 0.0
-    force: float = 1e6
-    penalty: float = 1e9
-    width: float = 0.0
+    radius: float = 10.0  # The radius R of the disk, a length.
+    young: tuple[float, float] = (1e8, 1e9)  # Young's moduli of disk and foundation, force per length squared.
+    poisson: float = 0.0  # Poisson's ratio of both bodies.
+    force: float = 1e6  # The force F on top of the disk, per unit of thickness.
+    penalty: float = 1e9  # The distributed stiffness ε̂, force per length per length of penetration.
+    width: float = 0.0  # The width and the depth of the foundation, lengths; 2R and R by default.
     depth: float = 0.0
 
     def __post_init__(self) -> None:
@@ -116,11 +100,6 @@ def disk_on_foundation(
         Winkler layer has, so that what is in contact hardly changes afterwards.
     name : str
         The name of the scene.
-
-    Raises
-    ------
-    MisuseError
-        If the contact is wider, or very much narrower, than the meshes are made for.
     """
     a = problem.half_width
     low, high = SLOPES[0] * problem.radius, SLOPES[1] * problem.radius
@@ -248,11 +227,6 @@ def grade(length: float, first: float, parts: int, steps: int) -> FloatArray:
     """Return ascending coordinates (steps + 1,) from 0 to the length, each step longer than the one before.
 
     As many steps as parts begin with one that is `first` long; more or fewer follow the same law.
-
-    Raises
-    ------
-    MisuseError
-        If so many parts, each as long as the first, do not fit into the length.
     """
     if not first * parts < length:
         raise MisuseError("graded: length", f"{length:g}", f"more than {parts} parts of {first:g}")

@@ -38,23 +38,14 @@ FINER = 4  # The mesh of the reference is so many times finer.
 
 @dataclass(frozen=True, slots=True)
 class DiskErrors:
-    """The errors on one mesh, all dimensionless.
+    """The errors on one mesh, all dimensionless."""
 
-    Attributes
-    ----------
-    slave, master : float
-        E_F, the error of nodal forces of disk and foundation.
-    pressure : float | None
-        The root mean square error of reported pressures over the largest of the reference; None if there are none to
-        compare.
-    displacement : float
-        The error of the displacements of the disk's surface, in L2.
-    """
-
-    slave: float
+    slave: float  # E_F, the error of nodal forces of disk and foundation.
     master: float
+    # The root mean square error of reported pressures over the largest of the reference; None if there are none to
+    # compare.
     pressure: float | None
-    displacement: float
+    displacement: float  # The error of the displacements of the disk's surface, in L2.
 
 
 def solve_disk_for_accuracy(subject: Subject, refine: int = 1, problem: DiskProblem = PAPER) -> Solution:
@@ -79,15 +70,7 @@ def _scene(problem: DiskProblem, refine: int) -> Scene:
 
 
 def disk_errors(solution: Solution, reference: Solution) -> DiskErrors:
-    """Return the errors of a solution against one on a finer mesh, whose pressures are forces over ∫N ds.
-
-    Parameters
-    ----------
-    solution : Solution
-        The solution whose errors are wanted.
-    reference : Solution
-        The solution on the finer mesh, or that of another formulation on an equally fine one.
-    """
+    """Return the errors of a solution against one on a finer mesh, whose pressures are forces over ∫N ds."""
     interface, current = solution.interface, solution.state.positions
     sides = zip(
         (interface.slave, interface.master), (reference.interface.slave, reference.interface.master), strict=True

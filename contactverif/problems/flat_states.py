@@ -26,21 +26,11 @@ UPRIGHT, TURNED, STEEP = (1, 0, 1), (4, 3, 5), (-5, 12, 13)
 
 @dataclass(frozen=True, slots=True)
 class Master:
-    """The master in the frame: all its chains, of which one has the flat part that the slave penetrates.
+    """The master in the frame: all its chains, of which one has the flat part that the slave penetrates."""
 
-    Attributes
-    ----------
-    points : Sequence[tuple[float, float]]
-        The nodes: their places along the flat part and their heights above it.
-    segments : Sequence[tuple[int, int]]
-        The segments as pairs of nodes, the body on the left.
-    flat : Sequence[int]
-        The nodes of the flat part, from right to left.
-    """
-
-    points: Sequence[tuple[float, float]]
-    segments: Sequence[tuple[int, int]]
-    flat: Sequence[int]
+    points: Sequence[tuple[float, float]]  # The nodes: their places along the flat part and their heights above it.
+    segments: Sequence[tuple[int, int]]  # The segments as pairs of nodes, the body on the left.
+    flat: Sequence[int]  # The nodes of the flat part, from right to left.
 
 
 def flat_master(places: Sequence[float]) -> Master:

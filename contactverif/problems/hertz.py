@@ -49,17 +49,10 @@ def pressure(x: FloatArray, force: float, radius: float, stiffness: float) -> Fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WinklerContact:
-    """The contact of a cylinder with a flat, with a layer of springs between them.
+    """The contact of a cylinder with a flat, with a layer of springs between them."""
 
-    Attributes
-    ----------
-    half_width : float
-        The half-width of the contact, a length.
-    coefficients : FloatArray, shape (n,)
-        The pressure in Legendre polynomials of x over the half-width, force per length; odd ones are 0.
-    """
-
-    half_width: float
+    half_width: float  # The half-width of the contact, a length.
+    # (n,) The pressure in Legendre polynomials of x over the half-width, force per length; odd ones are 0.
     coefficients: FloatArray
 
     @property
@@ -97,11 +90,6 @@ def solve_winkler_contact(
         The radius R, the stiffness E* and the penalty ε̂.
     terms : int
         The number of polynomials.
-
-    Returns
-    -------
-    WinklerContact
-        Half-width and pressure.
     """
     widest = _WIDEST * max(half_width(force, radius, stiffness), layer_half_width(force, radius, penalty))
 

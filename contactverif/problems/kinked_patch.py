@@ -10,7 +10,6 @@ Rule for the next editor: nodes of both meshes lie at every kink, and nowhere el
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -20,8 +19,10 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import Scene
+from contactverif.problems.problem import PosedProblem, Problem
+from contactverif.problems.uniform_stress import pose_uniform
 
 LAYERS = 2  # Layers of cells of each block.
 LOWER, UPPER = (0.0, 0.3, 0.65, 1.0), (0.0, 0.2, 0.45, 0.75, 1.0)  # Shares of each facet at which nodes lie.
@@ -32,17 +33,6 @@ _FACTS = ("line", "height", "pressure", "young", "poisson")  # The attributes of
 @dataclass(frozen=True, slots=True)
 class KinkedPatch:
     """Two blocks on a broken line.
-
-    Attributes
-    ----------
-    line : tuple[tuple[float, float], ...]
-        The ends of the facets from left to right, a length each.
-    height : float
-        The distance of bottom and top from y = 0, a length.
-    pressure : float
-        The pressure p on all sides, force per length.
-    young, poisson : float
-        Young's modulus and Poisson's ratio of both blocks.
 
     Examples
     --------
@@ -56,10 +46,10 @@ class KinkedPatch:
     [0.0, -0.125]
     """
 
-    line: tuple[tuple[float, float], ...]
-    height: float = 6.0
-    pressure: float = 1e-6
-    young: float = 1.0
+    line: tuple[tuple[float, float], ...]  # The ends of the facets from left to right, a length each.
+    height: float = 6.0  # The distance of bottom and top from y = 0, a length.
+    pressure: float = 1e-6  # The pressure p on all sides, force per length.
+    young: float = 1.0  # Young's modulus and Poisson's ratio of both blocks.
     poisson: float = 0.3
 
     @property
@@ -105,47 +95,17 @@ class KinkedPatch:
         return displacement + self.translation(penetration) if upper else displacement
 
     def cut(self, share: float = 0.25) -> KinkedPatch:
-        """Return the patch of a line with a third normal: one kink is cut off, from `share` of both facets.
-
-        Raises
-        ------
-        MisuseError
-            If the line has another number of facets than two.
-        """
+        """Return the patch of a line with a third normal: one kink is cut off, from `share` of both facets."""
         if len(self.line) != 3:
             raise MisuseError("line", f"{len(self.line) - 1} facets", "two facets, which meet in one kink")
         first, kink, last = np.array(self.line)
         ends = (first, kink + share * (first - kink), kink + share * (last - kink), last)
         return replace(self, line=tuple((float(x), float(y)) for x, y in ends))
 
-    def forces(self, interface: Interface) -> FloatArray:
-        """Return the exact forces (n_nodes, 2) that push the nodes of a mesh of this interface."""
-        forces = np.zeros((interface.n_nodes, 2))
-        for surface in (interface.slave, interface.master):
-            along = interface.nodes[surface.segments[:, 1]] - interface.nodes[surface.segments[:, 0]]
-            inwards = self.pressure * np.column_stack([-along[:, 1], along[:, 0]])  # The body is on the left.
-            np.add.at(forces, surface.segments.reshape(-1), np.repeat(inwards / 2, 2, axis=0))
-        return forces
-
 
 @cache
 def kinked_patch(problem: KinkedPatch, *, upper_slave: bool = True, penalty: float = 1.0) -> Scene:
-    """Return the scene of both blocks; the lower one stands on a hinge and a roller, the upper one on the lower one.
-
-    Parameters
-    ----------
-    problem : KinkedPatch
-        Line, pressure and material.
-    upper_slave : bool
-        True if the upper block is the slave.
-    penalty : float
-        The distributed stiffness ε̂. The first guess is a penetration of p/ε̂ everywhere.
-
-    Returns
-    -------
-    Scene
-        The slave first. The facts are the attributes of the problem and "upper_slave", 1 or 0; `patch_of` reads them.
-    """
+    """Return the scene of both blocks; the lower one stands on a hinge and a roller, the upper one on the lower one."""
     start = problem.translation(problem.pressure / penalty)
     bodies = _block(problem, upper=True, start=start), _block(problem, upper=False, start=np.zeros(2))
     facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
@@ -183,10 +143,9 @@ def exact_unknowns(problem: KinkedPatch, scene: Scene, penetration: float) -> Fl
 def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
     """Return one block, its nodes row by row from bottom to top."""
     line, shares = np.array(problem.line), np.array(UPPER if upper else LOWER)
-    parts = [first + shares[1:, None] * (second - first) for first, second in itertools.pairwise(line)]
-    for part, end in zip(parts, line[1:], strict=True):
-        part[-1] = end  # A kink is the same point to the last bit on both sides.
-    edge = np.vstack([line[:1], *parts])
+    parts = line[:-1, None] + shares[1:, None] * np.diff(line, axis=0)[:, None]  # (n_facets, n_nodes, 2)
+    parts[:, -1] = line[1:]  # A kink is the same point to the last bit on both sides.
+    edge = np.vstack([line[:1], parts.reshape(-1, 2)])
     far = np.column_stack([edge[:, 0], np.full(len(edge), problem.height if upper else -problem.height)])
     low, high = (edge, far) if upper else (far, edge)
     rows = [low + layer / LAYERS * (high - low) for layer in range(LAYERS)] + [high]
@@ -216,3 +175,26 @@ def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
         start=start,
         name="upper" if upper else "lower",
     )
+
+
+_WIDTH, _HEIGHT = 8.0, 1.5  # Lengths of the zigzag with one tooth
+
+
+def _pose(teeth: int, stiffness: float, traits: Traits) -> PosedProblem:
+    """Return blocks on a zigzag of so many teeth: it has two normals, so that the uniform state is exact."""
+    places = range(2 * teeth + 1)
+    problem = KinkedPatch(tuple((_WIDTH * place / (2 * teeth), _HEIGHT / teeth * (place % 2)) for place in places))
+    penalty = stiffness * problem.young
+    scene = kinked_patch(problem, penalty=penalty)
+    penetration = 0.0 if traits.enforcement == "multiplier" else problem.pressure / penalty
+    return pose_uniform(scene, problem.pressure, exact_unknowns(problem, scene, penetration))
+
+
+KINKED = Problem(
+    label="two blocks on a zigzag",
+    unit="E/ℓ",
+    meshes=(1, 2, 4),
+    penalties=(1.0, 30.0, 1e3),
+    pose=_pose,
+    rank=4,
+)

@@ -40,24 +40,15 @@ _RECURRENCE = 400  # The first ratio of Legendre functions is 1/t here: a point 
 
 @dataclass(frozen=True, eq=False)
 class LinePressure:
-    """A symmetrical pressure on the strip |x| ≤ a, a polynomial on each panel.
+    """A symmetrical pressure on the strip |x| ≤ a, a polynomial on each panel."""
 
-    Attributes
-    ----------
-    half_width : float
-        The half-width a, a length.
-    edges : FloatArray, shape (n_panels + 1,)
-        The ends of the panels over a, ascending from −1 to 1.
-    coefficients : FloatArray, shape (n_panels, n_terms)
-        The pressure of each panel in Legendre polynomials of the place on the panel, force per length.
-    approach : float
-        The approach δ of the integral equation, in which ln|x − s| has x and s in the unit of a; NaN where the
-        pressure solves none.
-    """
-
-    half_width: float
-    edges: FloatArray
+    half_width: float  # The half-width a, a length.
+    edges: FloatArray  # (n_panels + 1,) The ends of the panels over a, ascending from −1 to 1.
+    # (n_panels, n_terms) The pressure of each panel in Legendre polynomials of the place on the panel, force per
+    # length.
     coefficients: FloatArray
+    # The approach δ of the integral equation, in which ln|x − s| has x and s in the unit of a; NaN where the pressure
+    # solves none.
     approach: float = float("nan")
 
     @property
@@ -181,16 +172,6 @@ def layer_contact(
         The number of polynomials on a panel.
     more_levels : int
         The number of panels at each edge beyond those that E*/(ε̂ a) asks for.
-
-    Returns
-    -------
-    LinePressure
-        The pressure with its approach. Twice as many terms and more panels change it by less than 1e-10 of its peak.
-
-    Raises
-    ------
-    MisuseError
-        If a number is not positive.
     """
     for name, number in (
         ("half_width", half_width),

@@ -28,33 +28,17 @@ Curve = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A slave chain over a master chain, at rest: the slave on top, and left of the way that it is walked.
+    """A slave chain over a master chain, at rest: the slave on top, and left of the way that it is walked."""
 
-    Attributes
-    ----------
-    slave, master : FloatArray, shape (n, 2)
-        The points in walking order, the body on the left.
-    inward : FloatArray, shape (n_slave, 2)
-        The unit vectors along which the slave's points penetrate the master.
-    closed : bool
-        The last point of each chain is joined to its first.
-    """
-
-    slave: FloatArray
+    slave: FloatArray  # (n, 2) The points in walking order, the body on the left.
     master: FloatArray
-    inward: FloatArray
-    closed: bool = False
+    inward: FloatArray  # (n_slave, 2) The unit vectors along which the slave's points penetrate the master.
+    closed: bool = False  # The last point of each chain is joined to its first.
 
 
 @cache
 def long_states() -> tuple[Case, ...]:
-    """Return the states.
-
-    Returns
-    -------
-    tuple[Case, ...]
-        Cases with names (``"wave-110"``); the number is that of the segments of the longer side.
-    """
+    """Return the states."""
     parts = {
         "wave-110": [_open(_places(2, 80), _places(13, 110), _wave)],
         "graded-110": [_open(_grade_places(4, 110), _places(5, 60), _flat)],

@@ -53,13 +53,7 @@ def refinement_cases() -> tuple[Case, ...]:
 
 
 def refinements(case: Case) -> tuple[Scene, ...]:
-    """Return the scenes of a family from coarse to fine, each with twice the segments of the one before.
-
-    Parameters
-    ----------
-    case : Case
-        The coarsest mesh, from `refinement_cases`.
-    """
+    """Return the scenes of a family from coarse to fine, each with twice the segments of the one before."""
     n_slave, n_master = case.parameters["columns"].astype(int).tolist()
     return tuple(refined_blocks(n_slave * 2**level, n_master * 2**level) for level in range(N_MESHES))
 

@@ -18,7 +18,7 @@ S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from math import inf, pi
 from typing import Literal
 
@@ -29,7 +29,11 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
+from contactverif.problems.problem import PosedProblem, Problem
 
 Role = Literal["inner", "outer"]
 SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
@@ -42,18 +46,10 @@ _FACTS = ("inner_radius", "radius", "outer_radius", "young", "poisson", "interfe
 
 @dataclass(frozen=True, slots=True)
 class FiniteFit:
-    """The fit of two rings, measured where they are after it.
+    """The fit of two rings, measured where they are after it."""
 
-    Attributes
-    ----------
-    force : float
-        The force between the rings for each unit of angle, pressure times radius.
-    pressure : float
-        The contact pressure over the length of the slave, force per length.
-    """
-
-    force: float
-    pressure: float
+    force: float  # The force between the rings for each unit of angle, pressure times radius.
+    pressure: float  # The contact pressure over the length of the slave, force per length.
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +206,7 @@ def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refin
     -------
     Scene
         The rings, the slave first. The penalty is 1; a study chooses its own. The facts are the attributes of the
-        problem and "outer_slave", 1 or 0; `rings_of` reads them.
+        problem and "outer_slave", 1 or 0; `RingStudy.from_case` reads them.
 
     Raises
     ------
@@ -224,20 +220,6 @@ def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refin
     facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
     facts["outer_slave"] = np.array(float(slave == "outer"))
     return Scene(tuple(rings[name] for name in order), facts=facts)
-
-
-def rings_of(case: Case) -> tuple[ShrinkFit, Role]:
-    """Return the problem of a case of `shrink_fit`, on whatever mesh, and the ring that is the slave."""
-    (inner, outer), (inner_ratio, outer_ratio) = (case.parameters[name].tolist() for name in ("young", "poisson"))
-    problem = ShrinkFit(
-        case.parameter("inner_radius"),
-        case.parameter("radius"),
-        case.parameter("outer_radius"),
-        young=(inner, outer),
-        poisson=(inner_ratio, outer_ratio),
-        interference=case.parameter("interference"),
-    )
-    return problem, "outer" if case.parameter("outer_slave") else "inner"
 
 
 @cache
@@ -265,3 +247,76 @@ def _ring(problem: ShrinkFit, ring: Role, refine: int) -> Body:
         fixed=fixed.reshape(-1, 2),
         name=ring,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class RingStudy:
+    """Two rings at one penalty, the same on all meshes."""
+
+    problem: ShrinkFit
+    slave: Role
+    penalty: float  # The distributed stiffness ε̂
+
+    def fit(self, traits: Traits) -> FiniteFit:
+        """Return the exact fit for formulations of these traits."""
+        penalty = inf if traits.enforcement == "multiplier" else self.penalty
+        return self.problem.finite(self.slave, penalty, "reference" if traits.area == "reference" else "current")
+
+    def pose(self, refine: int, traits: Traits) -> PosedProblem:
+        """Return the problem on a mesh.
+
+        The ends of a quarter are held across their line of symmetry, and bear what contact does there.
+        """
+        fit, ring = self.fit(traits), int(self.slave == "outer")
+        scene = replace(shrink_fit(self.problem, slave=self.slave, refine=refine), penalty=self.penalty)
+        radius = self.problem.contact_radii[ring]
+        outwards = (1 if ring else -1) * replace(self.problem, radius=radius).compliances[ring] / radius * fit.force
+
+        def motion(places: FloatArray) -> FloatArray:
+            moves: FloatArray = outwards * places / np.linalg.norm(places, axis=1)[:, None]
+            return moves
+
+        return PosedProblem(
+            scene=scene,
+            forces=partial(self._forces, scene.interface, fit),
+            motions=(motion,),
+            pressure=lambda places: np.full(len(places), fit.pressure),
+            pressure_scale=fit.pressure,
+        )
+
+    def _forces(self, interface: Interface, fit: FiniteFit, positions: FloatArray) -> FloatArray:
+        """Return the exact forces: the master bears the same force for each unit of angle as the slave."""
+
+        def traction(of_master: bool, places: FloatArray) -> FloatArray:
+            radii = np.linalg.norm(places, axis=1)[:, None]
+            towards = -1.0 if (self.slave == "inner") is not of_master else 1.0
+            pressures: FloatArray = towards * (fit.force / radii if of_master else fit.pressure) * places / radii
+            return pressures
+
+        sides = ((interface.slave, False), (interface.master, True))
+        forces = [traction_forces(side, positions, partial(traction, of_master)) for side, of_master in sides]
+        return forces[0] + forces[1]
+
+    @classmethod
+    def from_case(cls, case: Case) -> RingStudy:
+        """Return the study that a case of a scene of `shrink_fit` stands for, on whatever mesh."""
+        facts = {name: case.parameters[name].tolist() for name in _FACTS}
+        facts |= {name: tuple(facts[name]) for name in ("young", "poisson")}
+        return cls(ShrinkFit(**facts), "outer" if case.parameter("outer_slave") else "inner", case.penalty)
+
+
+FIT = ShrinkFit(interference=1e-2)  # The interference is larger than the height of a facet.
+
+
+def _pose(refine: int, penalty: float, traits: Traits) -> PosedProblem:
+    return RingStudy(FIT, "inner", penalty).pose(refine, traits)
+
+
+RINGS = Problem(
+    label="two rings shrunk onto each other",
+    unit="",
+    meshes=(1, 2, 4, 6),
+    penalties=(1e2, 1e3, 1e4),
+    pose=_pose,
+    rank=3,
+)

@@ -60,13 +60,7 @@ def stability_states() -> tuple[Case, ...]:
 
 @cache
 def stability_scenes() -> tuple[Case, ...]:
-    """Return two blocks at penalties from soft springs to far beyond what doubles can carry.
-
-    Returns
-    -------
-    tuple[Case, ...]
-        Cases of scenes with names (``"stiffness-1e6"``), with the parameters "stiffness" (ε̂h/E), "turn" and "shift".
-    """
+    """Return two blocks at penalties from soft springs to far beyond what doubles can carry."""
     slave_x, master_x = _places(np.random.default_rng(3), _MOST_BITS, 1.0)
     lines = np.array([0.0, 1.0, 2.0])
     master_x = np.concatenate([[slave_x[0]], master_x[1:-1], [slave_x[-1]]])  # Both blocks are equally wide.

@@ -21,8 +21,12 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
-from contactverif.mechanics.scene import Scene
-from contactverif.problems.blocks import pressure_of
+from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import Solution, shape_integrals
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.problem import Errors, PosedProblem
 
 CONDITION_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r"
 STRESS_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂ + M U/ℓ)/p"
@@ -71,15 +75,7 @@ def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float |
 
 
 def condition_tolerance(scene: Scene, penalty: float) -> float:
-    """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number.
-
-    Parameters
-    ----------
-    scene : Scene
-        The solved scene.
-    penalty : float
-        The distributed penalty ε̂ that it was solved with.
-    """
+    """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number."""
     lengths = _segment_lengths(scene)
     young = [body.young for body in scene.bodies if not body.rigid]
     h = float(scene.interface.slave.lengths(scene.interface.nodes).mean())
@@ -88,32 +84,14 @@ def condition_tolerance(scene: Scene, penalty: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class UniformTolerances:
-    """The tolerances of a solved patch test in one state, all dimensionless.
+    """The tolerances of a solved patch test in one state, all dimensionless."""
 
-    Attributes
-    ----------
-    stress : float
-        STRESS_TOLERANCE, for stresses over p and nodal forces over p L.
-    pressure : float
-        PRESSURE_TOLERANCE, for the pressure that a formulation reports, over p.
-    """
-
-    stress: float
-    pressure: float
+    stress: float  # STRESS_TOLERANCE, for stresses over p and nodal forces over p L.
+    pressure: float  # PRESSURE_TOLERANCE, for the pressure that a formulation reports, over p.
 
 
 def uniform_tolerances(case: Case, scene: Scene, pressure: float) -> UniformTolerances:
-    """Return the tolerances of a solved scene in the state of the case.
-
-    Parameters
-    ----------
-    case : Case
-        The solved state: its positions, and the penalty ε̂ that the scene was solved with.
-    scene : Scene
-        The scene of the case.
-    pressure : float
-        The exact pressure p.
-    """
+    """Return the tolerances of a solved scene in the state of the case."""
     lengths = _segment_lengths(scene)
     modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
     displacement = float(np.abs(case.positions - scene.interface.nodes).max())
@@ -132,3 +110,44 @@ def _segment_lengths(scene: Scene) -> FloatArray:
 def _ratio(lengths: FloatArray) -> float:
     """Return the shortest length over the longest."""
     return float(lengths.min() / lengths.max())
+
+
+def uniform_forces(interface: Interface, pressure: float) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) that push the nodes of an interface under a uniform pressure."""
+    forces = np.zeros(interface.nodes.shape)
+    for surface in (interface.slave, interface.master):
+        along = np.diff(interface.nodes[surface.segments], axis=1)[:, 0]
+        inwards = pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]])  # The body is on the left.
+        np.add.at(forces, surface.segments, inwards[:, None])
+    return forces
+
+
+def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> PosedProblem:
+    """Return the problem of a scene whose exact pressure is uniform, with its exact unknowns (n_free,)."""
+    interface = scene.interface
+    exact_moves = scene.positions(exact).reshape(-1, 2) - interface.nodes
+
+    def motion_error(solution: Solution) -> Errors:
+        squares = np.zeros(2)
+        for surface in (interface.slave, interface.master):
+            integrals = shape_integrals(surface, interface.nodes)
+            fields = (solution.displacements - exact_moves, exact_moves)
+            squares += [integrals @ (field**2).sum(axis=1) for field in fields]
+        return {"displacement": float(np.sqrt(squares[0] / squares[1]))}
+
+    return PosedProblem(
+        scene=scene,
+        forces=lambda _: uniform_forces(interface, pressure),
+        pressure=lambda places: np.full(len(places), pressure),
+        pressure_scale=pressure,
+        deformed=False,
+        further=motion_error,
+    )
+
+
+def pose_blocks(case: Case, traits: Traits) -> PosedProblem:
+    """Return the problem of two blocks under a uniform pressure, from their case."""
+    scene = scene_of(case)
+    penalty = np.inf if traits.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty)
+    return pose_uniform(scene, pressure, exact_unknowns(scene, pressure, penalty))

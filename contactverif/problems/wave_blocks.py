@@ -79,31 +79,15 @@ def case_name(columns: tuple[int, int], penalty: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class WaveAnswer:
-    """The answer of two blocks to the wave.
+    """The answer of two blocks to the wave."""
 
-    Attributes
-    ----------
-    compliance : float
-        The work of the wave's load on the displacements that it causes.
-    pressure_range : float
-        The largest minus the smallest pressure at the interface that it causes, over p1.
-    """
-
-    compliance: float
-    pressure_range: float
+    compliance: float  # The work of the wave's load on the displacements that it causes.
+    pressure_range: float  # The largest minus the smallest pressure at the interface that it causes, over p1.
 
 
 @cache
 def matching_answer(n_columns: int, distributed: float) -> WaveAnswer:
-    """Return the answer of matching meshes, whose gap is integrated exactly against a distributed stiffness.
-
-    Parameters
-    ----------
-    n_columns : int
-        The number of segments of either side.
-    distributed : float
-        The distributed stiffness ε̂ of the springs.
-    """
+    """Return the answer of matching meshes, whose gap is integrated exactly against a distributed stiffness."""
     scene = _uniform_blocks(n_columns, n_columns)
     interface, length = scene.interface, LENGTH / n_columns
     slave, master = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])

@@ -8,8 +8,6 @@ symmetry; the far edges move as the exact field does there, so that nothing is c
 Each body has its own depth η = |y| ≥ 0: the upper one is 0 < y < H, the lower one −H < y < 0. The field is one of
 linear elasticity: it is exact but for terms of the order of p1/E and of the slope of the surfaces, 1e-6 here.
 
-Rule for the next editor: fields know no mesh and no formulation. Only `wavy_scene` makes bodies.
-
 References
 ----------
 K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half-plane) and 13.2 (wavy surfaces).
@@ -17,50 +15,43 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-from math import inf, pi
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
+from itertools import product
+from math import inf, pi, sqrt
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import grid_cells
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, PosedProblem, Problem, Studies
 
 UPPER, LOWER = 0, 1
 COLUMNS = (6, 8)  # The number of cells along the upper and the lower surface of the coarsest mesh.
+MESHES = (1, 2, 4, 8)  # The refinements r of a study.
+# The cells along both surfaces where one mesh is four times finer, and r. No inner node meets a node for these r.
+CONTRAST_COLUMNS, CONTRAST_MESHES = (4, 1), (6, 9, 13, 18)
 GRADING = 0.15  # The nodes of the lower body lie at W (t + GRADING t (1 − t)): no node meets one of the upper body.
 
 
 @dataclass(frozen=True, slots=True)
 class WavyProblem:
-    """Two wavy bodies, their materials and the pressure between them. The first entry of a pair is the upper body.
+    """Two wavy bodies, their materials and the pressure between them. The first entry of a pair is the upper body."""
 
-    Attributes
-    ----------
-    wavelength : float
-        The wavelength λ of the pressure, and the width W of the bodies.
-    height : float
-        The height H of each body.
-    young, poisson : tuple[float, float]
-        Young's moduli E, force per length squared, and Poisson's ratios ν, in plane strain.
-    mean, wave : float
-        The mean pressure p̄ and the amplitude p1 of its wave, force per length, p̄ > p1.
-    penalty : float
-        The distributed stiffness ε̂ between the bodies; infinite for multipliers.
-    amplitude : float
-        The amplitude A of the interface where the bodies meet, a length: y = A cos kx there, up to a constant.
-    """
-
-    wavelength: float = 4.0
-    height: float = 2.0
-    young: tuple[float, float] = (1.0, 3.0)
+    wavelength: float = 4.0  # λ of the pressure, and the width W of the bodies
+    height: float = 2.0  # H of each body
+    young: tuple[float, float] = (1.0, 3.0)  # Force per length squared, in plane strain
     poisson: tuple[float, float] = (0.3, 0.2)
-    mean: float = 2e-6
-    wave: float = 1e-6
-    penalty: float = inf
-    amplitude: float = 0.0
+    mean: float = 2e-6  # The mean pressure p̄ > p1, force per length
+    wave: float = 1e-6  # The amplitude p1 of its wave
+    penalty: float = inf  # The distributed stiffness ε̂ between the bodies; infinite for multipliers
+    amplitude: float = 0.0  # A of the interface where the bodies meet: y = A cos kx there, up to a constant
 
     @property
     def wave_number(self) -> float:
@@ -91,82 +82,60 @@ class WavyProblem:
         moduli = (self.plane_modulus(body) for body in (UPPER, LOWER))
         return self.wave * (sum(2 / (self.wave_number * modulus) for modulus in moduli) + 1 / self.penalty)
 
+    def pressure(self, x: FloatArray) -> FloatArray:
+        """Return the pressure p̄ + p1 cos kx, force per length, in the shape of x."""
+        pressures: FloatArray = self.mean + self.wave * np.cos(self.wave_number * np.asarray(x))
+        return pressures
 
-def wavy_pressure(problem: WavyProblem, x: FloatArray) -> FloatArray:
-    """Return the pressure p̄ + p1 cos kx, force per length, in the shape of x."""
-    pressures: FloatArray = problem.mean + problem.wave * np.cos(problem.wave_number * np.asarray(x))
-    return pressures
+    def forces(self, interface: Interface, slave: int, positions: FloatArray) -> FloatArray:
+        """Return the exact forces (n_nodes, 2) that push the nodes at positions (n_nodes, 2)."""
 
+        def traction(direction: float, places: FloatArray) -> FloatArray:
+            pressure = self.pressure(places[:, 0])  # The surface is flat but for slopes of 1e-6.
+            return np.column_stack([0 * pressure, direction * pressure])
 
-def wavy_displacements(problem: WavyProblem, body: int, places: FloatArray) -> FloatArray:
-    """Return the displacements of a body, those of the interface included.
+        sides = ((interface.slave, slave), (interface.master, 1 - slave))
+        forces = [traction_forces(side, positions, partial(traction, _into(body))) for side, body in sides]
+        return forces[0] + forces[1]
 
-    With the depth η and u_η into the body:
-    u_x = −p1/(E'k) sin kx [(1−kη) − ν'(1+kη)] e^{−kη} and
-    u_η = p1/(E'k) cos kx [2 + (1+ν')kη] e^{−kη} + p̄(H−η)/M.
-    The upper body moves down by the approach Δ too.
+    def displacements(self, body: int, places: FloatArray) -> FloatArray:
+        """Return the displacements (..., 2) of a body at reference places (..., 2), those of the interface included.
 
-    Parameters
-    ----------
-    problem : WavyProblem
-        Materials and pressure.
-    body : int
-        `UPPER` or `LOWER`.
-    places : FloatArray, shape (..., 2)
-        Places in the body, before they move. The waviness of the surface counts for nothing here.
+        With the depth η and u_η into the body:
+        u_x = −p1/(E'k) sin kx [(1−kη) − ν'(1+kη)] e^{−kη} and
+        u_η = p1/(E'k) cos kx [2 + (1+ν')kη] e^{−kη} + p̄(H−η)/M.
+        The upper body moves down by the approach Δ too. The waviness of the surface counts for nothing here.
+        """
+        k, modulus, ratio, into = self.wave_number, self.plane_modulus(body), self.plane_ratio(body), _into(body)
+        depth = into * places[..., 1]
+        decay = self.wave / (modulus * k) * np.exp(-k * depth)
+        along = -decay * np.sin(k * places[..., 0]) * ((1 - k * depth) - ratio * (1 + k * depth))
+        inward = decay * np.cos(k * places[..., 0]) * (2 + (1 + ratio) * k * depth)
+        inward = inward + self.mean * (self.height - depth) / self.oedometric_modulus(body)
+        descent = self.approach if body == UPPER else 0.0
+        return np.stack([along, into * inward - descent], axis=-1)
 
-    Returns
-    -------
-    FloatArray, shape (..., 2)
-        The displacements, a length each.
-    """
-    k, modulus, ratio = problem.wave_number, problem.plane_modulus(body), problem.plane_ratio(body)
-    into = _into(body)
-    depth = into * places[..., 1]
-    decay = problem.wave / (modulus * k) * np.exp(-k * depth)
-    along = -decay * np.sin(k * places[..., 0]) * ((1 - k * depth) - ratio * (1 + k * depth))
-    inward = decay * np.cos(k * places[..., 0]) * (2 + (1 + ratio) * k * depth)
-    inward = inward + problem.mean * (problem.height - depth) / problem.oedometric_modulus(body)
-    descent = problem.approach if body == UPPER else 0.0
-    return np.stack([along, into * inward - descent], axis=-1)
+    def stresses(self, body: int, places: FloatArray) -> FloatArray:
+        """Return the stresses σ_xx, σ_yy and σ_xy (..., 3) of a body at places (..., 2), positive in tension.
 
+        With the depth η: σ_yy = −p̄ − p1 (1+kη) e^{−kη} cos kx, σ_xx = −p̄ν' − p1 (1−kη) e^{−kη} cos kx, and
+        σ_xy = ± p1 kη e^{−kη} sin kx, + in the lower body.
+        """
+        k, into = self.wave_number, _into(body)
+        depth = into * places[..., 1]
+        wave = self.wave * np.exp(-k * depth)
+        cosine, sine = np.cos(k * places[..., 0]), np.sin(k * places[..., 0])
+        along = -self.mean * self.plane_ratio(body) - wave * (1 - k * depth) * cosine
+        across = -self.mean - wave * (1 + k * depth) * cosine
+        return np.stack([along, across, -into * wave * k * depth * sine], axis=-1)
 
-def wavy_stresses(problem: WavyProblem, body: int, places: FloatArray) -> FloatArray:
-    """Return the stresses of a body.
+    def profile(self, body: int) -> float:
+        """Return the amplitude a of the surface y = a cos kx of a body before contact.
 
-    With the depth η: σ_yy = −p̄ − p1 (1+kη) e^{−kη} cos kx, σ_xx = −p̄ν' − p1 (1−kη) e^{−kη} cos kx, and
-    σ_xy = ± p1 kη e^{−kη} sin kx, + in the lower body.
-
-    Parameters
-    ----------
-    problem : WavyProblem
-        Materials and pressure.
-    body : int
-        `UPPER` or `LOWER`.
-    places : FloatArray, shape (..., 2)
-        Places in the body.
-
-    Returns
-    -------
-    FloatArray, shape (..., 3)
-        The stresses σ_xx, σ_yy and σ_xy, force per length squared, positive in tension.
-    """
-    k, into = problem.wave_number, _into(body)
-    depth = into * places[..., 1]
-    wave = problem.wave * np.exp(-k * depth)
-    cosine, sine = np.cos(k * places[..., 0]), np.sin(k * places[..., 0])
-    along = -problem.mean * problem.plane_ratio(body) - wave * (1 - k * depth) * cosine
-    across = -problem.mean - wave * (1 + k * depth) * cosine
-    return np.stack([along, across, -into * wave * k * depth * sine], axis=-1)
-
-
-def wavy_profile(problem: WavyProblem, body: int) -> float:
-    """Return the amplitude a of the surface y = a cos kx of a body before contact.
-
-    The bodies share the layer's part: a = A ± (2p1/(kE') + p1/2ε̂), + for the lower body.
-    """
-    indentation = 2 * problem.wave / (problem.wave_number * problem.plane_modulus(body))
-    return problem.amplitude - _into(body) * (indentation + problem.wave / (2 * problem.penalty))
+        The bodies share the layer's part: a = A ± (2p1/(kE') + p1/2ε̂), + for the lower body.
+        """
+        indentation = 2 * self.wave / (self.wave_number * self.plane_modulus(body))
+        return self.amplitude - _into(body) * (indentation + self.wave / (2 * self.penalty))
 
 
 def _into(body: int) -> float:
@@ -174,33 +143,12 @@ def _into(body: int) -> float:
     return 1.0 if body == UPPER else -1.0
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=128)  # The bodies of a scene are condensed once.
 def wavy_scene(problem: WavyProblem, refine: int = 1, slave: int = UPPER, columns: tuple[int, int] = COLUMNS) -> Scene:
-    """Return two wavy bodies of quadrilaterals whose meshes do not match.
+    """Return two wavy bodies of quadrilaterals whose meshes do not match, the upper body first.
 
-    The scene is remembered, so that its bodies are condensed once.
-
-    Parameters
-    ----------
-    problem : WavyProblem
-        Materials, pressure and penalty. The scene has the penalty 1 if that of the problem is infinite.
-    refine : int
-        The number r of parts that each of the columns is divided into.
-    slave : int
-        The body that is the slave, `UPPER` or `LOWER`.
-    columns : tuple[int, int]
-        The numbers of cells along the upper and the lower surface at r = 1. Those of the upper body have equal widths,
-        those of the lower one become narrower. Cells are about square.
-
-    Returns
-    -------
-    Scene
-        The upper body first.
-
-    Raises
-    ------
-    MisuseError
-        As `Body` and `Scene` do.
+    `columns` are the numbers of cells along the upper and the lower surface at refine = 1. Those of the upper body have
+    equal widths, those of the lower one become narrower. The penalty is 1 if that of the problem is infinite.
     """
     bodies = tuple(_wavy_body(problem, body, columns[body] * refine) for body in (UPPER, LOWER))
     penalty = problem.penalty if np.isfinite(problem.penalty) else 1.0
@@ -218,12 +166,12 @@ def _wavy_body(problem: WavyProblem, body: int, n_columns: int) -> Body:
     flat = np.stack(np.meshgrid(x, levels), axis=-1)  # (n_rows, n_columns, 2)
     fade = 1 - np.abs(flat[..., 1]) / problem.height
     nodes = flat.copy()
-    nodes[..., 1] += wavy_profile(problem, body) * np.cos(problem.wave_number * flat[..., 0]) * fade
+    nodes[..., 1] += problem.profile(body) * np.cos(problem.wave_number * flat[..., 0]) * fade
     number = np.arange(len(x) * len(levels)).reshape(len(levels), len(x))
     near, far = (number[0], number[-1]) if body == UPPER else (number[-1][::-1], number[0])
     fixed, imposed = np.zeros((number.size, 2), bool), np.zeros((number.size, 2))
     fixed[number[:, [0, -1]], 0] = fixed[far] = True
-    imposed[far] = wavy_displacements(problem, body, flat.reshape(-1, 2)[far])
+    imposed[far] = problem.displacements(body, flat.reshape(-1, 2)[far])
     imposed[number[:, [0, -1]], 0] = 0.0  # sin kx is rounded there.
     # The first guess penetrates everywhere: Newton's method begins with all in contact.
     down = problem.approach + 2 * problem.wave_approach if body == UPPER else 0.0
@@ -238,3 +186,187 @@ def _wavy_body(problem: WavyProblem, body: int, n_columns: int) -> Body:
         start=np.array([0.0, -down]),
         name="upper body" if body == UPPER else "lower body",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class WavyStudy:
+    """Wavy half-planes on several meshes, with a penalty that grows as E/h; each has the exact field of its penalty."""
+
+    slave: int  # UPPER or LOWER
+    stiffness: float  # The penalty ε̂h/E, with E of the upper body and the mean cell h of the coarser mesh
+    amplitude: float = 0.0  # That of the interface where the bodies meet, a length
+    contrast: bool = False  # The mesh of the upper body is four times finer than that of the lower one.
+
+    @property
+    def columns(self) -> tuple[int, int]:
+        """The numbers of cells along both surfaces at r = 1."""
+        return CONTRAST_COLUMNS if self.contrast else COLUMNS
+
+    @property
+    def meshes(self) -> tuple[int, ...]:
+        """The refinements r."""
+        return CONTRAST_MESHES if self.contrast else MESHES
+
+    def size(self, refine: int) -> float:
+        """Return 1/r."""
+        return 1 / refine
+
+    def penalty(self, refine: int) -> float:
+        """Return the penalty ε̂ on a mesh."""
+        problem = WavyProblem()
+        return self.stiffness * problem.young[UPPER] * min(self.columns) * refine / problem.wavelength
+
+    def pose(self, refine: int, traits: Traits) -> PosedProblem:
+        """Return the problem on a mesh."""
+        penalty = self.penalty(refine)
+        multipliers = traits.enforcement == "multiplier"
+        problem = WavyProblem(penalty=inf if multipliers else penalty, amplitude=self.amplitude)
+        scene = wavy_scene(problem, refine, self.slave, self.columns)
+        if multipliers:
+            scene = replace(scene, penalty=penalty)
+
+        def motion(body: int, places: FloatArray) -> FloatArray:
+            return problem.displacements(body, np.column_stack([places[:, 0], 0 * places[:, 0]]))
+
+        # A pressure that is constant on each slave segment leaves h/√12 of a slope p1 k sin kx, and sin² has the
+        # mean 1/2.
+        segment = problem.wavelength / (self.columns[self.slave] * refine)
+        return PosedProblem(
+            scene=scene,
+            forces=partial(problem.forces, scene.interface, self.slave),
+            motions=(partial(motion, self.slave), partial(motion, 1 - self.slave)),
+            pressure=lambda places: problem.pressure(places[:, 0]),
+            pressure_scale=problem.wave,
+            step=(problem.mean - problem.wave) / penalty / 16,
+            best={PRESSURE: problem.wave_number * segment / sqrt(24)},
+        )
+
+    def group(self, traits: Traits) -> str:
+        """Return which slave is finer or coarser, if the meshes differ by a factor of four."""
+        return f"{self._words[self.slave]} slave" if self.contrast else ""
+
+    @property
+    def _words(self) -> tuple[str, str]:
+        return ("finer", "coarser") if self.contrast else ("upper", "lower")
+
+    @property
+    def case(self) -> Case:
+        """The coarsest scene, with the attributes as parameters."""
+        facts = {name: np.array(float(getattr(self, name))) for name in ("slave", "stiffness", "amplitude", "contrast")}
+        scene = self.pose(self.meshes[0], Traits()).scene
+        name = f"{self._words[self.slave]} slave, {self.stiffness:g} E/h"
+        return replace(replace(scene, facts=facts).case(), name=name)
+
+    @classmethod
+    def from_case(cls, case: Case) -> WavyStudy:
+        """Return the study that a case stands for."""
+        slave, stiffness, amplitude, contrast = map(case.parameter, ("slave", "stiffness", "amplitude", "contrast"))
+        return cls(int(slave), stiffness, amplitude, bool(contrast))
+
+
+@cache
+def flat_cases() -> tuple[Case, ...]:
+    """Return both choices of the slave at two penalties, then a slave four times finer, and one four times coarser."""
+    alike = [WavyStudy(slave, stiffness) for slave, stiffness in product((UPPER, LOWER), (10.0, 1e3))]
+    contrast = [WavyStudy(slave, 10.0, contrast=True) for slave in (UPPER, LOWER)]
+    return tuple(study.case for study in (*alike, *contrast))
+
+
+# Facets of the two meshes are up to this amplitude, a length, × k²h²/8 apart: 1 to 10 times p/ε̂ at 100 E/h.
+CURVED_AMPLITUDE = 1e-6
+
+
+@cache
+def curved_cases() -> tuple[Case, ...]:
+    """Return both choices of the slave at two penalties, on a curved interface."""
+    choices = product((UPPER, LOWER), (10.0, 100.0))
+    return tuple(WavyStudy(slave, stiffness, CURVED_AMPLITUDE).case for slave, stiffness in choices)
+
+
+_SERIES = {
+    "slave force error": FORCES[0],
+    "master force error": FORCES[1],
+    "slave displacement error": MOTIONS[0],
+    "master displacement error": MOTIONS[1],
+    "pressure error": PRESSURE,
+}
+_PRESSURE_RATE = Bound(
+    name="rate of pressures",
+    kinds=(PRESSURE,),
+    rate=True,
+    limits={"": 0.9},
+    reason="Constant pressures on segments have the rate 1.",
+)
+WAVY_STUDIES = Studies(
+    cases=flat_cases,
+    read=WavyStudy.from_case,
+    series=_SERIES,
+    bounds=(
+        Bound(
+            name="rate of forces",
+            kinds=FORCES,
+            rate=True,
+            limits={"": 1.1, "coarser slave": 0.8},
+            reason="Right ones: at least 1.22, as a coarser slave 0.95; wrong ones: at most 0.42 and 0.58.",
+        ),
+        Bound(
+            name="rate of displacements",
+            kinds=MOTIONS,
+            rate=True,
+            limits={"": 1.8, "finer slave": 1.6, "coarser slave": 1.6},
+            reason="The rate of linear elements is 2; right ones: at least 1.89 and 1.72.",
+        ),
+        _PRESSURE_RATE,
+        Bound(
+            name="pressure error on the finest mesh",
+            kinds=(PRESSURE,),
+            limits={"": 2.0},
+            of_best="kh/√24",
+            reason="The best pressure that is constant on each segment h is off by kh/√24 of the wave; twice that is "
+            "allowed.",
+        ),
+    ),
+)
+CURVED_STUDIES = Studies(
+    cases=curved_cases,
+    read=WavyStudy.from_case,
+    series=_SERIES,
+    bounds=(
+        Bound(
+            name="rate of forces",
+            kinds=FORCES,
+            rate=True,
+            limits={"": 1.0},
+            reason="Right ones: at least 1.13.",
+        ),
+        Bound(
+            name="rate of displacements",
+            kinds=MOTIONS,
+            rate=True,
+            limits={"": 1.8},
+            reason="The rate of linear elements is 2; right ones: at least 1.89.",
+        ),
+        _PRESSURE_RATE,
+        Bound(
+            name="pressure error on the finest mesh",
+            kinds=(PRESSURE,),
+            limits={"": 4.0},
+            of_best="kh/√24",
+            reason="Twice that of `accuracy.wavy`: facets that cross add as much as constant pressures do.",
+        ),
+    ),
+)
+
+
+def _pose(refine: int, stiffness: float, traits: Traits) -> PosedProblem:
+    return WavyStudy(UPPER, stiffness).pose(refine, traits)
+
+
+WAVY = Problem(
+    label="two wavy half-planes in full contact",
+    unit="E/h",
+    meshes=(1, 2, 3, 4, 6),
+    penalties=(1.0, 30.0, 1e3),
+    pose=_pose,
+    rank=1,
+)

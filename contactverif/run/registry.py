@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
+from math import inf
 from typing import Any, Literal
 
 from contactverif.contract.errors import ContractError, MisuseError
@@ -26,9 +27,11 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import Wrapper, load_remote, survey
+from contactverif.problems.problem import Problem
 
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
+PROBLEMS = "contactverif.problems"
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
@@ -240,6 +243,20 @@ def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> P
     description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
     needed = f"a contactverif.contract.property.Property with the id {name}"
     return NotLoaded(name, f"the entry point gives {description}; needed {needed}")
+
+
+def load_problems() -> dict[str, Problem | NotLoaded]:
+    """Load the installed problems with an exact answer by name, those of lower rank first."""
+    loaded = {name: _load_problem(name, entries) for name, entries in _entries_by_name(PROBLEMS).items()}
+    return dict(sorted(loaded.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
+
+
+def _load_problem(name: str, entries: Sequence[EntryPoint]) -> Problem | NotLoaded:
+    loaded = _load_entry(name, entries)
+    if isinstance(loaded, NotLoaded | Problem):
+        return loaded
+    needed = "a contactverif.problems.problem.Problem"
+    return NotLoaded(name, f"the entry point gives a {type(loaded).__name__}; needed {needed}")
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:

@@ -33,15 +33,6 @@ def measure_costs(
 ) -> tuple[Cost, ...]:
     """Time each formulation on each state, in turns.
 
-    Parameters
-    ----------
-    subjects : Sequence[Subject]
-        The formulations.
-    cases : Sequence[Case] | None
-        The states; by default flat interfaces of `SEGMENTS` slave segments on three quarters as many.
-    turns : int
-        The least number of turns that are timed. Who begins changes from turn to turn.
-
     Returns
     -------
     tuple[Cost, ...]

@@ -27,25 +27,7 @@ _FAR = 1e3  # An iterate is not drawn if a displacement exceeds this multiple of
 
 
 def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedScene:
-    """Solve the scene of a case with each formulation.
-
-    Parameters
-    ----------
-    case : Case
-        A case that holds a scene.
-    subjects : Sequence[Subject | NotLoaded]
-        The formulations. One that does not load or breaks its contract goes to `failures`.
-
-    Returns
-    -------
-    SolvedScene
-        The scene with its solutions and failures.
-
-    Raises
-    ------
-    MisuseError
-        If the case holds no scene.
-    """
+    """Solve the scene of a case with each formulation."""
     scene = scene_of(case)
     solutions, failures = [], {}
     for subject in subjects:

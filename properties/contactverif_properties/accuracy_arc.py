@@ -59,13 +59,6 @@ PRESSURE = Quantity("error of the reported pressures", "1", f"{TOTAL:g}", _REASO
 def measure_arcs(case: Case, subject: Subject) -> Measurement:
     """Compare forces and reported pressures with those of a uniform pressure on the slave's arc.
 
-    Parameters
-    ----------
-    case : Case
-        Two arcs from `arc_cases`.
-    subject : Subject
-        The formulation.
-
     Returns
     -------
     Measurement

@@ -31,151 +31,14 @@ It starts at the exact displacements, where nothing but the formulation's own ki
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cache
+from functools import partial
 
-import numpy as np
-
-from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Quantity
-from contactverif.contract.subject import Subject
+from contactverif.contract.property import Property
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import fit_rate
-from contactverif.mechanics.scene import scene_of
-from contactverif.problems.hertz_box import COARSEST, exact_forces, hertz_box
-from contactverif.problems.hertz_errors import BOX, HertzErrors, HertzStudy, hertz_errors
+from contactverif.problems.hertz_box import HERTZ_STUDIES
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
-from contactverif_properties.shared.finite_lists import Cases, unless_given
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """The least rates, and the largest errors on the finest mesh, all dimensionless."""
-
-    rate: float
-    pressure_rate: float
-    force: float
-    pressure: float
-    peak: float
-    width: float
-    trace: float
-
-
-MESHES = (COARSEST, 20, 26, 33)  # Numbers of the parabola's segments across the contact.
-# The penalties: their stiffness, and whether that is ε̂ over E/a, the same on all meshes, or ε̂ over E/h.
-PENALTIES = {"layer": (1.0, True), "soft": (1.0, False), "stiff": (100.0, False)}
-# Least rates and largest errors on the finest mesh. Measured on formulations that pass the patch test: rates of forces
-# at least 1.28, 0.97, 0.86; of pressures 1.14, 0.78, 0.81; errors at most half of these.
-LIMITS = {
-    "layer": Limits(rate=1.1, pressure_rate=0.9, force=9e-3, pressure=8e-3, peak=2.5e-3, width=3.5e-3, trace=4e-3),
-    "soft": Limits(rate=0.85, pressure_rate=0.65, force=1.6e-2, pressure=2.5e-2, peak=4e-3, width=5.5e-3, trace=6e-3),
-    "stiff": Limits(rate=0.75, pressure_rate=0.65, force=6e-2, pressure=3e-1, peak=8e-3, width=7e-3, trace=6e-3),
-}
-
-_ROOT = "The pressure's edge allows 1, and 1.5 on a layer of fixed stiffness; measured 0.97 and 1.28, at 100 E/h 0.86."
-_MEASURED = "Twice what formulations that pass the patch test have on the finest mesh."
-_RATES = "layer 1.1, soft 0.85, stiff 0.75"
-SLAVE = Quantity("rate of slave forces", "1", _RATES, _ROOT, "at least")
-MASTER = Quantity("rate of master forces", "1", _RATES, _ROOT, "at least")
-_PRESSURES = "As for forces; measured 0.78, on a layer 1.14."
-PRESSURE_RATE = Quantity("rate of reported pressures", "1", "layer 0.9, else 0.65", _PRESSURES, "at least")
-FORCE = Quantity("error of nodal forces", "1", "layer 0.009, soft 0.016, stiff 0.06", _MEASURED)
-PRESSURE = Quantity("error of reported pressures", "1", "layer 0.008, soft 0.025, stiff 0.3", _MEASURED)
-PEAK = Quantity("error of the peak", "1", "layer 0.0025, soft 0.004, stiff 0.008", _MEASURED)
-WIDTH = Quantity("error of the half-width", "1", "layer 0.0035, soft 0.0055, stiff 0.007", _MEASURED)
-DISPLACEMENT = Quantity("error of displacements", "1", "layer 0.004, else 0.006", _MEASURED)
-_SERIES = {
-    "E_F of the slave": "slave",
-    "E_F of the master": "master",
-    "reported pressures": "pressure",
-    "peak": "peak",
-    "half-width": "half_width",
-    "displacements": "displacement",
-    "iterations": "iterations",
-}
-
-
-def measure_convergence(case: Case, subject: Subject) -> Measurement:
-    """Solve a study on four meshes, and return rates, errors on the finest mesh, and all errors as series.
-
-    Parameters
-    ----------
-    case : Case
-        The scene of the coarsest mesh, with the attributes of a `HertzStudy` as parameters.
-    subject : Subject
-        The formulation.
-    """
-    study = _study(case)
-    errors = [hertz_errors(study, across, subject) for across in MESHES]
-    limits, finest = LIMITS["stiff" if subject.traits.enforcement == "multiplier" else _word(case)], errors[-1]
-    judged = [
-        (SLAVE, _rate([mesh.slave for mesh in errors]), limits.rate),
-        (MASTER, _rate([mesh.master for mesh in errors]), limits.rate),
-        (FORCE, max(finest.slave, finest.master), limits.force),
-        (PEAK, finest.peak, limits.peak),
-        (WIDTH, finest.half_width, limits.width),
-        (DISPLACEMENT, finest.displacement, limits.trace),
-    ]
-    pressures = [mesh.pressure for mesh in errors if mesh.pressure is not None]
-    if len(pressures) == len(errors):
-        judged.append((PRESSURE_RATE, _rate(pressures), limits.pressure_rate))
-        judged.append((PRESSURE, pressures[-1], limits.pressure))
-    numbers = [quantity.check(value, tolerance) for quantity, value, tolerance in judged]
-    return Measurement(numbers, undecided=_reason(errors), series=_as_series(errors))
-
-
-def hertz_cases() -> Cases:
-    """Return the six studies, each as the scene of its coarsest mesh."""
-    return tuple(_case(slave, word) for slave in ("parabola", "flat") for word in PENALTIES)
-
-
-def forces_to_draw(case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2) on the coarsest mesh at the penalty of the case, for pictures."""
-    return exact_forces(BOX, case.penalty, scene_of(case), _study(case).parabola_is_slave)
-
-
-@cache
-def _case(slave: str, word: str) -> Case:
-    """Return the case `slave-word`: the body that is the slave, and the word of the penalty."""
-    stiffness, fixed = PENALTIES[word]
-    study = HertzStudy(slave == "parabola", stiffness, fixed)
-    role = study.parabola_is_slave
-    scene = hertz_box(BOX, penalty=study.penalty(COARSEST), parabola_is_slave=role, name=f"{slave}-{word}")
-    facts = {name: np.array(float(getattr(study, name))) for name in ("parabola_is_slave", "stiffness", "fixed")}
-    return replace(scene, facts=facts).case()
-
-
-def _study(case: Case) -> HertzStudy:
-    return HertzStudy(
-        bool(case.parameter("parabola_is_slave")), case.parameter("stiffness"), bool(case.parameter("fixed"))
-    )
-
-
-def _word(case: Case) -> str:
-    """Return the word of the penalty of a case."""
-    pair = case.parameter("stiffness"), bool(case.parameter("fixed"))
-    return next(word for word, penalty in PENALTIES.items() if penalty == pair)
-
-
-def _rate(errors: list[float]) -> float:
-    return fit_rate([1 / (across + 1 / 3) for across in MESHES], errors)
-
-
-def _reason(errors: list[HertzErrors]) -> str:
-    """Return which meshes Newton's method left out of balance; empty if there are none."""
-    meshes = [str(across) for across, mesh in zip(MESHES, errors, strict=True) if not mesh.balanced]
-    return f"Newton's method found no balance with {', '.join(meshes)} segments across the contact" if meshes else ""
-
-
-def _as_series(errors: list[HertzErrors]) -> dict[str, FloatArray]:
-    """Return the errors by mesh, {name: (n_meshes,)}; those that are not reported are left out."""
-    columns = {name: [getattr(mesh, entry) for mesh in errors] for name, entry in _SERIES.items()}
-    return {
-        name: np.array(column, dtype=np.float64)
-        for name, column in columns.items()
-        if all(value is not None for value in column)
-    }
+from contactverif_properties.shared.convergence import exact_forces, measure_convergence
+from contactverif_properties.shared.finite_lists import unless_given
 
 
 def _refuse(traits: Traits) -> str:
@@ -186,12 +49,12 @@ ACCURACY_HERTZ = Property(
     id="accuracy.hertz",
     family="accuracy",
     summary="Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.",
-    quantities=(SLAVE, MASTER, PRESSURE_RATE, FORCE, PRESSURE, PEAK, WIDTH, DISPLACEMENT),
-    series=dict.fromkeys(_SERIES, "1"),
-    cases=unless_given(hertz_cases),
-    measure=measure_convergence,
+    quantities=HERTZ_STUDIES.quantities,
+    cases=unless_given(HERTZ_STUDIES.cases),
+    measure=partial(measure_convergence, HERTZ_STUDIES),
     promise=lambda traits: traits.converges,
     applicable=_refuse,
+    series=dict.fromkeys(HERTZ_STUDIES.series, "1"),
     bodies=True,
-    exact=forces_to_draw,
+    exact=partial(exact_forces, HERTZ_STUDIES),
 )

@@ -43,14 +43,13 @@ from contactverif.contract.property import Measurement, Property, Quantity, chec
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
-from contactverif.problems.ring_errors import ring_force_error
-from contactverif.problems.shrink_fit import FiniteFit, Role, ShrinkFit, rings_of, shrink_fit
+from contactverif.problems.problem import FORCES
+from contactverif.problems.shrink_fit import FIT, FiniteFit, RingStudy, Role, shrink_fit
 from contactverif_properties.flat_resultant import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.passes import nearest_sum
 
-PROBLEM = ShrinkFit(interference=1e-2)
 REFINEMENTS = (2, 4)  # Two meshes, one twice as fine, so that an error of second order can be taken away.
 PENALTIES = (1e2, 1e3)
 ROLES: tuple[Role, Role] = ("inner", "outer")
@@ -80,13 +79,6 @@ class Means:
 def measure_rings(case: Case, subject: Subject) -> Measurement:
     """Solve the rings on two meshes and compare the mean pressure with Lamé's.
 
-    Parameters
-    ----------
-    case : Case
-        A quarter of two rings from `rings`.
-    subject : Subject
-        The formulation.
-
     Returns
     -------
     Measurement
@@ -94,20 +86,20 @@ def measure_rings(case: Case, subject: Subject) -> Measurement:
         differ from the forces on the finer mesh; all relative, so dimensionless. Details: e_2 and e_4 of the slave's
         forces, their rate, and the error E_F of the slave's nodal forces.
     """
-    problem, slave = rings_of(case)
-    penalty = inf if subject.traits.enforcement == "multiplier" else case.penalty
-    fit = problem.finite(slave, penalty, "reference" if subject.traits.area == "reference" else "current")
+    study = RingStudy.from_case(case)
+    fit = study.fit(subject.traits)
     means: list[Means] = []
     details: dict[str, float] = {}
     undecided = ""
     for refine in REFINEMENTS:
-        scene = replace(shrink_fit(problem, slave=slave, refine=refine), penalty=case.penalty)
-        solution = solve_for_accuracy(scene, subject)
+        posed = study.pose(refine, subject.traits)
+        solution = solve_for_accuracy(posed.scene, subject)
         if not solution.balanced:
-            return Measurement(undecided=f"Newton's method: {solution.trace.end.label} at refine = {refine}")
+            return Measurement(undecided=f"Newton's method: {solution.end} at refine = {refine}")
         undecided = undecided or _lost_end(solution)
-        means.append(_mean_errors(solution, fit, slave))
-        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": ring_force_error(solution, fit, slave)}
+        means.append(_mean_errors(solution, fit, study.slave))
+        forces = posed.errors(solution)[FORCES[0]]
+        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": forces}
     coarse, fine = means
     details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf
     values = {SLAVE: _extrapolate(coarse.slave, fine.slave), MASTER: _extrapolate(coarse.master, fine.master)}
@@ -148,7 +140,7 @@ def rings() -> tuple[Case, ...]:
     """Return the coarser of both meshes, with either ring as the slave and at two penalties."""
     return tuple(
         replace(
-            shrink_fit(PROBLEM, slave=slave, refine=REFINEMENTS[0]),
+            shrink_fit(FIT, slave=slave, refine=REFINEMENTS[0]),
             penalty=penalty,
             name=f"{slave} slave, ε̂ = {penalty:g}",
         ).case()

@@ -43,6 +43,7 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import Trace
 from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
+from contactverif.problems.uniform_stress import uniform_forces
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.newton_solution import end_details
@@ -91,13 +92,6 @@ FALL = Quantity(
 def measure_kink(case: Case, subject: Subject) -> Measurement:
     """Solve a kink with two normals, and with its ridge cut off.
 
-    Parameters
-    ----------
-    case : Case
-        A case from `kinked_cases`.
-    subject : Subject
-        The formulation.
-
     Returns
     -------
     Measurement
@@ -121,7 +115,7 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     z = np.concatenate([scene.positions(q), multipliers])
     pairing = formulation.pair(scene.interface, z)
     by_contact = -formulation.residual(scene.interface, pairing, z)[: scene.interface.n_unknowns].reshape(-1, 2)
-    exact, n_slave = problem.forces(scene.interface), scene.interface.n_slave_nodes
+    exact, n_slave = uniform_forces(scene.interface, pressure), scene.interface.n_slave_nodes
     by_bodies = scene.nodal_forces(q)
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
     errors /= np.linalg.norm(exact, axis=1).max()
@@ -185,12 +179,12 @@ def _add_three_normals(
         penalty = stiffness * problem.young
         scene = kinked_patch(stiff, upper_slave=upper_slave, penalty=penalty)
         solution = solve_for_accuracy(scene, subject)
-        if not solution.balanced:
+        if not solution.balanced or solution.trace is None:
             break
         errors.append(_stress_error(stiff, scene, solution.trace.solution))
         floors.append(_floor(stiff, solution.state, stiff.pressure / penalty))
     if len(errors) < 2:
-        reason = f"Newton's method with three normals: {solution.trace.end.label}"
+        reason = f"Newton's method with three normals: {solution.end}"
         return measurement if fails else Measurement(undecided=reason, details=measurement.details)
     numbers = [*measurement.numbers, CUT.check(errors[1], max(SHARE / STIFF[1], floors[1]))]
     if errors[1] > floors[1]:
@@ -236,7 +230,7 @@ def kinked_cases() -> tuple[Case, ...]:
 def forces_to_draw(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2), for pictures."""
     problem, _ = patch_of(case)
-    return problem.forces(case.interface)
+    return uniform_forces(case.interface, problem.pressure)
 
 
 PATCH_KINKED = Property(

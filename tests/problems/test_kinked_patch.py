@@ -9,6 +9,7 @@ import pytest
 
 from contactverif.contract.errors import MisuseError
 from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
+from contactverif.problems.uniform_stress import uniform_forces
 
 ROOF = KinkedPatch(line=((0.0, 0.0), (4.0, 3.0), (8.0, 0.0)), pressure=1e-3)
 
@@ -19,7 +20,7 @@ def test_the_uniform_state_has_the_exact_stress_and_needs_the_exact_forces(upper
     q = exact_unknowns(ROOF, scene, 0.01)
     for stresses in scene.stresses(q):
         np.testing.assert_allclose(stresses / ROOF.pressure, np.broadcast_to([-1, -1, 0], stresses.shape), atol=1e-10)
-    np.testing.assert_allclose(scene.nodal_forces(q), ROOF.forces(scene.interface), atol=1e-12)
+    np.testing.assert_allclose(scene.nodal_forces(q), uniform_forces(scene.interface, ROOF.pressure), atol=1e-12)
 
 
 @pytest.mark.parametrize("upper_slave", [True, False])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.problems.shrink_fit import Role, ShrinkFit, rings_of, shrink_fit
+from contactverif.problems.shrink_fit import RingStudy, Role, ShrinkFit, shrink_fit
 
 RINGS: tuple[Role, Role] = ("inner", "outer")
 
@@ -93,7 +93,7 @@ def test_the_finite_fit_balances_the_rings_of_the_scene(slave: Role) -> None:
 def test_the_scene_is_a_quarter_whose_case_tells_its_problem(slave: Role) -> None:
     problem = ShrinkFit(interference=5e-3, young=(10.0, 20.0))
     scene = shrink_fit(problem, slave=slave, refine=2)
-    assert rings_of(scene.case()) == (problem, slave)
+    assert RingStudy.from_case(scene.case()) == RingStudy(problem, slave, 1.0)
     assert (len(scene.interface.slave), len(scene.interface.master)) == ((24, 32) if slave == "inner" else (32, 24))
     radii = np.linalg.norm(scene.interface.nodes, axis=1)
     inner, outer = (radii[:25], radii[25:]) if slave == "inner" else (radii[33:], radii[:33])

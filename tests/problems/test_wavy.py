@@ -7,19 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.mechanics.bulk import elasticity
-from contactverif.problems.wavy import (
-    LOWER,
-    UPPER,
-    WavyProblem,
-    wavy_displacements,
-    wavy_pressure,
-    wavy_profile,
-    wavy_scene,
-    wavy_stresses,
-)
+from contactverif.problems.wavy import LOWER, UPPER, WAVY, WavyProblem, wavy_scene
 
 STEP = 1e-30
 BODIES = pytest.mark.parametrize("body", [UPPER, LOWER])
@@ -40,7 +33,7 @@ def _gradient(field: Callable[[FloatArray], FloatArray], places: FloatArray) -> 
 
 @BODIES
 def test_stresses_are_in_equilibrium(body: int) -> None:
-    gradient = _gradient(lambda x: wavy_stresses(PROBLEM, body, x), _places(body))
+    gradient = _gradient(lambda x: PROBLEM.stresses(body, x), _places(body))
     size = PROBLEM.wave * PROBLEM.wave_number
     np.testing.assert_allclose((gradient[:, 0, 0] + gradient[:, 2, 1]) / size, 0, atol=1e-14)
     np.testing.assert_allclose((gradient[:, 2, 0] + gradient[:, 1, 1]) / size, 0, atol=1e-14)
@@ -49,19 +42,19 @@ def test_stresses_are_in_equilibrium(body: int) -> None:
 @BODIES
 def test_stresses_follow_from_displacements_by_hookes_law(body: int) -> None:
     places = _places(body)
-    gradient = _gradient(lambda x: wavy_displacements(PROBLEM, body, x), places)
+    gradient = _gradient(lambda x: PROBLEM.displacements(body, x), places)
     strain = np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1)
     material = elasticity(wavy_scene(PROBLEM).bodies[body])
     np.testing.assert_allclose(
-        strain @ material / PROBLEM.wave, wavy_stresses(PROBLEM, body, places) / PROBLEM.wave, atol=1e-13
+        strain @ material / PROBLEM.wave, PROBLEM.stresses(body, places) / PROBLEM.wave, atol=1e-13
     )
 
 
 def test_both_bodies_press_on_one_another_with_the_pressure_and_without_friction() -> None:
     x = np.linspace(0, 4, 41)
     for body in (UPPER, LOWER):
-        stresses = wavy_stresses(PROBLEM, body, np.column_stack([x, 0 * x]))
-        np.testing.assert_allclose(-stresses[:, 1], wavy_pressure(PROBLEM, x), rtol=1e-14)
+        stresses = PROBLEM.stresses(body, np.column_stack([x, 0 * x]))
+        np.testing.assert_allclose(-stresses[:, 1], PROBLEM.pressure(x), rtol=1e-14)
         assert not stresses[:, 2].any()
 
 
@@ -72,11 +65,11 @@ def test_the_gap_that_is_left_is_the_pressure_over_the_penalty(penalty: float, a
     x = np.linspace(0, 4, 41)
     flat = np.column_stack([x, 0 * x])
     heights = [
-        wavy_profile(problem, body) * np.cos(problem.wave_number * x) + wavy_displacements(problem, body, flat)[:, 1]
+        problem.profile(body) * np.cos(problem.wave_number * x) + problem.displacements(body, flat)[:, 1]
         for body in (UPPER, LOWER)
     ]
     gap = heights[UPPER] - heights[LOWER]
-    np.testing.assert_allclose(gap, -wavy_pressure(problem, x) / penalty, rtol=1e-9, atol=1e-15 * (amplitude + 1e-5))
+    np.testing.assert_allclose(gap, -problem.pressure(x) / penalty, rtol=1e-9, atol=1e-15 * (amplitude + 1e-5))
     wave = (heights[UPPER] + heights[LOWER]) / 2
     np.testing.assert_allclose(
         wave - wave.mean(), amplitude * (np.cos(problem.wave_number * x) - 1 / 41), atol=1e-14 * (amplitude + 1e-5)
@@ -88,8 +81,8 @@ def test_sides_are_planes_of_symmetry(body: int) -> None:
     y = (1 if body == UPPER else -1) * np.linspace(0, 1.5, 7)
     for x in (0.0, 4.0):
         places = np.column_stack([np.full(7, x), y])
-        assert np.abs(wavy_displacements(PROBLEM, body, places)[:, 0]).max() < 1e-15 * PROBLEM.wave
-        assert np.abs(wavy_stresses(PROBLEM, body, places)[:, 2]).max() < 1e-14 * PROBLEM.wave
+        assert np.abs(PROBLEM.displacements(body, places)[:, 0]).max() < 1e-15 * PROBLEM.wave
+        assert np.abs(PROBLEM.stresses(body, places)[:, 2]).max() < 1e-14 * PROBLEM.wave
 
 
 @BODIES
@@ -99,7 +92,7 @@ def test_the_far_edge_moves_with_the_exact_field(body: int) -> None:
     far = np.flatnonzero(np.abs(np.abs(nodes[:, 1]) - PROBLEM.height) < 1e-12)
     assert len(far) in (13, 17)
     assert scene.bodies[body].fixed[far].all()
-    exact = wavy_displacements(PROBLEM, body, nodes[far])
+    exact = PROBLEM.displacements(body, nodes[far])
     np.testing.assert_allclose(scene.bodies[body].imposed[far], exact, atol=1e-14 * PROBLEM.approach)
 
 
@@ -116,3 +109,14 @@ def test_either_body_may_be_the_slave() -> None:
     assert scene.slave == (LOWER,)
     assert len(scene.interface.slave) == 8
     assert wavy_scene(PROBLEM, 1, LOWER) is scene
+
+
+def test_displacements_of_another_code_have_the_errors_of_the_solution_that_they_are_of() -> None:
+    subject = load_subject("mortar")
+    posed = WAVY.pose(2, 30.0, subject.traits)
+    ours = solve_for_accuracy(posed.scene, subject, posed.start, posed.step)
+    theirs = Solution.from_displacements(posed.scene, ours.displacements)
+    assert theirs.balanced
+    errors = posed.errors(ours)
+    del errors["pressure"]  # Displacements say nothing of reported pressures.
+    assert posed.errors(theirs) == {kind: pytest.approx(error, rel=1e-2) for kind, error in errors.items()}

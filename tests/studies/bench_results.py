@@ -26,6 +26,8 @@ def make_results(
     return BenchResults(
         formulations=tuple(runs),
         cells=tuple(cells),
+        labels={cell.scene: f"the scene {cell.scene}" for cell in cells},
+        units={cell.scene: "E/h" for cell in cells if cell.scene != "rings"},
         segments=np.full(len(cells), 6),
         unknowns=np.full(len(cells), 28),
         outcomes=np.where(unsolved, int(Outcome.NOT_SOLVED), int(Outcome.SOLVED)),

@@ -6,10 +6,14 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from contextlib import closing
 from dataclasses import replace
+from importlib.metadata import EntryPoint
+from importlib.metadata import entry_points as find_entries
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import msgspec
@@ -23,18 +27,20 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
-from contactverif.mechanics.accuracy import solve_in_tries
-from contactverif.problems.hertz_errors import HertzStudy, hertz_errors
+from contactverif.mechanics.accuracy import solve_for_accuracy, solve_in_tries
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem
+from contactverif.run import registry
 from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
-from contactverif.run.registry import load_formulation
+from contactverif.run.registry import load_formulation, load_problems
 from contactverif.studies.bench.bench_journal import Header, Journal
-from contactverif.studies.bench.bench_plan import GRID, BenchPlan, make_plan
-from contactverif.studies.bench.bench_scenes import make_task
+from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose
 from contactverif.studies.bench.bench_study import run_bench
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
+from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 WAVY = Cell("wavy", 1, 30.0)
+PROBLEMS = {name: problem for name, problem in load_problems().items() if isinstance(problem, Problem)}
 ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "wavy", "--scene", "kinked", "--repeats", "2"]
 
 
@@ -52,11 +58,12 @@ def residual_alone(name: str) -> Subject:
     return Subject("alone", Alone)
 
 
-@pytest.mark.parametrize("scene", GRID)
+@pytest.mark.parametrize("scene", PROBLEMS)
 def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: str) -> None:
     """On the zigzag the exact solution is in the space of the meshes, so that only roundoff is left."""
-    meshes, penalties = GRID[scene]
-    records = [run_cell(Cell(scene, mesh, penalties[1]), [load_subject("vts-ppt")], 1, 0) for mesh in meshes[:3:2]]
+    problem = PROBLEMS[scene]
+    cells = [Cell(scene, mesh, problem.penalties[1]) for mesh in problem.meshes[:3:2]]
+    records = [run_cell(cell, [load_subject("vts-ppt")], 1, 0) for cell in cells]
     runs = [record.runs["vts-ppt"] for record in records]
     assert [run.outcome for run in runs] == [Outcome.SOLVED, Outcome.SOLVED]
     for kind in ("forces", "displacement", "pressure"):
@@ -69,18 +76,19 @@ def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: s
 
 def test_errors_are_those_of_the_properties() -> None:
     """Properties keep the matrix of Newton's method, a bench does not: both are out of balance by 1e-9 at most."""
-    study, subject = HertzStudy(parabola_is_slave=True, stiffness=10.0), load_subject("nts-ar")
-    expected = hertz_errors(study, 16, subject)
-    run = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"]
-    assert run.errors["forces"] == pytest.approx(max(expected.slave, expected.master), rel=1e-6)
-    assert run.errors["pressure"] == pytest.approx(expected.pressure, rel=1e-6)
-    assert run.errors["displacement"] == pytest.approx(expected.displacement, rel=1e-6)
+    subject = load_subject("nts-ar")
+    posed = PROBLEMS["hertz"].pose(16, 10.0, subject.traits)
+    expected = posed.errors(solve_for_accuracy(posed.scene, subject, posed.start, posed.step))
+    errors = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"].errors
+    assert errors["forces"] == pytest.approx(max(expected[kind] for kind in FORCES), rel=1e-6)
+    assert errors["pressure"] == pytest.approx(expected[PRESSURE], rel=1e-6)
+    assert errors["displacement"] == pytest.approx(expected[MOTIONS[0]], rel=1e-6)
 
 
 def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
     subject = load_subject("vts-ppt")
-    task = make_task(WAVY, subject, 0)
-    (trace,) = solve_in_tries(task.scene, subject.for_case(task.case), task.start, task.step)
+    posed = pose(WAVY, subject, 0)
+    (trace,) = solve_in_tries(posed.scene, subject.for_case(posed.first_guess), posed.start, posed.step)
     counts = run_cell(WAVY, [subject], 1, 0).runs["vts-ppt"].counts
     assert list(counts) == list(COUNTS)
     assert counts["iterations"] == trace.n_iterations
@@ -155,7 +163,7 @@ def test_times_that_cannot_be_are_a_crash(words: bytes | str, remark: str, monke
 
 def test_random_scenes_are_the_same_for_the_same_seed() -> None:
     subject, cell = load_subject("vts-ppt"), Cell("random", 1, 1.0)
-    scenes = [make_task(cell, subject, seed).scene for seed in (0, 0, 1)]
+    scenes = [pose(cell, subject, seed).scene for seed in (0, 0, 1)]
     assert scenes[0] is scenes[1]
     assert scenes[0].interface.nodes.tolist() != scenes[2].interface.nodes.tolist()
 
@@ -204,6 +212,37 @@ def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
     (tmp_path / "a.nc.journal" / "header").write_bytes(header)
     with pytest.raises(MisuseError, match=r"--out: found a.nc.journal with a damaged header; needed an undamaged"):
         Journal(tmp_path / "a.nc", HEADER)
+
+
+def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """One entry point is all that it takes; the results say in words what it is."""
+    stranger = replace(PROBLEMS["kinked"], label="a stranger's zigzag", unit="E/m", meshes=(1, 2), rank=7)
+    module = ModuleType("a_strangers_problems")
+    module.__dict__.update(ZIGZAG=stranger, NUMBER=3)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    entries = [
+        *find_entries(group=registry.PROBLEMS),
+        EntryPoint("zigzag", "a_strangers_problems:ZIGZAG", registry.PROBLEMS),
+        EntryPoint("number", "a_strangers_problems:NUMBER", registry.PROBLEMS),
+    ]
+    installed = {group: find_entries(group=group) for group in (registry.FORMULATIONS, registry.PROPERTIES)}
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: {**installed, registry.PROBLEMS: entries}[group])
+    assert list(load_problems()) == [*PROBLEMS, "zigzag", "number"]
+    plan = make_plan(["number", "zigzag"], quick=True, repeats=1)
+    results = run_bench([load_subject("vts-ppt")], plan)
+    assert results.not_loaded == {
+        "number": "the entry point gives a int; needed a contactverif.problems.problem.Problem"
+    }
+    assert [cell.scene for cell in results.cells] == ["zigzag", "zigzag"]
+    assert (results.outcomes == Outcome.SOLVED).all()
+    assert results.errors_of("vts-ppt").max() < 1e-5
+    write_bench(results, tmp_path / "a.nc")
+    again = read_bench(tmp_path / "a.nc")
+    assert again.cells == results.cells
+    assert again.label("zigzag") == "a stranger's zigzag"
+    assert again.penalty_name("zigzag", 30.0) == "ε̂ = 30 E/m"
+    with pytest.raises(MisuseError, match="--scene: found number: the entry point gives a int"):
+        make_plan(["number"])
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,7 @@ from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
 
-Progress = Callable[
-    [str, int, int], None
-]  # A function of the next cell in words, the number of finished cells, the number of all.
+Progress = Callable[[str, int, int], None]  # The next cell in words, the number of finished cells, the number of all
 
 
 def run_bench(
@@ -33,27 +31,8 @@ def run_bench(
 ) -> BenchResults:
     """Measure speed and error of formulations on all cells of a plan.
 
-    Parameters
-    ----------
-    subjects : Sequence[Subject | NotLoaded]
-        The formulations, as the registry loads them.
-    plan : BenchPlan
-        The cells and the number of repeats.
-    output : Path | None
-        The file that the results go to. A journal beside it keeps what is finished; a bench that was killed goes on
-        with the same plan. The caller that writes the file removes the journal. None keeps no journal.
-    progress : Callable[[str, int, int], None] | None
-        A function that is called before every cell and at the end.
-
-    Returns
-    -------
-    BenchResults
-        Outcomes, errors, counts and seconds.
-
-    Raises
-    ------
-    MisuseError
-        If no formulation is loaded, or the journal belongs to another plan.
+    A journal beside the file `output` keeps what is finished, so that a bench that was killed goes on with the same
+    plan. The caller writes the file and removes the journal. `progress` is called before every cell.
     """
     loaded = [subject for subject in subjects if isinstance(subject, Subject)]
     if not loaded:
@@ -65,7 +44,7 @@ def run_bench(
         header = Header.of(plan, names, provenance)
         journal = stack.enter_context(closing(Journal(output, header))) if output else None
         records = _run_cells(loaded, plan, journal, progress or _show_nothing)
-    not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)}
+    not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)} | plan.not_loaded
     return collect_results(names, plan, records, not_loaded, provenance)
 
 
@@ -97,26 +76,14 @@ def collect_results(
     not_loaded: dict[str, str],
     provenance: dict[str, str],
 ) -> BenchResults:
-    """Return the records of all cells as arrays.
-
-    Parameters
-    ----------
-    names : Sequence[str]
-        The formulations.
-    plan : BenchPlan
-        The plan.
-    records : Sequence[CellRecord]
-        The record of each cell.
-    not_loaded : dict[str, str]
-        {formulation: why it did not load}.
-    provenance : dict[str, str]
-        Versions, machine, time and command.
-    """
+    """Return the records of all cells as arrays."""
     rows = [[record.runs[name] for record in records] for name in names]
     nothing = [nan] * plan.repeats
     return BenchResults(
         formulations=tuple(names),
         cells=plan.cells,
+        labels=plan.labels,
+        units=plan.units,
         segments=np.array([record.segments for record in records], np.int64),
         unknowns=np.array([record.unknowns for record in records], np.int64),
         outcomes=_array(rows, lambda run: run.outcome, np.int64),

@@ -22,75 +22,38 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solution_of, solve_in_tries
 from contactverif.mechanics.trace import Trace
-from contactverif.studies.bench.bench_scenes import is_solved, make_task
+from contactverif.studies.bench.bench_plan import is_solved, largest_errors, pose
 from contactverif.studies.bench.timed_solution import solve_there, solve_with_clock, without_collector
 from contactverif_reports.bench.results import PARTS, Cell, Outcome
 
 
 @dataclass(slots=True)
 class RunRecord:
-    """One formulation in one cell.
+    """One formulation in one cell."""
 
-    Attributes
-    ----------
-    outcome : int
-        The outcome, see `Outcome`.
-    remark : str
-        How it ended, if it is no solution.
-    errors : dict[str, float]
-        The errors by kind; empty without a solution.
-    counts : dict[str, int]
-        The counts by name; empty after a crash.
-    seconds : dict[str, list[float]]
-        The seconds of the processor in each repeat by part; empty after a crash.
-    wall : list[float]
-        The seconds of the wall clock in each repeat.
-    """
-
-    outcome: int = int(Outcome.CRASHED)
-    remark: str = ""
-    errors: dict[str, float] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
+    outcome: int = int(Outcome.CRASHED)  # The outcome, see `Outcome`.
+    remark: str = ""  # How it ended, if it is no solution.
+    errors: dict[str, float] = field(default_factory=dict)  # The errors by kind; empty without a solution.
+    counts: dict[str, int] = field(default_factory=dict)  # The counts by name; empty after a crash.
+    # The seconds of the processor in each repeat by part; empty after a crash.
     seconds: dict[str, list[float]] = field(default_factory=dict)
-    wall: list[float] = field(default_factory=list)
+    wall: list[float] = field(default_factory=list)  # The seconds of the wall clock in each repeat.
 
 
 @dataclass(slots=True)
 class CellRecord:
-    """All formulations in one cell, as the journal keeps it.
+    """All formulations in one cell, as the journal keeps it."""
 
-    Attributes
-    ----------
-    segments, unknowns : int
-        The numbers of slave segments and of unknowns of the scene.
-    yardstick : list[float]
-        The seconds of the yardstick in each repeat.
-    runs : dict[str, RunRecord]
-        The runs by formulation.
-    """
-
-    segments: int
+    segments: int  # The numbers of slave segments and of unknowns of the scene.
     unknowns: int
-    yardstick: list[float]
-    runs: dict[str, RunRecord]
+    yardstick: list[float]  # The seconds of the yardstick in each repeat.
+    runs: dict[str, RunRecord]  # The runs by formulation.
 
 
 def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -> CellRecord:
-    """Solve a cell with all formulations, in turns.
-
-    Parameters
-    ----------
-    cell : Cell
-        The scene, the mesh and the penalty.
-    subjects : Sequence[Subject]
-        The formulations, at least one.
-    repeats : int
-        The number of timed repeats.
-    seed : int
-        The seed of the random scenes.
-    """
+    """Solve a cell with all formulations, in turns."""
     runners = [_Runner(subject, cell, seed) for subject in subjects]
-    scene = runners[0].task.scene
+    scene = runners[0].posed.scene
     for runner in runners:
         runner.warm_up()
     yardstick = []
@@ -119,20 +82,20 @@ class _Runner:
 
     def __init__(self, subject: Subject, cell: Cell, seed: int) -> None:
         self.subject, self.cell, self.seed = subject, cell, seed
-        self.task, self.record = make_task(cell, subject, seed), RunRecord()
+        self.posed, self.record = pose(cell, subject, seed), RunRecord()
 
     def warm_up(self) -> None:
         """Solve once without the clock, and record outcome, errors and counts."""
         try:
             timed = solve_there(self.subject, self.cell, self.seed)
             if timed is None:
-                timed, tries = solve_with_clock(self.subject, self.task)
+                timed, tries = solve_with_clock(self.subject, self.posed)
             else:
                 tries = self._solve_by_questions()
-            formulation = self.subject.for_case(self.task.case)
+            formulation = self.subject.for_case(self.posed.first_guess)
             solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
             solved = is_solved(solution)
-            self.record.errors = self.task.errors(solution) if solved else {}
+            self.record.errors = largest_errors(self.posed, solution) if solved else {}
         except ContractError as error:
             self.record.remark = str(error)
             return
@@ -146,7 +109,7 @@ class _Runner:
         if self.record.outcome == Outcome.CRASHED:
             return
         try:
-            timed = solve_there(self.subject, self.cell, self.seed) or solve_with_clock(self.subject, self.task)[0]
+            timed = solve_there(self.subject, self.cell, self.seed) or solve_with_clock(self.subject, self.posed)[0]
         except ContractError as error:  # A plugin with a memory may fail later.
             self.record = RunRecord(remark=str(error))
             return
@@ -158,5 +121,5 @@ class _Runner:
         """Solve here, with a formulation in another process."""
         with np.errstate(all="ignore"):
             return solve_in_tries(
-                self.task.scene, self.subject.for_case(self.task.case), self.task.start, self.task.step
+                self.posed.scene, self.subject.for_case(self.posed.first_guess), self.posed.start, self.posed.step
             )

@@ -21,7 +21,8 @@ from contactverif.contract.errors import PluginError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solve_in_tries
 from contactverif.mechanics.trace import Trace
-from contactverif.studies.bench.bench_scenes import Task, make_task
+from contactverif.problems.problem import PosedProblem
+from contactverif.studies.bench.bench_plan import pose
 from contactverif.studies.bench.meter import Meter, add_meter
 from contactverif_reports.bench.results import COUNTS, PARTS, Cell
 
@@ -33,30 +34,20 @@ _COUNTED = ("pair", "residual", "tangent", "differences")  # The states that a m
 
 @dataclass(frozen=True, slots=True)
 class TimedSolution:
-    """The time and the counts of one solution.
+    """The time and the counts of one solution."""
 
-    Attributes
-    ----------
-    seconds : dict[str, float]
-        The seconds of the processor by part.
-    wall : float
-        The seconds of the wall clock.
-    counts : dict[str, int]
-        The counts by name.
-    """
-
-    seconds: dict[str, float]
-    wall: float
-    counts: dict[str, int]
+    seconds: dict[str, float]  # The seconds of the processor by part.
+    wall: float  # The seconds of the wall clock.
+    counts: dict[str, int]  # The counts by name.
 
 
-def solve_with_clock(subject: Subject, task: Task) -> tuple[TimedSolution, tuple[Trace, ...]]:
+def solve_with_clock(subject: Subject, posed: PosedProblem) -> tuple[TimedSolution, tuple[Trace, ...]]:
     """Solve in this process; return times and counts, and the tries."""
     meter = Meter()
-    formulation = add_meter(subject, task.case, meter)
+    formulation = add_meter(subject, posed.first_guess, meter)
     wall, start = perf_counter(), process_time()
     with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
-        tries = solve_in_tries(task.scene, formulation, task.start, task.step)
+        tries = solve_in_tries(posed.scene, formulation, posed.start, posed.step)
     total, wall = process_time() - start, perf_counter() - wall
     seconds = meter.seconds | {"solve": sum(trace.seconds["solve"] for trace in tries), "total": total}
     counts = (sum(trace.n_iterations for trace in tries), *(meter.states[name] for name in _COUNTED))
@@ -64,13 +55,7 @@ def solve_with_clock(subject: Subject, task: Task) -> tuple[TimedSolution, tuple
 
 
 def solve_there(subject: Subject, cell: Cell, seed: int) -> TimedSolution | None:
-    """Let the formulation's process solve a cell; return None if it has no process of its own.
-
-    Raises
-    ------
-    ContractError
-        If the plugin made an error, its process ended, or it says what cannot be.
-    """
+    """Let the formulation's process solve a cell; return None if it has no process of its own."""
     words = subject.run_there("solve", f"{__name__}:answer", json.dumps([asdict(cell), seed]).encode())
     if words is None:
         return None
@@ -88,15 +73,15 @@ def solve_there(subject: Subject, cell: Cell, seed: int) -> TimedSolution | None
 def answer(subject: Subject, words: bytes) -> bytes:
     """Solve a cell in the formulation's process, and return times and counts for `solve_there`."""
     cell, seed = json.loads(words)
-    task = _make_task(Cell(**cell), subject, seed)
+    posed = _pose(Cell(**cell), subject, seed)
     with without_collector():
-        timed, _ = solve_with_clock(subject, task)
+        timed, _ = solve_with_clock(subject, posed)
         if timed.seconds["total"] < _SHORT:
-            timed, _ = solve_with_clock(subject, task)
+            timed, _ = solve_with_clock(subject, posed)
     return json.dumps(asdict(timed)).encode()
 
 
-_make_task = lru_cache(maxsize=1)(make_task)  # The scene of a cell is made once, and its bodies are condensed once.
+_pose = lru_cache(maxsize=1)(pose)  # The scene of a cell is made once, and its bodies are condensed once.
 
 
 @contextmanager

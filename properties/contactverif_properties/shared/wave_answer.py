@@ -27,44 +27,19 @@ _LEAST_SHARE = UNIT_ROUNDOFF**0.5
 
 @dataclass(frozen=True, slots=True)
 class InterfaceAnswer:
-    """The answer of a formulation to the wave.
+    """The answer of a formulation to the wave."""
 
-    Attributes
-    ----------
-    compliance : float
-        The work of the wave's load on the displacements that it causes.
-    stiffness : float
-        The distributed stiffness of the springs under the mean pressure.
-    force_range : float
-        The largest minus the smallest pressure from nodal forces, over the amplitude of the wave. The surface with the
-        larger one counts.
-    point_range : float
-        The same of the pressures that the formulation reports; NaN if it reports none, or nodal forces.
-    """
-
-    compliance: float
-    stiffness: float
+    compliance: float  # The work of the wave's load on the displacements that it causes.
+    stiffness: float  # The distributed stiffness of the springs under the mean pressure.
+    # The largest minus the smallest pressure from nodal forces, over the amplitude of the wave. The surface with the
+    # larger one counts.
     force_range: float
+    # The same of the pressures that the formulation reports; NaN if it reports none, or nodal forces.
     point_range: float
 
 
 def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
-    """Solve two blocks with the wave and without it.
-
-    Parameters
-    ----------
-    columns : tuple[int, int]
-        The numbers of segments of slave and master.
-    penalty : float
-        The distributed stiffness ε̂ times h/E.
-    subject : Subject
-        The formulation.
-
-    Returns
-    -------
-    InterfaceAnswer | None
-        The answer; None if Newton's method does not converge.
-    """
+    """Solve two blocks with the wave and without it."""
     uniform, wavy = (wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, WAVE))
     formulation = subject.for_case(uniform.case())
     systems = System(uniform, formulation), System(wavy, formulation)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isinf, isnan
 
 from contactverif_reports.bench.clocks import clock_sentences
-from contactverif_reports.bench.results import SCENES, BenchResults
+from contactverif_reports.bench.results import BenchResults
 from contactverif_reports.bench.work_precision import (
     REFERENCE,
     TARGETS,
@@ -26,17 +26,7 @@ def picture_of(scene: str) -> str:
 
 
 def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    report : str
-        The name of the netCDF file beside the page; empty without one.
-    with_pictures : bool
-        True if the pictures stand beside the page.
-    """
+    """Return the page."""
     facts = results.provenance
     version, commit = (facts.get(name, "unknown") for name in ("contactverif_version", "commit"))
     n_repeats = results.seconds.shape[-1]
@@ -56,10 +46,10 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
         parts.append(f"![Time to an error of 1 % in the forces, over that of {REFERENCE}]({COST_PICTURE})")
     parts += ["## Error against time", _HOW_TO_READ]
     for scene in results.scenes:
-        title = f"{SCENES[scene][0].upper()}{SCENES[scene][1:]}"
-        parts.append(f"### {title}")
+        label = results.label(scene)
+        parts.append(f"### {label[:1].upper()}{label[1:]}")
         if with_pictures:
-            parts.append(f"![Error of the forces against time: {SCENES[scene]}]({picture_of(scene)})")
+            parts.append(f"![Error of the forces against time: {label}]({picture_of(scene)})")
         parts += [figure_sentence(results, scene), _table(results, scene)]
     parts.append(_profiles(results, with_pictures))
     if report:

@@ -22,13 +22,7 @@ def wall_ratio(results: BenchResults, formulation: str) -> float:
 
 
 def clock_sentences(results: BenchResults) -> list[str]:
-    """Return a sentence for each formulation whose time the processor's clock of one process may not show.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    """
+    """Return a sentence for each formulation whose time the processor's clock of one process may not show."""
     sentences = []
     for name in results.formulations:
         ratio = wall_ratio(results, name)

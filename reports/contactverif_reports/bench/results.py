@@ -16,13 +16,6 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.foreign_text import LONGEST_FACT, name_line, one_line
 
 RANDOM = "random"  # The scene of the performance profiles.
-SCENES = {
-    "wavy": "two wavy half-planes in full contact",
-    "hertz": "Hertz' contact in boxes",
-    "rings": "two rings shrunk onto each other",
-    "kinked": "two blocks on a zigzag",
-    RANDOM: "random blocks under a uniform pressure",
-}
 ERRORS = {
     "forces": "E_F of nodal forces, the larger one of slave and master",
     "displacement": "L2 error of displacements of the interface over the exact ones",
@@ -60,72 +53,45 @@ class Outcome(IntEnum):
 
 @dataclass(frozen=True, slots=True, order=True)
 class Cell:
-    """One scene on one mesh at one penalty.
+    """One scene on one mesh at one penalty."""
 
-    Attributes
-    ----------
-    scene : str
-        A key of `SCENES`.
-    mesh : int
-        The fineness, as the scene counts it; the number of a random scene.
-    stiffness : float
-        The penalty ε̂ in the unit of the scene: E/h for wavy and hertz, E/ℓ for kinked, N m-2 for rings and random.
-    """
-
-    scene: str
-    mesh: int
-    stiffness: float
+    scene: str  # The name of a problem, or `RANDOM`
+    mesh: int  # The fineness, as the problem counts it; the number of a random scene
+    stiffness: float  # The penalty ε̂ in the unit of the problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchResults:
-    """All numbers of a bench.
+    """All numbers of a bench."""
 
-    Attributes
-    ----------
-    formulations : tuple[str, ...]
-        The formulations, as on the command line.
-    cells : tuple[Cell, ...]
-        The cells.
-    segments, unknowns : IntArray, shape (n_cells,)
-        The numbers of slave segments and of the unknowns of the scene.
-    outcomes : IntArray, shape (n_formulations, n_cells)
-        The outcomes, see `Outcome`.
-    errors : FloatArray, shape (n_formulations, n_cells, n_errors)
-        The errors, in the order of `ERRORS`; NaN where nothing is solved, or nothing is reported.
-    counts : IntArray, shape (n_formulations, n_cells, n_counts)
-        The counts, in the order of `COUNTS`.
-    seconds : FloatArray, shape (n_formulations, n_cells, n_parts, n_repeats)
-        The processor's time of each part in each repeat, in the order of `PARTS`; NaN where the plugin crashed.
-    wall : FloatArray, shape (n_formulations, n_cells, n_repeats)
-        The time of each repeat by the wall clock; NaN where the plugin crashed, or an old file has none.
-    yardstick : FloatArray, shape (n_cells, n_repeats)
-        The time of a fixed piece of work that was done in the same repeats.
-    remarks : Mapping[tuple[str, int], str]
-        {(formulation, number of the cell): how a run ended that gave no solution}.
-    not_loaded : Mapping[str, str]
-        {formulation: why it did not load}.
-    provenance : Mapping[str, str]
-        Versions, machine, time and command.
-    """
-
-    formulations: tuple[str, ...]
+    formulations: tuple[str, ...]  # The formulations, as on the command line.
     cells: tuple[Cell, ...]
-    segments: IntArray
+    labels: Mapping[str, str]  # {scene: what is solved, in words}; a file of an earlier version has none
+    units: Mapping[str, str]  # {scene: unit of its penalties}; empty where they are ε̂ itself
+    segments: IntArray  # (n_cells,) The numbers of slave segments and of the unknowns of the scene.
     unknowns: IntArray
-    outcomes: IntArray
+    outcomes: IntArray  # (n_formulations, n_cells) The outcomes, see `Outcome`.
+    # (n_formulations, n_cells, n_errors) The errors, in the order of `ERRORS`; NaN where nothing is solved, or nothing
+    # is reported.
     errors: FloatArray
-    counts: IntArray
+    counts: IntArray  # (n_formulations, n_cells, n_counts) The counts, in the order of `COUNTS`.
+    # (n_formulations, n_cells, n_parts, n_repeats) The processor's time of each part in each repeat, in the order of
+    # `PARTS`; NaN where the plugin crashed.
     seconds: FloatArray
+    # (n_formulations, n_cells, n_repeats) The time of each repeat by the wall clock; NaN where the plugin crashed, or
+    # an old file has none.
     wall: FloatArray
-    yardstick: FloatArray
+    yardstick: FloatArray  # (n_cells, n_repeats) The time of a fixed piece of work that was done in the same repeats.
+    # {(formulation, number of the cell): how a run ended that gave no solution}.
     remarks: Mapping[tuple[str, int], str]
-    not_loaded: Mapping[str, str]
-    provenance: Mapping[str, str]
+    not_loaded: Mapping[str, str]  # {formulation: why it did not load}.
+    provenance: Mapping[str, str]  # Versions, machine, time and command.
 
     def __post_init__(self) -> None:
         cleaned = {
             "formulations": tuple(map(name_line, self.formulations)),
+            "labels": {name_line(name): one_line(text) for name, text in self.labels.items()},
+            "units": {name_line(name): name_line(text) for name, text in self.units.items()},
             "remarks": {(name_line(name), cell): one_line(text) for (name, cell), text in self.remarks.items()},
             "not_loaded": {name_line(name): one_line(text) for name, text in self.not_loaded.items()},
             "provenance": {name_line(name): one_line(text, LONGEST_FACT) for name, text in self.provenance.items()},
@@ -135,9 +101,16 @@ class BenchResults:
 
     @property
     def scenes(self) -> tuple[str, ...]:
-        """The scenes that have cells, without the random ones, in the order of `SCENES`."""
-        there = {cell.scene for cell in self.cells}
-        return tuple(scene for scene in SCENES if scene in there and scene != RANDOM)
+        """The scenes that have cells, without the random ones, as the cells follow one another."""
+        return tuple(dict.fromkeys(cell.scene for cell in self.cells if cell.scene != RANDOM))
+
+    def label(self, scene: str) -> str:
+        """Return what a scene is, in words; its name if the file does not say."""
+        return self.labels.get(scene, scene)
+
+    def penalty_name(self, scene: str, stiffness: float) -> str:
+        """Return a penalty of a scene with its unit."""
+        return f"ε̂ = {stiffness:g} {self.units.get(scene, '')}".rstrip()
 
     @property
     def fastest(self) -> FloatArray:

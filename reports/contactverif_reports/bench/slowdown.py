@@ -20,28 +20,14 @@ SLOWER = 1.25  # A median ratio above this is a slowdown: repeats of one bench d
 
 @dataclass(frozen=True, slots=True)
 class Slowdown:
-    """The time of a formulation over that of the earlier bench.
+    """The time of a formulation over that of the earlier bench."""
 
-    Attributes
-    ----------
-    formulation : str
-        The formulation.
-    n_runs : int
-        The number of runs that both benches have, with a time.
-    ratio : float
-        The median of the ratios; NaN without runs.
-    low, high : float
-        The quartiles of the ratios.
-    parts : Mapping[str, float]
-        The median ratio of each part.
-    """
-
-    formulation: str
-    n_runs: int
-    ratio: float
-    low: float
+    formulation: str  # The formulation.
+    n_runs: int  # The number of runs that both benches have, with a time.
+    ratio: float  # The median of the ratios; NaN without runs.
+    low: float  # The quartiles of the ratios.
     high: float
-    parts: Mapping[str, float]
+    parts: Mapping[str, float]  # The median ratio of each part.
 
     @property
     def slower(self) -> bool:
@@ -50,13 +36,7 @@ class Slowdown:
 
 
 def slowdowns(new: BenchResults, old: BenchResults) -> tuple[Slowdown, ...]:
-    """Return the ratio of each formulation that both benches have.
-
-    Parameters
-    ----------
-    new, old : BenchResults
-        The two benches.
-    """
+    """Return the ratio of each formulation that both benches have."""
     names = [name for name in new.formulations if name in old.formulations]
     common = [cell for cell in new.cells if cell in old.cells]
     return tuple(_slowdown(name, common, new, old) for name in names)

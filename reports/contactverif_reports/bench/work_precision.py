@@ -47,24 +47,7 @@ def pareto_front(times: FloatArray, errors: FloatArray) -> BoolArray:
 def time_to_reach(
     results: BenchResults, formulation: str, scene: str, target: float, kind: str = "forces", part: str = "total"
 ) -> float:
-    """Return the time of the cheapest run on a scene, over meshes and penalties, whose error is at most the target.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    formulation, scene : str
-        The formulation and the scene.
-    target : float
-        The error to reach.
-    kind, part : str
-        The kind of error and the part of the time.
-
-    Returns
-    -------
-    float
-        Seconds; infinite if no run reaches it.
-    """
+    """Return the time of the cheapest run on a scene, over meshes and penalties, whose error is at most the target."""
     reached = results.cells_of(scene) & (results.errors_of(formulation, kind) <= target)
     return float(results.times(formulation, part)[reached].min(initial=inf))
 
@@ -83,22 +66,14 @@ def cost_ratio(results: BenchResults, formulation: str, scene: str, reference: s
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairProfile:
-    """The performance profile of a formulation and the reference, the two alone.
+    """The performance profile of a formulation and the reference, the two alone."""
 
-    Attributes
-    ----------
-    formulation, reference : str
-        The two.
-    factors : FloatArray, shape (n_scenes,)
-        The time of the formulation over that of the faster one of both, on each random scene; infinite where it fails.
-    reference_factors : FloatArray, shape (n_scenes,)
-        The same of the reference.
-    """
-
-    formulation: str
+    formulation: str  # The two.
     reference: str
+    # (n_scenes,) The time of the formulation over that of the faster one of both, on each random scene; infinite where
+    # it fails.
     factors: FloatArray
-    reference_factors: FloatArray
+    reference_factors: FloatArray  # (n_scenes,) The same of the reference.
 
     def share(self, factor: float) -> float:
         """Return the share of scenes that the formulation solves within a factor of the faster one of both."""
@@ -120,13 +95,6 @@ def pair_profiles(results: BenchResults, reference: str = REFERENCE) -> tuple[Pa
     """Return the profile of each formulation beside the reference, over the random scenes that have a solution.
 
     A scene counts as solved if the forces are exact up to `ACCURATE`.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench. Without the reference or without random scenes there are no profiles.
-    reference : str
-        The formulation to compare with.
     """
     selection = results.cells_of(RANDOM)
     if reference not in results.formulations or not selection.any():
@@ -154,22 +122,7 @@ def _over(values: FloatArray, best: FloatArray) -> FloatArray:
 
 
 def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None = None) -> str:
-    """Return one sentence: at an error of 1 %, what others cost beside the reference.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    scene : str
-        The scene.
-    names : Sequence[str] | None
-        The formulations to name; all by default.
-
-    Returns
-    -------
-    str
-        The sentence; empty without the reference.
-    """
+    """Return one sentence: at an error of 1 %, what others cost beside the reference."""
     others = [name for name in (names or results.formulations) if name != REFERENCE]
     if REFERENCE not in results.formulations or not others:
         return ""
@@ -181,13 +134,6 @@ def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None
 
 def harness_share(results: BenchResults, formulation: str) -> float:
     """Return the share of the time of all solutions in which neither the plugin nor a linear solver works.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    formulation : str
-        The formulation.
 
     Returns
     -------
@@ -227,15 +173,7 @@ def _put_in_words(scene: str, ratios: Mapping[str, float]) -> str:
 
 
 def figure_sentence(results: BenchResults, scene: str, kind: str = "forces") -> str:
-    """Return one sentence on what a figure of error against time shows: who is exact, and who is quick.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    scene, kind : str
-        The scene and the kind of error.
-    """
+    """Return one sentence on what a figure of error against time shows: who is exact, and who is quick."""
     cells = results.cells_of(scene)
     best = {name: float(np.fmin.reduce(results.errors_of(name, kind)[cells])) for name in results.formulations}
     best = {name: inf if np.isnan(error) else error for name, error in best.items()}

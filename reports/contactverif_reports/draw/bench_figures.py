@@ -37,24 +37,12 @@ _DASHES = ("-", "--", ":")
 _LEAST_ERROR = 1e-12  # Errors below are roundoff, and are drawn here.
 _MOST_IN_A_PANEL = 6  # More curves than these cannot be told apart.
 _EDGE = 0.07  # Failed runs are drawn above the largest error, by this share of the range of log errors, and a half.
-_PENALTY_NAMES = {
-    "wavy": "ε̂ = {:g} E/h",
-    "hertz": "ε̂ = {:g} E/h",
-    "rings": "ε̂ = {:g}",
-    "kinked": "ε̂ = {:g} E/ℓ",
-}
 _COST_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _STYLE: dict[Any, Any] = {"font.size": 8.0, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 4.0}
 
 
 def draw_bench(results: BenchResults, folder: Path) -> None:
-    """Draw all figures of a bench as SVG into a folder: one for each scene, the cost, and the profiles.
-
-    Raises
-    ------
-    MisuseError
-        If a file cannot be written.
-    """
+    """Draw all figures of a bench as SVG into a folder: one for each scene, the cost, and the profiles."""
     for scene in results.scenes:
         save(make_work_precision_figure(results, scene), folder / picture_of(scene))
     if results.scenes and len(results.formulations) > 1 and REFERENCE in results.formulations:
@@ -68,21 +56,12 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
     """Return error against time of one scene with the Pareto front.
 
     There is a panel for each penalty; of many formulations there is a panel for each instead.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    scene : str
-        The scene.
-    kind : str
-        The kind of error.
     """
     stiffnesses, n_names = results.stiffnesses_of(scene), len(results.formulations)
     low, high = _error_range(results, scene, kind)
     edge = 1.5 * high * (high / low) ** _EDGE
     if n_names > _MOST_IN_A_PANEL:
-        penalties = {stiffness: _PENALTY_NAMES[scene].format(stiffness) for stiffness in stiffnesses}
+        penalties = {stiffness: results.penalty_name(scene, stiffness) for stiffness in stiffnesses}
         return make_multiples_figure(results, scene, kind, (low / 2, edge, edge**2 / high), penalties)
     with matplotlib.rc_context(_STYLE):
         n_columns = min(6, max(2, 2 * len(stiffnesses)))
@@ -91,7 +70,7 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
         panels = figure.subplots(1, len(stiffnesses), squeeze=False, sharey=True)[0]
         for axes, stiffness in zip(panels, stiffnesses, strict=True):
             axes.set(xscale="log", yscale="log", ylim=(low / 2, edge**2 / high), xlabel="time of the solution / ms")
-            axes.set_title(_PENALTY_NAMES[scene].format(stiffness))
+            axes.set_title(results.penalty_name(scene, stiffness))
             axes.axhline(edge, color="0.8", linewidth=0.6)
             _draw_runs(axes, results, results.cells_of(scene, stiffness), kind, edge)
             _label_times(axes)

@@ -33,19 +33,7 @@ Span = tuple[float, float, float]  # The least error, the error at which failure
 def make_multiples_figure(
     results: BenchResults, scene: str, kind: str, span: Span, penalties: dict[float, str]
 ) -> Figure:
-    """Return a panel for each formulation with its runs, the front of all and the front of the reference.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    scene, kind : str
-        The scene and the kind of error.
-    span : tuple[float, float, float]
-        The lower end of the errors, the error at which failures are drawn, and the upper end.
-    penalties : dict[float, str]
-        {penalty: its name}, soft ones first.
-    """
+    """Return a panel for each formulation with its runs, the front of all and the front of the reference."""
     n_rows = ceil(len(results.formulations) / _N_COLUMNS)
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(5.0, 0.9 + 1.25 * n_rows), layout="constrained")

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from contactverif_reports.bench.clocks import clock_sentences
-from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Outcome
+from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
 from contactverif_reports.bench.slowdown import Slowdown
 from contactverif_reports.bench.work_precision import (
     REFERENCE,
@@ -27,20 +27,7 @@ _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version
 
 
 def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
-    """Return the page of a bench.
-
-    Parameters
-    ----------
-    results : BenchResults
-        The bench.
-    changes : Sequence[Slowdown]
-        The times over those of an earlier bench.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-    """
+    """Return the page of a bench."""
     from contactverif_reports.draw.bench_figures import (  # Importing matplotlib is slow.
         make_cost_figure,
         make_profile_figure,
@@ -52,7 +39,6 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         "bench.html.j2",
         results=results,
         reference=REFERENCE,
-        titles=SCENES,
         scenes=scenes,
         sentences=list(filter(None, (cost_sentence(results, scene) for scene in scenes))),
         clocks=clock_sentences(results),

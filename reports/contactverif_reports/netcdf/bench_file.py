@@ -14,7 +14,7 @@ import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, SCENES, BenchResults, Cell, Outcome
+from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.schema import NONE, RATIO, SECONDS, text
 from contactverif_reports.netcdf.stored_groups import Group, read_groups
@@ -27,13 +27,7 @@ _RUN = ["formulation", "cell"]
 
 
 def write_bench(results: BenchResults, path: str | os.PathLike[str]) -> None:
-    """Write the file of a bench, whole or not at all.
-
-    Raises
-    ------
-    MisuseError
-        If the path cannot be written.
-    """
+    """Write the file of a bench, whole or not at all."""
     check_writable(path)
     with whole(path) as part:
         write_tree(bench_tree(results), part)
@@ -52,13 +46,7 @@ def bench_tree(results: BenchResults) -> xr.DataTree:
 
 
 def read_bench(path: str | os.PathLike[str]) -> BenchResults:
-    """Return what `write_bench` wrote.
-
-    Raises
-    ------
-    MisuseError
-        If the file is missing, or is no file of a bench.
-    """
+    """Return what `write_bench` wrote."""
     needed = "a file that `contactverif bench --out FILE.nc` wrote"
     name = os.fspath(path)
     groups = read_groups(path, "FILE", needed)
@@ -109,8 +97,8 @@ def _check_codes(results: BenchResults) -> None:
 
 def _labels(results: BenchResults) -> dict[str, Any]:
     """Return the names along the dimensions, and what a cell is."""
-    scenes = {scene: number for number, scene in enumerate(SCENES)}
     cells = results.cells
+    scenes = {scene: number for number, scene in enumerate(dict.fromkeys(cell.scene for cell in cells))}
     return {
         "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
         "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
@@ -120,7 +108,10 @@ def _labels(results: BenchResults) -> dict[str, Any]:
             [cell.stiffness for cell in cells],
             "penalty in the unit of the scene",
             RATIO,
-            "E/h for wavy and hertz, E over the unit of length for kinked, N m-2 for rings; 1 for random",
+        ),
+        "scene_label": words(["scene_name"], [results.labels.get(scene, "") for scene in scenes], "what a scene is"),
+        "scene_unit": words(
+            ["scene_name"], [results.units.get(scene, "") for scene in scenes], "unit of penalty; none for itself"
         ),
         "slave_segments": numbers(["cell"], results.segments, "number of slave segments", RATIO),
         "unknowns": numbers(["cell"], results.unknowns, "number of unknowns of the scene", RATIO),
@@ -167,7 +158,7 @@ def _timing(results: BenchResults) -> xr.Dataset:
 
 def _results(root: Group, timing: Group) -> BenchResults:
     formulations = tuple(map(str, root["formulation"].values))
-    scenes = list(SCENES)
+    scenes = str(root["scene"].attrs["flag_meanings"]).split()
     if (root["scene"].values < 0).any():
         raise ValueError("scene holds a code without a meaning")
     columns = (root[name].values.tolist() for name in ("scene", "mesh", "stiffness"))
@@ -180,6 +171,8 @@ def _results(root: Group, timing: Group) -> BenchResults:
     return BenchResults(
         formulations=formulations,
         cells=cells,
+        labels=_texts(root, "scene_label", scenes),
+        units=_texts(root, "scene_unit", scenes),
         segments=root["slave_segments"].values.astype(np.int64),
         unknowns=root["unknowns"].values.astype(np.int64),
         outcomes=outcomes,
@@ -192,6 +185,12 @@ def _results(root: Group, timing: Group) -> BenchResults:
         not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
+
+
+def _texts(root: Group, name: str, scenes: list[str]) -> dict[str, str]:
+    """Return the text of each scene that has one; a file of an earlier version has none."""
+    texts = root[name].values if name in root else [""] * len(scenes)
+    return {scene: str(text) for scene, text in zip(scenes, texts, strict=True) if str(text)}
 
 
 def _wall(timing: Group) -> FloatArray:

@@ -1,0 +1,142 @@
+"""What problems with an exact answer have in common: to be posed on a mesh, to measure errors, and to be studied.
+
+It is no part of `contract`, because scenes and solutions belong to mechanics, of which a contract knows nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.property import Quantity
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import (
+    Field,
+    Solution,
+    displacement_error,
+    force_error,
+    pressure_error,
+    shape_integrals,
+)
+from contactverif.mechanics.scene import Scene
+
+Errors = dict[str, float]  # {kind of error: number, dimensionless}; a kind that is not reported is not there.
+
+# Kinds of error. A pair is that of slave and master.
+FORCES = "slave forces", "master forces"
+MOTIONS = "slave displacement", "master displacement"
+PRESSURE, ITERATIONS = "pressure", "iterations"
+
+
+def _no_errors(solution: Solution) -> Errors:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PosedProblem:
+    """A problem on one mesh, at one penalty, for formulations of some traits, with its exact answer."""
+
+    scene: Scene  # Its penalty is ε̂. With multipliers it is the scale of the contact decision.
+    forces: Callable[[FloatArray], FloatArray]  # From positions (n_nodes, 2) to the exact forces that push the nodes
+    motions: tuple[Field, ...] = ()  # Exact displacements at reference places of the slave, and of the master if known
+    pressure: Field  # The exact pressure at current places of the slave
+    pressure_scale: float  # The pressure that errors of pressures are divided by
+    deformed: bool = True  # Forces are distributed over current lengths, not over those of the reference.
+    further: Callable[[Solution], Errors] = _no_errors  # Further kinds of error
+    start: FloatArray | None = None  # (n_free,): the first iterate; None for the first guess of the scene
+    step: float | None = None  # The step of differences, a length, where a formulation has no tangent
+    best: Mapping[str, float] = field(default_factory=dict)  # The least errors that the mesh allows, where known
+
+    @property
+    def first_guess(self) -> Case:
+        """The first guess of the scene, with its penalty."""
+        return Case(self.scene.interface, self.scene.positions(self.scene.start), self.scene.penalty)
+
+    def exact_forces(self, state: Case) -> FloatArray:
+        """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
+        return self.forces(state.positions if self.deformed else state.interface.nodes)
+
+    def errors(self, solution: Solution) -> Errors:
+        """Return the errors of a solution by kind, whoever solved the scene."""
+        interface = solution.interface
+        surfaces = interface.slave, interface.master
+        positions = solution.state.positions if self.deformed else interface.nodes
+        exact, errors = self.exact_forces(solution.state), {}
+        for kind, surface in zip(FORCES, surfaces, strict=True):
+            errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
+        for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
+            errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, motion)
+        pressure = pressure_error(solution, self.pressure, self.pressure_scale)
+        if pressure is not None:
+            errors[PRESSURE] = pressure
+        return errors | self.further(solution)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """A problem that `contactverif bench` can solve: what an entry point of the group `contactverif.problems` names."""
+
+    label: str  # What is solved, in words: "two rings shrunk onto each other"
+    unit: str  # The unit of the penalties, as "E/h"; empty if they are ε̂ itself
+    meshes: tuple[int, ...]  # From coarse to fine
+    penalties: tuple[float, ...]  # From soft to stiff, in the unit
+    pose: Callable[[int, float, Traits], PosedProblem]  # From mesh, penalty and the traits of a formulation
+    rank: int = 100  # Pages show problems of lower rank first.
+
+
+class Study(Protocol):
+    """A problem on finer and finer meshes, as a property asks it."""
+
+    @property
+    def meshes(self) -> tuple[int, ...]:
+        """The meshes, from coarse to fine."""
+
+    def size(self, mesh: int) -> float:
+        """Return the size of the cells of a mesh, in any unit."""
+
+    def pose(self, mesh: int, traits: Traits) -> PosedProblem:
+        """Return the problem on a mesh for formulations of these traits."""
+
+    def group(self, traits: Traits) -> str:
+        """Return the key of the bounds that hold for formulations of these traits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bound:
+    """The bound of one number of a study: the rate at which errors fall, or their size on the finest mesh."""
+
+    name: str
+    kinds: tuple[str, ...]  # The kinds of error. The least rate counts, or the largest error.
+    limits: Mapping[str, float]  # {group of studies: limit}; the group "" is for all that are not named.
+    reason: str
+    rate: bool = False  # The number is a rate, which is at least the limit.
+    of_best: str = ""  # The formula of the best approximation's error, if the limit is a multiple of that
+
+    @property
+    def quantity(self) -> Quantity:
+        """The number as a property declares it."""
+        limits = ", ".join(f"{group} {limit:g}{self.of_best}".lstrip() for group, limit in self.limits.items())
+        return Quantity(self.name, "1", limits, self.reason, "at least" if self.rate else "at most")
+
+    def limit(self, group: str) -> float:
+        """Return the limit for a group of studies."""
+        return self.limits[group if group in self.limits else ""]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Studies:
+    """The studies of a problem, and what is asked of them."""
+
+    cases: Callable[[], tuple[Case, ...]]  # The coarsest mesh of each study, with its parameters
+    read: Callable[[Case], Study]  # The study of a case
+    bounds: tuple[Bound, ...]
+    series: Mapping[str, str]  # {name in reports: kind of error} of what is kept of all meshes
+    nearly: float = 0.0  # An iterate that is out of balance by this share of the largest exact force is a solution.
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The numbers that are judged."""
+        return tuple(bound.quantity for bound in self.bounds)
