@@ -14,17 +14,17 @@ Source: Zavarise & De Lorenzis (2009), Appendix A, Figs. 27–29, Box 3.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.interface import Interface
+from contactverif_paper.paper_columns import WORDS, Column
 from contactverif_paper.paper_formulations import VTS_PPT, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers, words
 
 PENALTY = 16.0
 C = -0.5  # The coordinate of V on the slave segment.
@@ -170,10 +170,24 @@ FORMULAS: tuple[tuple[str, str, str, str], ...] = (  # number, formula, check, a
 )
 
 
-def compute(report_progress: Progress) -> FloatArray:
-    """Return the largest relative difference (n_formulas,) of each formula from its check."""
+def _column(number: int) -> tuple[str, ...]:
+    return tuple(row[number] for row in FORMULAS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checks:
+    """The largest relative difference of each formula from its check."""
+
+    difference: Annotated[FloatArray, Column("formula", "1", "largest relative difference")]
+    formula: Annotated[tuple[str, ...], Column("formula", WORDS, "number in the appendix")] = _column(0)
+    text: Annotated[tuple[str, ...], Column("formula", WORDS, "the formula")] = _column(1)
+    check: Annotated[tuple[str, ...], Column("formula", WORDS, "what it is compared with")] = _column(2)
+
+
+def compute(report_progress: Progress) -> Checks:
+    """Check every formula."""
     report_progress("Appendix A")
-    return errors(Increment)
+    return Checks(errors(Increment))
 
 
 def errors(increment: Callable[[Geometry, np.ndarray], Increment]) -> FloatArray:
@@ -212,14 +226,8 @@ def _integrals(geometry: Geometry) -> dict[str, Vector]:
     last_f, last_n = both(0.0, geometry.xi_a, geometry.l_last)
     between, _ = both(0.0, 1.0, geometry.l_between)
     f_v = -geometry.unit(geometry.l_ab) * float(_GAUSS.size) / 4  # Half of the slave segment.
-    return {
-        "first_f": first_f,
-        "first_n": first_n,
-        "between": between,
-        "last_f": last_f,
-        "last_n": last_n,
-        "f_v": f_v,
-    }
+    first, last = {"first_f": first_f, "first_n": first_n}, {"last_f": last_f, "last_n": last_n}
+    return first | {"between": between} | last | {"f_v": f_v}
 
 
 def _work_errors(directions: FloatArray, increment: Callable[[Geometry, np.ndarray], Increment]) -> dict[str, float]:
@@ -249,10 +257,10 @@ def _length(vector: Vector) -> Any:
     return np.sqrt(vector @ vector)
 
 
-def statements(result: FloatArray) -> tuple[Statement, ...]:
+def statements(checks: Checks) -> tuple[Statement, ...]:
     """Count the formulas that are right."""
-    wrong = [FORMULAS[row][0] for row in np.flatnonzero(~(result <= TOLERANCE))]
-    text = f"each agrees with its check, within {number(float(result.max()), 2)}"
+    wrong = [checks.formula[row] for row in np.flatnonzero(~(checks.difference <= TOLERANCE))]
+    text = f"each agrees with its check, within {number(float(checks.difference.max()), 2)}"
     return (
         Statement(
             "Appendix A",
@@ -263,35 +271,20 @@ def statements(result: FloatArray) -> tuple[Statement, ...]:
     )
 
 
-def tables(result: FloatArray) -> tuple[PageTable, ...]:
+def tables(checks: Checks) -> tuple[PageTable, ...]:
     """Return a line for each formula."""
+    marks = [f"{'✓' if error <= TOLERANCE else '✗'} {number(error, 2)}" for error in checks.difference.tolist()]
+    rows = zip(checks.formula, checks.text, checks.check, marks, strict=True)
     return (
         PageTable(
             "Appendix A, formula by formula",
             ("No.", "Formula", "Compared with", "Difference"),
             tuple(
-                (
-                    Cell((name,)),
-                    Cell((text,)),
-                    Cell((check,), tone="soft"),
-                    Cell((("✓ " if error <= TOLERANCE else "✗ ") + number(float(error), 2),), tone="n"),
-                )
-                for (name, text, check, _), error in zip(FORMULAS, result, strict=True)
+                (Cell((name,)), Cell((text,)), Cell((check,), tone="soft"), Cell((mark,), tone="n"))
+                for name, text, check, mark in rows
             ),
         ),
     )
-
-
-def datasets(result: FloatArray) -> dict[str, xr.Dataset]:
-    """Return the differences."""
-    dims = ["formula"]
-    table = {
-        "formula": words(dims, [row[0] for row in FORMULAS], "number in the appendix"),
-        "text": words(dims, [row[1] for row in FORMULAS], "the formula"),
-        "check": words(dims, [row[2] for row in FORMULAS], "what it is compared with"),
-        "difference": numbers(dims, result, "largest relative difference", "1"),
-    }
-    return {"": xr.Dataset(table, attrs={"formulation": VTS_PPT.name})}
 
 
 ITEM = Item(
@@ -299,7 +292,7 @@ ITEM = Item(
     title="Appendix A: the formulas of the consistent tangent",
     compute=compute,
     statements=statements,
-    datasets=datasets,
+    attributes={"formulation": VTS_PPT.name},
     tables=tables,
     text="f and n are the first and the second node of a segment, 1 and 2 those of V’s own one, M is the middle of the "
     "slave segment AB; Δ(ε̂ g l n) stands for ε̂ Δg l n + ε̂ g Δl n + ε̂ g l Δn. A11 is checked by Δl of the last segment.",

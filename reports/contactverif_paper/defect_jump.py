@@ -11,29 +11,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import (
     REFERENCE_LINE,
-    TWO_COLUMNS,
     Series,
     add_legend,
-    new_figure,
     new_panels,
     plot_logarithmic,
     plot_series,
     use_round_ticks,
 )
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables
-from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_paper.paper_columns import Column, Formulations, axis_column, values_column
+from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_paper.tilted_segment import DEPTH, TILTS, nodal_forces
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers
 
 FORMULATIONS = (formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
 SLIDING_TILT = 0.3  # Radians: the tilt at which the area slides past the node.
@@ -45,20 +43,33 @@ _NEAR = 2.0**-40  # The distance to either side of the jump over the slave's len
 class Jump:
     """The jump of the forces where the end of an area of competence passes a master node."""
 
-    sliding: Series  # Over the position of that end: the force on the master over that on the slave, at `SLIDING_TILT`.
-    jump: Series  # Over the tilt (rad): the largest jump of a nodal force, over the slave's force.
-    formula: FloatArray  # (n_tilts,) The same by formula, for the printed algorithm.
+    jump: Annotated[
+        Series,
+        (
+            axis_column("tilt", "rad", "tilt of the slave"),
+            values_column("tilt", "1", "largest jump over the slave's force"),
+        ),
+    ]
+    known: Annotated[FloatArray, Column("tilt", "1", "the jump of the printed algorithm, by formula")]
+    transmitted: Annotated[  # At `SLIDING_TILT`.
+        Series,
+        (
+            axis_column("shift", "1", "end of the area past the node over the slave's length"),
+            values_column("shift", "1", "force on the master over that on the slave"),
+        ),
+    ]
+    formulations: Formulations = FORMULATIONS
 
 
 def compute(report_progress: Progress) -> Jump:
     """Compute forces beside the node and on both sides of it."""
     report_progress("jump between Eq. 6 and Box 3")
-    sliding = np.array([[_transmission(row, SLIDING_TILT, shift) for shift in SHIFTS] for row in FORMULATIONS])
+    transmitted = np.array([[_transmission(row, SLIDING_TILT, shift) for shift in SHIFTS] for row in FORMULATIONS])
     jumps = np.array([[_jump(row, theta) for theta in TILTS] for row in FORMULATIONS])
     return Jump(
-        Series(FORMULATIONS, SHIFTS, sliding),
         Series(FORMULATIONS, TILTS, jumps),
         np.array([jump_by_formula(theta) for theta in TILTS]),
+        Series(FORMULATIONS, SHIFTS, transmitted),
     )
 
 
@@ -95,33 +106,18 @@ def statements(result: Jump) -> tuple[Statement, ...]:
 
 def plot(result: Jump) -> Figure:
     """Draw the transmitted force beside the node, and the jump over the tilt."""
-    figure = new_figure(TWO_COLUMNS, 3.6)
-    sliding, jump = new_panels(figure, 2)
-    plot_series(sliding, result.sliding, markers=False)
+    figure, (sliding, jump) = new_panels(3.6, 2)
+    plot_series(sliding, result.transmitted, markers=False)
     sliding.set_xlabel("area’s end past the node\n(slave lengths)")
     sliding.set_ylabel("master force / slave force (–)")
     sliding.set_title(f"θ = {SLIDING_TILT:g}")
     use_round_ticks(sliding)
-    jump.plot(TILTS[1:], result.formula[1:], **REFERENCE_LINE)
+    jump.plot(TILTS[1:], result.known[1:], **REFERENCE_LINE)
     plot_logarithmic(jump, result.jump)
     jump.set_xlabel("tilt θ (rad)")
     jump.set_ylabel("largest jump / slave force (–)")
     add_legend(figure, FORMULATIONS, reference="formula, printed algorithm", columns=2)
     return figure
-
-
-def datasets(result: Jump) -> dict[str, xr.Dataset]:
-    """Return forces and jumps."""
-    table = name_variables(FORMULATIONS) | {
-        "tilt": numbers(["tilt"], TILTS, "tilt of the slave", "rad"),
-        "jump": numbers(["formulation", "tilt"], result.jump.values, "largest jump over the slave's force", "1"),
-        "known": numbers(["tilt"], result.formula, "the jump of the printed algorithm, by formula", "1"),
-        "shift": numbers(["shift"], SHIFTS, "end of the area past the node over the slave's length", "1"),
-        "transmitted": numbers(
-            ["formulation", "shift"], result.sliding.values, "force on the master over that on the slave", "1"
-        ),
-    }
-    return {"": xr.Dataset(table, attrs={"tilt_of_transmitted": SLIDING_TILT})}
 
 
 def _master(theta: float, shift: float) -> Sequence[float]:
@@ -147,11 +143,10 @@ ITEM = Item(
     title="Defect 2: forces jump between Eq. 6 and Box 3",
     compute=compute,
     statements=statements,
-    datasets=datasets,
+    attributes={"tilt_of_transmitted": SLIDING_TILT},
     figures=(
         PaperFigure(
             "defect-jump",
-            OURS,
             "(a) The force that reaches the master while the end of an area of competence slides past a master node, "
             "and (b) the largest jump of a nodal force there.",
             plot,

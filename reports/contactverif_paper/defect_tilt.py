@@ -10,26 +10,18 @@ Source: Zavarise & De Lorenzis (2009), Section 5.1.1, Boxes 1–3.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.figure_style import (
-    REFERENCE_LINE,
-    TWO_COLUMNS,
-    Series,
-    add_legend,
-    new_figure,
-    new_panels,
-    plot_logarithmic,
-)
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables
-from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_logarithmic
+from contactverif_paper.paper_columns import Formulations, axis_column, values_column
+from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_paper.tilted_segment import TILTS, nodal_forces
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers
 
 FORMULATIONS = (formulations.VTS_ME, formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
 _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses a node, up to θ = 0.5.
@@ -37,10 +29,17 @@ _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imbalance:
-    """The loss of force and moment over the tilt (rad)."""
+    """The loss of force, |ΣR|, and of moment about the slave's middle, |Σ x×R|, over the tilt."""
 
-    force: Series  # |ΣR| over the slave's force.
-    moment: Series  # |Σ x×R| about the slave's middle over that force times the slave's length.
+    force: Annotated[
+        Series,
+        (
+            axis_column("tilt", "rad", "tilt of the slave"),
+            values_column("tilt", "1", "force lost between slave and master over the slave's force"),
+        ),
+    ]
+    moment: Annotated[Series, values_column("tilt", "1", "moment lost over the slave's force times its length")]
+    formulations: Formulations = FORMULATIONS
 
 
 def compute(report_progress: Progress) -> Imbalance:
@@ -68,8 +67,7 @@ def statements(imbalance: Imbalance) -> tuple[Statement, ...]:
 
 def plot(imbalance: Imbalance) -> Figure:
     """Draw both losses over the tilt."""
-    figure = new_figure(TWO_COLUMNS, 3.6)
-    force, moment = new_panels(figure, 2)
+    figure, (force, moment) = new_panels(3.6, 2)
     force.plot(TILTS[1:], 1 - np.cos(TILTS[1:]), **REFERENCE_LINE)
     plot_logarithmic(force, imbalance.force)
     plot_logarithmic(moment, imbalance.moment)
@@ -79,19 +77,6 @@ def plot(imbalance: Imbalance) -> Figure:
         axes.set_xlabel("tilt θ (rad)")
     add_legend(figure, FORMULATIONS, reference="1 − cos θ", columns=3)
     return figure
-
-
-def datasets(imbalance: Imbalance) -> dict[str, xr.Dataset]:
-    """Return both losses."""
-    dims = ["formulation", "tilt"]
-    table = name_variables(FORMULATIONS) | {
-        "tilt": numbers(["tilt"], TILTS, "tilt of the slave", "rad"),
-        "force": numbers(
-            dims, imbalance.force.values, "force lost between slave and master over the slave's force", "1"
-        ),
-        "moment": numbers(dims, imbalance.moment.values, "moment lost over the slave's force times its length", "1"),
-    }
-    return {"": xr.Dataset(table)}
 
 
 def _imbalance(formulation: PaperFormulation, theta: float) -> tuple[float, float]:
@@ -108,11 +93,9 @@ ITEM = Item(
     title="Defect 1: action is not reaction under tilt",
     compute=compute,
     statements=statements,
-    datasets=datasets,
     figures=(
         PaperFigure(
             "defect-tilt",
-            OURS,
             "(a) Force and (b) moment that are lost between slave and master when the slave is tilted.",
             plot,
         ),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import Annotated
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
+from contactverif_paper.paper_columns import Column
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_reports.netcdf import schema
 
 PAPER = DiskProblem()
 
@@ -27,16 +30,18 @@ PAPER = DiskProblem()
 class DiskSolution:
     """A solution of Example 2."""
 
-    formulation: PaperFormulation  # The formulation.
-    problem: DiskProblem  # What was solved.
-    converged: bool  # True if it is a solution.
-    iterations: int  # Linear systems solved, from the disk lowered to roundoff.
-    x: FloatArray  # (n_points,) The contact points from left to right: a length, and force per length.
-    pressure: FloatArray
-    half_width: float  # Half-width of the contact, where the gap changes its sign, a length; NaN if it does not.
+    formulation: PaperFormulation
+    problem: DiskProblem
+    # From the disk lowered to roundoff; −1 without a solution.
+    iterations: Annotated[int, Column("", "1", "linear systems")]
+    # The contact points from left to right.
+    x: Annotated[FloatArray, Column("point", schema.LENGTH, "x along the interface", fill=np.nan)]
+    pressure: Annotated[FloatArray, Column("point", schema.STRESS, "contact pressure", fill=np.nan)]
+    # Where the gap changes its sign; NaN if it does not.
+    half_width: Annotated[float, Column("", schema.LENGTH, "half-width of the contact")]
 
     @property
-    def peak(self) -> float:
+    def peak(self) -> Annotated[float, Column("", schema.STRESS, "largest contact pressure", name="largest")]:
         """The largest pressure."""
         return float(self.pressure.max())
 
@@ -50,18 +55,9 @@ class DiskSolution:
 def solve_disk(
     formulation: PaperFormulation, problem: DiskProblem = PAPER, refine: int = 1, lowered: float = 1.0
 ) -> DiskSolution:
-    """Solve Example 2.
+    """Solve Example 2, with each side of each cell divided into `refine` parts.
 
-    Parameters
-    ----------
-    formulation : PaperFormulation
-        The formulation.
-    problem : DiskProblem
-        Radius, materials, force, penalty, size of the foundation.
-    refine : int
-        Parts that each side of each cell of the base meshes is divided into.
-    lowered : float
-        Depth of the disk in the first guess, over what is about right.
+    `lowered` is the depth of the disk in the first guess, over what is about right.
     """
     scene = disk_scene(problem, refine)
     plugin = subject_of(formulation).for_case(scene.case())
@@ -73,8 +69,7 @@ def solve_disk(
     return DiskSolution(
         formulation=formulation,
         problem=problem,
-        converged=trace.converged,
-        iterations=trace.n_iterations,
+        iterations=trace.n_iterations if trace.converged else -1,
         x=x,
         pressure=pressure[order],
         half_width=_half_width(x, gap),

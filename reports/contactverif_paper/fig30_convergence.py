@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -25,21 +26,12 @@ from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.figure_style import (
-    REFERENCE_LINE,
-    TWO_COLUMNS,
-    add_legend,
-    line_style,
-    new_figure,
-    new_panels,
-    use_decades,
-)
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
-from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement
-from contactverif_paper.paper_tree import pad_rows
+from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_decades
+from contactverif_paper.paper_columns import WORDS, Column, Formulations, variables_of
+from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.variables import numbers, words
 
 FORMULATIONS = (formulations.VTS_ME, formulations.BASIC, formulations.VTS_PPT)
 YOUNG, PRESSURE = 1e4, 100.0
@@ -53,17 +45,23 @@ _ENERGY = 1e-15  # The paper's energy norm in Example 2; here it is taken over t
 _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the stopping rules that ask for more.
 
 
+def _steps(name: str, units: str, meaning: str) -> Column:
+    dims = {"residual": "residuals_step", "energy": "energies_step"}.get(name, f"{name}_step")
+    return Column(dims, units, meaning, "NaN: nothing there", np.nan, name=name)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
     """The way of Newton's method to a solution."""
 
-    formulation: PaperFormulation  # The formulation.
-    # (n_iterates,) The largest entry of the residual (a force) and |Δq · residual|, up to the solution.
-    residuals: FloatArray
-    energies: FloatArray
-    beyond: FloatArray  # (n_steps,) The residuals of further steps, which only roundoff stops.
-    floor: float  # What roundoff alone makes of the residual.
-    end: str  # How Newton's method ended.
+    formulation: PaperFormulation
+    # The first two, (n_iterates,), go up to the solution.
+    residuals: Annotated[FloatArray, _steps("residual", schema.FORCE, "largest entry of the residual")]
+    energies: Annotated[FloatArray, _steps("energy", "N m", "energy of a Newton step")]  # |Δq · residual|
+    # Only roundoff stops these steps.
+    beyond: Annotated[FloatArray, _steps("beyond", schema.FORCE, "largest entry of the residual in further steps")]
+    floor: Annotated[float, Column("", schema.FORCE, "what roundoff alone makes of the residual")]
+    end: Annotated[str, Column("", WORDS, "end of Newton")]
 
     @property
     def n_iterations(self) -> int:
@@ -71,7 +69,7 @@ class History:
         return len(self.residuals) - 1
 
     @property
-    def rate(self) -> float:
+    def rate(self) -> Annotated[float, Column("", "1", "ratio of residuals, late", fill=np.nan)]:
         """The mean ratio of residuals in the last five steps well above roundoff; NaN if there are fewer."""
         return late_rate(self.residuals, self.floor)
 
@@ -99,8 +97,20 @@ class Convergence:
     """Residual histories, and the linear rate of the basic version over the penalty."""
 
     histories: tuple[tuple[History, ...], ...]  # A row for each of `RATIOS`, a history for each of `FORMULATIONS`.
-    radius: FloatArray  # (n_penalties,) Spectral radius of I − K_basic⁻¹ K_consistent at the solution.
-    rate: FloatArray  # (n_penalties,) Ratio of successive residuals that Newton's method shows.
+    radius: Annotated[FloatArray, Column("penalty", "1", "spectral radius of I − K_basic⁻¹ K_consistent")]
+    # The ratio of successive residuals that Newton's method shows.
+    rate: Annotated[FloatArray, Column("penalty", "1", "rate of the basic version", fill=np.nan, name="basic_rate")]
+    formulations: Formulations = FORMULATIONS
+    ratio: Annotated[tuple[float, ...], Column("ratio", "1", "E of the master over E of the slave")] = RATIOS
+    rule: Annotated[tuple[str, ...], Column("rule", WORDS, "Newton's method stops when")] = tuple(RULES)
+    stiffness: Annotated[tuple[float, ...], Column("penalty", "m-1", "penalty over E")] = STIFFNESS
+
+    @property
+    def iterations(
+        self,
+    ) -> Annotated[IntArray, Column("rule ratio formulation", "1", "linear systems solved; −1: never")]:
+        """The numbers of linear systems by stopping rule."""
+        return np.stack([self.counts(row) for row in FORMULATIONS], axis=-1)
 
     def counts(self, formulation: PaperFormulation) -> IntArray:
         """Return the iterations (n_rules, n_ratios) of a formulation."""
@@ -225,21 +235,20 @@ def tables(convergence: Convergence) -> tuple[PageTable, ...]:
     heads = [f"{row.legend}, {material}" for row in FORMULATIONS for material in MATERIALS]
     columns = np.hstack([convergence.counts(row) for row in FORMULATIONS])
     return (
-        PageTable(
+        PageTable.of_numbers(
             "Fig. 30: linear systems solved, by stopping rule",
             ("Newton’s method stops when", *heads),
-            tuple(
-                (Cell((rule,)), *(Cell((str(count) if count >= 0 else "never",), tone="n") for count in row))
+            [
+                (rule, *(str(count) if count >= 0 else "never" for count in row))
                 for rule, row in zip(RULES, columns.tolist(), strict=True)
-            ),
+            ],
         ),
     )
 
 
 def plot(convergence: Convergence) -> Figure:
     """Draw both histories on the paper's axes, and the rate over the penalty."""
-    figure = new_figure(TWO_COLUMNS, 4.0)
-    panels = new_panels(figure, 3)
+    figure, panels = new_panels(4.0, 3)
     for axes, histories, material in zip(panels, convergence.histories, ("equal E", "master E/2"), strict=False):
         for history in histories:
             _plot_history(axes, history)
@@ -270,37 +279,8 @@ def _plot_history(axes: Axes, history: History) -> None:
 
 def datasets(convergence: Convergence) -> dict[str, xr.Dataset]:
     """Return histories, rates and counts."""
-    rows = [history for histories in convergence.histories for history in histories]
-    shape = len(RATIOS), len(FORMULATIONS)
-    dims = ["ratio", "formulation"]
-
-    def history_variable(name: str, meaning: str, units: str) -> xr.Variable:
-        values = pad_rows([getattr(row, name) for row in rows]).reshape(*shape, -1)
-        return numbers([*dims, f"{name}_step"], values, meaning, units, "NaN: nothing there", fill=np.nan)
-
-    counts = np.stack([convergence.counts(row) for row in FORMULATIONS], axis=-1)  # (n_rules, n_ratios, n_formulations)
-    table = name_variables(FORMULATIONS) | {
-        "ratio": numbers(["ratio"], RATIOS, "E of the master over E of the slave", "1"),
-        "rule": words(["rule"], list(RULES), "Newton's method stops when"),
-        "iterations": numbers(["rule", *dims], counts.astype(np.int32), "linear systems solved; −1: never", "1"),
-        "residual": history_variable("residuals", "largest entry of the residual", schema.FORCE),
-        "energy": history_variable("energies", "energy of a Newton step", "N m"),
-        "beyond": history_variable("beyond", "largest entry of the residual in further steps", schema.FORCE),
-        "floor": numbers(
-            dims,
-            np.reshape([row.floor for row in rows], shape),
-            "what roundoff alone makes of the residual",
-            schema.FORCE,
-        ),
-        "rate": numbers(
-            dims, np.reshape([row.rate for row in rows], shape), "ratio of residuals, late", "1", fill=np.nan
-        ),
-        "end": words(dims, [[h.end for h in histories] for histories in convergence.histories], "end of Newton"),
-        "stiffness": numbers(["penalty"], STIFFNESS, "penalty over E", "m-1"),
-        "radius": numbers(["penalty"], convergence.radius, "spectral radius of I − K_basic⁻¹ K_consistent", "1"),
-        "basic_rate": numbers(["penalty"], convergence.rate, "rate of the basic version", "1", fill=np.nan),
-    }
-    return {"": xr.Dataset(table, attrs={"figure": "Fig. 30", "scene": "c"})}
+    variables = variables_of(convergence) | variables_of(convergence.histories, "ratio formulation")
+    return {"": xr.Dataset(variables, attrs={"figure": "Fig. 30", "scene": "c"})}
 
 
 ITEM = Item(
@@ -312,7 +292,6 @@ ITEM = Item(
     figures=(
         PaperFigure(
             "fig30",
-            "Fig. 30",
             "Case C: (a, b) residual against iterations on the paper’s axes; grey is the residual’s own roundoff, "
             "where we stop; (c) ours: the linear rate of the basic version over the penalty, and the spectral radius "
             "of I − K_basic⁻¹ K_consistent.",

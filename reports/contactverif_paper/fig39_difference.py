@@ -9,7 +9,7 @@ Source: Zavarise & De Lorenzis (2009), Section 7.2, Fig. 39.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -18,11 +18,11 @@ from matplotlib.lines import Line2D
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.disk_solutions import difference, solve_disk
-from contactverif_paper.figure_style import REFERENCE_LINE, TWO_COLUMNS, new_figure, new_panels, use_round_ticks
+from contactverif_paper.figure_style import REFERENCE_LINE, new_panels, use_round_ticks
+from contactverif_paper.paper_columns import Column, to_dataset
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.variables import numbers
 
 REFINE = (1, 2)
 MESHES = ("our base meshes", "meshes twice as fine")
@@ -32,10 +32,12 @@ _STYLES: tuple[dict[str, Any], ...] = ({"color": "0.45", "linestyle": "--"}, {"c
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Difference:
-    """The difference of the pressures on one mesh: `values` (n_points,), a force per length, at `x` (n_points,)."""
+    """The difference of the pressures on one mesh."""
 
-    x: FloatArray
-    values: FloatArray
+    x: Annotated[FloatArray, Column("place", schema.LENGTH, "x along the interface", name="difference_x")]
+    values: Annotated[
+        FloatArray, Column("place", schema.STRESS, "VTS-PPT minus VTS-ME in contact pressure", name="difference")
+    ]
 
     @property
     def inside(self) -> bool:
@@ -61,7 +63,7 @@ def compute(report_progress: Progress) -> tuple[Difference, ...]:
 def statements(differences: tuple[Difference, ...]) -> tuple[Statement, ...]:
     """Say on which meshes the difference fits the printed axis."""
     inside = [row.inside for row in differences]
-    agreement = Agreement.CONDITIONAL if any(inside) and not all(inside) else Agreement.decide(all(inside))
+    agreement = Agreement.decide(any(inside), always=all(inside))
     fitting = " or ".join(mesh for mesh, fits in zip(MESHES, inside, strict=True) if fits)
     return (
         Statement(
@@ -77,8 +79,7 @@ def statements(differences: tuple[Difference, ...]) -> tuple[Statement, ...]:
 
 def plot(differences: tuple[Difference, ...]) -> Figure:
     """Draw both differences on the paper's axes, and on axes that hold both."""
-    figure = new_figure(TWO_COLUMNS, 3.6)
-    printed, whole = new_panels(figure, 2)
+    figure, (printed, whole) = new_panels(3.6, 2)
     for axes in (printed, whole):
         axes.axhline(0.0, **REFERENCE_LINE)
         for row, style in zip(differences, _STYLES, strict=True):
@@ -97,16 +98,8 @@ def plot(differences: tuple[Difference, ...]) -> Figure:
 
 def datasets(differences: tuple[Difference, ...]) -> dict[str, xr.Dataset]:
     """Return the differences, a group for each mesh."""
-    return {
-        group: xr.Dataset(
-            {
-                "difference_x": numbers(["place"], row.x, "x along the interface", schema.LENGTH),
-                "difference": numbers(["place"], row.values, "VTS-PPT minus VTS-ME in contact pressure", schema.STRESS),
-            },
-            attrs={"figure": "Fig. 39", "comment": mesh},
-        )
-        for group, mesh, row in zip(("base", "fine"), MESHES, differences, strict=True)
-    }
+    groups = zip(("base", "fine"), MESHES, differences, strict=True)
+    return {group: to_dataset(row, figure="Fig. 39", comment=mesh) for group, mesh, row in groups}
 
 
 ITEM = Item(
@@ -118,7 +111,6 @@ ITEM = Item(
     figures=(
         PaperFigure(
             "fig39",
-            "Fig. 39",
             "Example 2: the pressure of VTS-PPT minus that of VTS-ME, (a) on the paper’s axes, which the curve of the "
             "base meshes leaves, (b) on axes that hold both.",
             plot,

@@ -24,7 +24,7 @@ from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import PaperFigure
 from contactverif_reports.draw.scene_curves import choose_pen
 
-ONE_COLUMN, TWO_COLUMNS = 4.2, 7.2  # Widths of a figure in inches.
+WIDTH = 7.2  # The width of a figure in inches: two columns of a journal.
 LETTERS = 11  # Points: 5.5 at half size.
 REFERENCE_LINE: dict[str, Any] = {"color": "0.75", "linewidth": 2.6, "zorder": 1}  # The style of an exact answer.
 _STYLE: dict[Any, Any] = {
@@ -71,18 +71,19 @@ def render_figure(figure: PaperFigure, data: Any) -> Figure:
         return figure.plot(data)
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of that size in inches."""
-    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05))
+def new_figure(height: float) -> Figure:
+    """Return an empty figure of that height in inches."""
+    return Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05))
 
 
-def new_panels(figure: Figure, count: int, **options: Any) -> list[Axes]:
-    """Return `count` panels side by side, with a letter each if there are several."""
+def new_panels(height: float, count: int, **options: Any) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its `count` panels side by side, with a letter each if there are several."""
+    figure = new_figure(height)
     panels = list(figure.subplots(1, count, squeeze=False, **options)[0])
     if count > 1:
         for axes, letter in zip(panels, "abcdef", strict=False):
             axes.set_title(f"({letter})", loc="left", fontweight="bold")
-    return panels
+    return figure, panels
 
 
 def line_style(formulation: PaperFormulation, n_points: int, **more: Any) -> dict[str, Any]:

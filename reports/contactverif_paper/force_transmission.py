@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -21,10 +22,10 @@ from contactverif.contract.case import Case
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_columns import Column, name_columns, variables_of
+from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
 from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.variables import numbers
 
 FORMULATIONS = (
     formulations.NTS,
@@ -37,19 +38,34 @@ FORMULATIONS = (
 )
 EXACT = PaperFormulation("exact", "")
 _LARGEST_DENOMINATOR = 60
+Fractions = tuple[Fraction, ...]
 _ROUNDINGS = 256  # A force is the sum of a few dozen terms.
+
+
+def _fraction_columns(name: str, dim: str, meaning: str) -> tuple[Column, Column]:
+    comment = "0 over 0: nothing there"
+    parts = (("numerator", schema.LENGTH), ("denominator", "1"))
+    numerator, denominator = (
+        Column(dim, unit, f"force {meaning}: {part}", comment, part=part, name=f"{name}_{part}", pad=0)
+        for part, unit in parts
+    )
+    return numerator, denominator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """The nodal forces of a uniform pressure p = 1, in rationals; forces per unit of thickness over p."""
+    """The nodal forces of a uniform pressure p = 1, in rationals, from left to right; forces per thickness over p."""
 
-    formulation: PaperFormulation  # Who transmits them.
-    slave: tuple[Fraction, ...]  # On the nodes from left to right, as they are transferred to the other surface.
-    master: tuple[Fraction, ...]
-    points: tuple[Fraction, ...] = ()  # At the virtual slave nodes; empty if the formulation has none.
-    rounding: float = 0.0  # The largest difference of a computed float from its rational.
-    printed: tuple[Fraction, ...] = ()  # What the paper prints for the master; empty where it is silent.
+    formulation: Annotated[PaperFormulation, name_columns("")]
+    slave: Annotated[Fractions, _fraction_columns("slave", "slave_node", "transferred by the slave's nodes")]
+    master: Annotated[Fractions, _fraction_columns("master", "master_node", "transferred by the master's nodes")]
+    # Empty if the formulation has no virtual slave nodes.
+    points: Annotated[Fractions, _fraction_columns("points", "point", "on the virtual slave nodes")] = ()
+    rounding: Annotated[float, Column("", schema.LENGTH, "largest difference of a force from its rational")] = 0.0
+    # Empty where the paper is silent.
+    printed: Annotated[
+        Fractions, _fraction_columns("printed", "master_node", "on the master's nodes as the paper prints it")
+    ] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +74,10 @@ class ForceTable:
 
     case: str
     title: str
-    slave: tuple[float, ...]
-    master: tuple[float, ...]
+    slave_length: Annotated[tuple[float, ...], Column("slave_segment", schema.LENGTH, "length of the slave's segments")]
+    master_length: Annotated[
+        tuple[float, ...], Column("master_segment", schema.LENGTH, "length of the master's segments")
+    ]
     exact: Forces
     rows: tuple[Forces, ...]
 
@@ -73,10 +91,6 @@ class ForceTable:
         """The largest rounding of all rows."""
         return max(row.rounding for row in self.rows)
 
-    def row(self, formulation: PaperFormulation) -> Forces:
-        """Return the row of a formulation."""
-        return next(row for row in self.rows if row.formulation == formulation)
-
 
 def force_table(name: str, title: str, exact: str, printed: Mapping[PaperFormulation, str]) -> ForceTable:
     """Compute the table of one case."""
@@ -87,15 +101,9 @@ def force_table(name: str, title: str, exact: str, printed: Mapping[PaperFormula
     from_left = np.argsort(along[:n_slave]), n_slave + np.argsort(along[n_slave:])
     exact_slave, exact_master = (tuple(weights[node] for node in side.tolist()) for side in from_left)
     rows = [_forces(case, row, *from_left, _fractions(printed.get(row, ""))) for row in FORMULATIONS]
-    lengths = [tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:])]
-    return ForceTable(
-        name,
-        title,
-        lengths[0],
-        lengths[1],
-        Forces(EXACT, exact_slave, exact_master, printed=_fractions(exact)),
-        tuple(rows),
-    )
+    slave, master = (tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:]))
+    consistent = Forces(EXACT, exact_slave, exact_master, printed=_fractions(exact))
+    return ForceTable(name, title, slave, master, consistent, tuple(rows))
 
 
 def force_statement(table: ForceTable, place: str, claim: str) -> Statement:
@@ -111,7 +119,7 @@ def force_statement(table: ForceTable, place: str, claim: str) -> Statement:
     return Statement(place, f"{table.title}: {claim}", result, Agreement.decide(not wrong))
 
 
-def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple[Fraction, ...], float]:
+def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[Fractions, float]:
     """Return the rationals that the floats are roundings of, and the largest difference."""
     floats = [float(value) for value in values]
     nearest = tuple(Fraction(value).limit_denominator(_LARGEST_DENOMINATOR) for value in floats)
@@ -123,7 +131,7 @@ def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[tuple
 
 def force_page_table(table: ForceTable) -> PageTable:
     """Return the table of the page; consistent forces are bold."""
-    slave, master = (", ".join(f"{length:g}" for length in side) for side in (table.slave, table.master))
+    slave, master = (", ".join(f"{length:g}" for length in side) for side in (table.slave_length, table.master_length))
     return PageTable(
         f"{table.title}: nodal forces over p from left to right; slave segments {slave}; master segments {master}. "
         f"Bold: the consistent forces. Largest rounding: {table.rounding:.1e}",
@@ -143,30 +151,12 @@ def force_page_table(table: ForceTable) -> PageTable:
 
 def force_dataset(table: ForceTable, figure: str) -> xr.Dataset:
     """Return the fractions as numerators and denominators (formulation, node)."""
-    variables = name_variables(row.formulation for row in table.all_rows)
-    for name, dim, meaning in (
-        ("slave", "slave_node", "transferred by the slave's nodes"),
-        ("master", "master_node", "transferred by the master's nodes"),
-        ("points", "point", "on the virtual slave nodes"),
-        ("printed", "master_node", "on the master's nodes as the paper prints it"),
-    ):
-        rows = [getattr(row, name) for row in table.all_rows]
-        variables |= _fraction_variables(name, ["formulation", dim], rows, meaning)
-    for side in ("slave", "master"):
-        variables[f"{side}_length"] = numbers(
-            [f"{side}_segment"], getattr(table, side), f"length of the {side}'s segments", schema.LENGTH
-        )
-    rounding = [row.rounding for row in table.all_rows]
-    variables["rounding"] = numbers(
-        ["formulation"], rounding, "largest difference of a force from its rational", schema.LENGTH
-    )
     comment = "forces of a uniform pressure p = 1, over p, in rationals; the first row is exact; from left to right"
+    variables = variables_of(table.all_rows, "formulation") | variables_of(table)
     return xr.Dataset(variables, attrs={"figure": figure, "comment": comment})
 
 
-def _forces(
-    case: Case, formulation: PaperFormulation, slave: IntArray, master: IntArray, printed: tuple[Fraction, ...]
-) -> Forces:
+def _forces(case: Case, formulation: PaperFormulation, slave: IntArray, master: IntArray, printed: Fractions) -> Forces:
     plugin = subject_of(formulation).with_penalty(case.penalty)  # NTS gets it too: ε |g| = 1 at each node.
     pairing = plugin.pair(case.interface, case.z)
     forces = -plugin.residual(case.interface, pairing, case.z).reshape(-1, 2)  # They push the slave upwards.
@@ -182,7 +172,7 @@ def _forces(
     return Forces(formulation, on_slave, on_master, on_points, rounding, printed)
 
 
-def _fractions(text: str) -> tuple[Fraction, ...]:
+def _fractions(text: str) -> Fractions:
     return tuple(Fraction(word) for word in text.split())
 
 
@@ -195,17 +185,3 @@ def _printed_cell(row: Forces) -> Cell:
         return Cell(("–",), tone="row")
     same = row.printed == row.master
     return Cell((*map(str, row.printed), "✓ same" if same else "✗ differs"), tone=f"row {'good' if same else 'bad'}")
-
-
-def _fraction_variables(
-    name: str, dims: Sequence[str], rows: Sequence[tuple[Fraction, ...]], meaning: str
-) -> dict[str, xr.Variable]:
-    """Return numerators and denominators, 0 / 0 where there is nothing."""
-    parts = np.zeros((2, len(rows), max(map(len, rows))), dtype=np.int32)
-    for place, row in enumerate(rows):
-        parts[:, place, : len(row)] = [[x.numerator for x in row], [x.denominator for x in row]]
-    comment = "0 over 0: nothing there"
-    return {
-        f"{name}_numerator": numbers(dims, parts[0], f"force {meaning}: numerator", schema.LENGTH, comment),
-        f"{name}_denominator": numbers(dims, parts[1], f"force {meaning}: denominator", "1", comment),
-    }

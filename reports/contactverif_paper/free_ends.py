@@ -9,8 +9,10 @@ Source: Zavarise & De Lorenzis (2009), Boxes 2 and 3.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated
+
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.mechanics import newton
@@ -18,10 +20,10 @@ from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.figure_style import TWO_COLUMNS, Series, add_legend, new_figure, new_panels, plot_logarithmic
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
-from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_reports.netcdf.variables import numbers
+from contactverif_paper.figure_style import Series, add_legend, new_panels, plot_logarithmic
+from contactverif_paper.paper_columns import Formulations, axis_column, values_column
+from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 
 FORMULATIONS = (
     formulations.NTS_AR,
@@ -36,11 +38,25 @@ _YOUNG, _POISSON, _PRESSURE = 1e4, 0.3, 100.0
 _SEGMENT = 2.0  # The length of a slave segment.
 
 
-def compute(report_progress: Progress) -> Series:
-    """Compute the largest error of a stress over the pressure, over the part of a slave segment that overhangs."""
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeEnds:
+    """The error of the stress over the part of a slave segment that overhangs."""
+
+    stress_error: Annotated[
+        Series,
+        (
+            axis_column("overhang", "1", "part of a slave segment that overhangs"),
+            values_column("overhang", "1", "largest error of a stress over the pressure", fill=np.nan),
+        ),
+    ]
+    formulations: Formulations = FORMULATIONS
+
+
+def compute(report_progress: Progress) -> FreeEnds:
+    """Solve with all formulations and overhangs."""
     report_progress("free ends")
     errors = np.array([[_error(formulation, part) for part in OVERHANGS] for formulation in FORMULATIONS])
-    return Series(FORMULATIONS, OVERHANGS, errors)
+    return FreeEnds(Series(FORMULATIONS, OVERHANGS, errors))
 
 
 def overhanging(part: float) -> Scene:
@@ -72,10 +88,10 @@ def overhanging(part: float) -> Scene:
     return Scene((upper, lower), penalty=penalty, facts=facts)
 
 
-def statements(series: Series) -> tuple[Statement, ...]:
+def statements(result: FreeEnds) -> tuple[Statement, ...]:
     """Say what our reading leads to."""
-    largest = float(np.nanmax(series.row(formulations.VTS_PPT)))
-    balanced = float(np.nanmax(series.row(formulations.BALANCED)))
+    largest = float(np.nanmax(result.stress_error.row(formulations.VTS_PPT)))
+    balanced = float(np.nanmax(result.stress_error.row(formulations.BALANCED)))
     return (
         Statement(
             "Boxes 2, 3",
@@ -89,26 +105,14 @@ def statements(series: Series) -> tuple[Statement, ...]:
     )
 
 
-def plot(series: Series) -> Figure:
+def plot(result: FreeEnds) -> Figure:
     """Draw the errors over the overhang."""
-    figure = new_figure(TWO_COLUMNS, 3.8)
-    (axes,) = new_panels(figure, 1)
-    plot_logarithmic(axes, series)
+    figure, (axes,) = new_panels(3.8, 1)
+    plot_logarithmic(axes, result.stress_error)
     axes.set_xlabel("part of a slave segment that overhangs the master (–)")
     axes.set_ylabel("largest error of the stress / p (–)")
     add_legend(figure, FORMULATIONS, columns=3)
     return figure
-
-
-def datasets(series: Series) -> dict[str, xr.Dataset]:
-    """Return the errors."""
-    table = name_variables(FORMULATIONS) | {
-        "overhang": numbers(["overhang"], OVERHANGS, "part of a slave segment that overhangs", "1"),
-        "stress_error": numbers(
-            ["formulation", "overhang"], series.values, "largest error of a stress over the pressure", "1", fill=np.nan
-        ),
-    }
-    return {"": xr.Dataset(table)}
 
 
 def _error(formulation: PaperFormulation, part: float) -> float:
@@ -123,11 +127,9 @@ ITEM = Item(
     title="Free ends of the master: the paper is silent",
     compute=compute,
     statements=statements,
-    datasets=datasets,
     figures=(
         PaperFigure(
             "free-ends",
-            OURS,
             "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. Half a "
             "segment is an area of competence: nothing is cut there.",
             plot,

@@ -9,22 +9,19 @@ Source: Zavarise & De Lorenzis (2009), Section 6.3.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Property
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
-from contactverif_paper.figure_style import TWO_COLUMNS, add_legend, line_style, new_figure, new_panels, use_decades
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
-from contactverif_paper.paper_item import OURS, Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement
+from contactverif_paper.figure_style import add_legend, line_style, new_panels, use_decades
+from contactverif_paper.paper_columns import WORDS, Column, Formulations
+from contactverif_paper.paper_formulations import PaperFormulation, measure
+from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers, words
 
 VTS_PPT = PaperFormulation("VTS-PPT", "vts-ppt-lm", 0)
 ONE_POINT = PaperFormulation("VTS-PPT, n = 1", "vts-ppt-lm:n=1", 4)
@@ -41,10 +38,18 @@ _SERIES = ("inf-sup constant", "slave segment", "zero eigenvalues", "multipliers
 class Constants:
     """The inf-sup constants."""
 
-    beta: FloatArray  # (n_formulations, n_families, n_meshes) The smallest β that is not 0, dimensionless.
-    segments: FloatArray  # (n_families, n_meshes) The slave segments h, a length each.
-    zeros: FloatArray  # (n_formulations, n_families) The share of pressures that move nothing, on the finest mesh.
-    slopes: FloatArray  # (n_formulations, n_families) The slope of log β against log h between the two finest meshes.
+    beta: Annotated[
+        FloatArray, Column("formulation family mesh", "1", "smallest inf-sup constant that is not 0", name="constant")
+    ]
+    segments: Annotated[FloatArray, Column("family mesh", "length", "slave segment h", name="segment")]
+    zeros: Annotated[FloatArray, Column("formulation family", "1", "share of pressures that move nothing, finest mesh")]
+    slopes: Annotated[
+        FloatArray, Column("formulation family", "1", "slope of log β against log h, two finest meshes", name="slope")
+    ]
+    formulations: Formulations = FORMULATIONS
+    families: Annotated[tuple[str, ...], Column("family", WORDS, "slave against master", name="family")] = tuple(
+        FAMILIES
+    )
 
     def stable(self, formulation: PaperFormulation) -> bool:
         """Return whether β does not fall, and every pressure moves something, on all families."""
@@ -55,18 +60,16 @@ class Constants:
 def compute(report_progress: Progress) -> Constants:
     """Compute the constants of all formulations and families."""
     report_progress("Section 6.3, inf-sup constants")
-    (question,) = load_properties(["stability.inf-sup"])
-    assert isinstance(question, Property)
     table = np.array(
-        [[_series(question, case, formulation) for case in refinement_cases()] for formulation in FORMULATIONS]
+        [[_series(case, formulation) for case in refinement_cases()] for formulation in FORMULATIONS]
     )  # (n_formulations, n_families, 4, n_meshes)
     beta, segments = table[:, :, 0], table[0, :, 1]
     slopes = np.diff(np.log(beta[..., -2:]))[..., 0] / np.diff(np.log(segments[:, -2:]))[:, 0]
     return Constants(beta, segments, table[:, :, 2, -1] / table[:, :, 3, -1], slopes)
 
 
-def _series(question: Property, case: Case, formulation: PaperFormulation) -> list[FloatArray]:
-    measurement = judge_case(question, case, subject_of(formulation)).measurement
+def _series(case: Case, formulation: PaperFormulation) -> list[FloatArray]:
+    measurement = measure("stability.inf-sup", case, formulation)
     assert measurement is not None
     return [measurement.series[name] for name in _SERIES]
 
@@ -96,8 +99,7 @@ def statements(constants: Constants) -> tuple[Statement, ...]:
 
 def plot(constants: Constants) -> Figure:
     """Draw β over h, a panel a family."""
-    figure = new_figure(TWO_COLUMNS, 3.6)
-    panels = new_panels(figure, len(FAMILIES), sharey=True)
+    figure, panels = new_panels(3.6, len(FAMILIES), sharey=True)
     for column, (axes, name) in enumerate(zip(panels, FAMILIES, strict=True)):
         for row, formulation in enumerate(FORMULATIONS):
             full = {} if constants.zeros[row, column] == 0 else {"alpha": 0.35}
@@ -127,34 +129,15 @@ def tables(constants: Constants) -> tuple[PageTable, ...]:
     return (PageTable(f"{caption} nothing", ("Formulation", *FAMILIES), tuple(rows)),)
 
 
-def datasets(constants: Constants) -> dict[str, xr.Dataset]:
-    """Return constants, segments and zero eigenvalues."""
-    table = name_variables(FORMULATIONS) | {
-        "family": words(["family"], list(FAMILIES), "slave against master"),
-        "segment": numbers(["family", "mesh"], constants.segments, "slave segment h", "length"),
-        "constant": numbers(
-            ["formulation", "family", "mesh"], constants.beta, "smallest inf-sup constant that is not 0", "1"
-        ),
-        "zeros": numbers(
-            ["formulation", "family"], constants.zeros, "share of pressures that move nothing, finest mesh", "1"
-        ),
-        "slope": numbers(
-            ["formulation", "family"], constants.slopes, "slope of log β against log h, two finest meshes", "1"
-        ),
-    }
-    return {"": xr.Dataset(table, attrs={"n_meshes": N_MESHES})}
-
-
 ITEM = Item(
     name="inf_sup_condition",
     title="Section 6.3: the inf-sup condition",
     compute=compute,
     statements=statements,
-    datasets=datasets,
+    attributes={"n_meshes": N_MESHES},
     figures=(
         PaperFigure(
             "inf-sup",
-            OURS,
             "The inf-sup constant on five meshes, (a) with a slave that is coarser than the master, (b) with a finer "
             "one, and (c) with nodes on nodes. Pale: some pressures move nothing, and are left out.",
             plot,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -21,10 +22,11 @@ from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
+from contactverif_paper.paper_columns import WORDS, Column, variables_of
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
+from contactverif_paper.patch_solutions import PRINTED_COLUMN
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import codes, numbers, words
 
 NTS = PaperFormulation("NTS", "nts-lm")
 TWO_PASS = PaperFormulation("two-pass NTS", "two-pass/nts-lm")
@@ -56,16 +58,16 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # 1: the paper says t
 class MultiplierTest:
     """A patch test with Lagrange multipliers."""
 
-    formulation: PaperFormulation  # The formulation.
-    scene: str  # One of `SCENES`.
-    end: str  # How Newton's method ended.
-    error: float  # Error of the stress over the pressure; NaN without a solution.
-    tolerance: float  # What roundoff explains.
-    # Range of the pressures λ (a nodal method: λ over the length that the node stands for) over the exact one.
-    low: float
-    high: float
-    deficiency: int  # Number of vanishing singular values of the last matrix.
-    printed: int = -1  # What the paper says of the stress: 1 passes, 0 fails, −1 silent.
+    formulation: Annotated[PaperFormulation, Column("", WORDS, "formulation, as on the command line", part="name")]
+    scene: Annotated[str, Column("", WORDS, "scene")]  # One of `SCENES`.
+    end: Annotated[str, Column("", WORDS, "how Newton's method ended")]
+    error: Annotated[float, Column("", "1", "largest error of a stress over p", fill=np.nan, name="stress_error")]
+    tolerance: Annotated[float, Column("", "1", "what roundoff explains")]
+    # A multiplier is a pressure; that of a nodal method is divided by the length that the node stands for.
+    low: Annotated[float, Column("", "1", "smallest multiplier, as a pressure over p")]
+    high: Annotated[float, Column("", "1", "largest multiplier, as a pressure over p")]
+    deficiency: Annotated[int, Column("", "1", "multipliers that are not unique")]  # Vanishing singular values.
+    printed: Annotated[int, PRINTED_COLUMN] = -1
 
     @property
     def passes(self) -> bool:
@@ -195,29 +197,7 @@ def _cell(test: MultiplierTest) -> Cell:
 
 def datasets(tests: Sequence[MultiplierTest]) -> dict[str, xr.Dataset]:
     """Return a row for each test."""
-    dims = ["row"]
-    deficiency = np.array([test.deficiency for test in tests], np.int32)
-    table = {
-        "formulation": words(dims, [test.formulation.name for test in tests], "formulation, as on the command line"),
-        "scene": words(dims, [test.scene for test in tests], "scene"),
-        "end": words(dims, [test.end for test in tests], "how Newton's method ended"),
-        "stress_error": numbers(
-            dims, [test.error for test in tests], "largest error of a stress over p", "1", fill=np.nan
-        ),
-        "tolerance": numbers(dims, [test.tolerance for test in tests], "what roundoff explains", "1"),
-        "low": numbers(dims, [test.low for test in tests], "smallest multiplier, as a pressure over p", "1"),
-        "high": numbers(dims, [test.high for test in tests], "largest multiplier, as a pressure over p", "1"),
-        "deficiency": numbers(dims, deficiency, "multipliers that are not unique", "1"),
-        "printed": codes(
-            dims,
-            [test.printed for test in tests],
-            {"fails": 0, "passes": 1},
-            "what the paper says",
-            "missing: nothing",
-            fill=-1,
-        ),
-    }
-    return {"": xr.Dataset(table, attrs={"comment": "patch tests with Lagrange multipliers"})}
+    return {"": xr.Dataset(variables_of(tests, "row"), attrs={"comment": "patch tests with Lagrange multipliers"})}
 
 
 def _test(formulation: PaperFormulation, name: str, scene: Scene) -> MultiplierTest:

@@ -9,13 +9,13 @@ Source: Zavarise & De Lorenzis (2009), Section 6.3.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.property import Property
 from contactverif.mechanics.newton import solve
 from contactverif.problems.wave_blocks import (
     COLUMNS,
@@ -26,13 +26,11 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.figure_style import TWO_COLUMNS, add_legend, line_style, new_figure, new_panels
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
-from contactverif_paper.paper_item import OURS, Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_reports.netcdf.variables import numbers
+from contactverif_paper.figure_style import add_legend, line_style, new_panels
+from contactverif_paper.paper_columns import Column, Formulations, to_dataset
+from contactverif_paper.paper_formulations import PaperFormulation, measure, subject_of
+from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 
 FORMULATIONS = (
     formulations.VTS_PPT,
@@ -49,40 +47,45 @@ AMPLITUDE = 0.8  # The wave of real contact over its mean pressure.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Real contact, which may open, at the highest penalty."""
+
+    x: Annotated[FloatArray, Column("point", "length", "place of the contact point")]
+    pressure: Annotated[FloatArray, Column("point", "1", "pressure over the mean load at ε̂ = 1e6 E/h")]
+    converged: bool  # At each penalty.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Locking:
     """Compliance and pressures."""
 
-    # (n_formulations, n_penalties) The loss of compliance since the softest penalty, and the range of pressures, over
-    # those of matching meshes.
-    drift: FloatArray
-    roughness: FloatArray
-    # (n_points,) For each of `WITH_PRESSURES`: x of the contact points, a length, and the pressure over its mean in
-    # real contact.
-    places: tuple[FloatArray, ...]
-    pressures: tuple[FloatArray, ...]
-    converged: bool  # Newton's method converged at each penalty of real contact.
+    # Since the softest penalty.
+    drift: Annotated[FloatArray, Column("formulation penalty", "1", "loss of compliance beside matching meshes")]
+    roughness: Annotated[
+        FloatArray, Column("formulation penalty", "1", "range of pressures over that of matching meshes")
+    ]
+    contacts: tuple[Contact, ...]  # For each of `WITH_PRESSURES`.
+    formulations: Formulations = FORMULATIONS
+    penalty: Annotated[tuple[float, ...], Column("penalty", "1", "penalty ε̂ h/E")] = tuple(PENALTIES)
 
 
 def compute(report_progress: Progress) -> Locking:
     """Solve two blocks at all penalties."""
     report_progress("Section 6.3, locking")
-    (question,) = load_properties(["stability.locking"])
-    assert isinstance(question, Property)
     cases = {case.name: case for case in wave_cases()}
     table = np.zeros((2, len(FORMULATIONS), len(PENALTIES)))
     for row, formulation in enumerate(FORMULATIONS):
         for column, penalty in enumerate(PENALTIES):
-            measurement = judge_case(question, cases[case_name(FINER, penalty)], subject_of(formulation)).measurement
+            measurement = measure("stability.locking", cases[case_name(FINER, penalty)], formulation)
             assert measurement is not None
             names = ("drift of the compliance", "roughness of the pressure")
             table[:, row, column] = [measurement.values[name] for name in names]
-    places, pressures, converged = zip(*map(_real_contact, WITH_PRESSURES), strict=True)
     drift, roughness = table
-    return Locking(drift, roughness, places, pressures, all(converged))
+    return Locking(drift, roughness, tuple(map(_real_contact, WITH_PRESSURES)))
 
 
-def _real_contact(formulation: PaperFormulation) -> tuple[FloatArray, FloatArray, bool]:
-    """Return places and pressures at the highest penalty, and whether Newton's method converged at all of them."""
+def _real_contact(formulation: PaperFormulation) -> Contact:
+    """Solve at rising penalties."""
     start, converged = None, True
     for penalty in STEPS.tolist():
         scene = wave_blocks(*REAL, penalty, wave=AMPLITUDE * MEAN_PRESSURE)
@@ -91,13 +94,13 @@ def _real_contact(formulation: PaperFormulation) -> tuple[FloatArray, FloatArray
         start, converged = trace.solution, converged and trace.converged
     points = plugin.contact_points(scene.interface, plugin.pair(scene.interface, trace.z), trace.z)
     order = np.argsort(points.position[:, 0])
-    return points.position[order, 0], points.pressure[order] / MEAN_PRESSURE, converged
+    return Contact(points.position[order, 0], points.pressure[order] / MEAN_PRESSURE, converged)
 
 
 def statements(result: Locking) -> tuple[Statement, ...]:
     """Say what happens at a high penalty."""
     drift = dict(zip(FORMULATIONS, result.drift[:, -1], strict=True))
-    rough, smooth = (f"{pressure.min():.2f} to {pressure.max():.1f}" for pressure in result.pressures)
+    rough, smooth = (f"{row.pressure.min():.2f} to {row.pressure.max():.1f}" for row in result.contacts)
     return (
         Statement(
             "Section 6.3",
@@ -115,14 +118,13 @@ def statements(result: Locking) -> tuple[Statement, ...]:
 
 def plot(result: Locking) -> Figure:
     """Draw the loss of compliance over the penalty, and pressures of real contact."""
-    figure = new_figure(TWO_COLUMNS, 3.8)
-    loss, pressure = new_panels(figure, 2)
+    figure, (loss, pressure) = new_panels(3.8, 2)
     for formulation, values in zip(FORMULATIONS, result.drift, strict=True):
         loss.semilogx(PENALTIES, 100 * values, **line_style(formulation, 1))
     loss.set_xlabel("penalty ε̂ h/E (–)")
     loss.set_ylabel("loss of compliance (%)")
-    for formulation, x, values in zip(WITH_PRESSURES, result.places, result.pressures, strict=True):
-        pressure.plot(x / LENGTH, values, **line_style(formulation, 1))
+    for formulation, contact in zip(WITH_PRESSURES, result.contacts, strict=True):
+        pressure.plot(contact.x / LENGTH, contact.pressure, **line_style(formulation, 1))
     pressure.set_xlabel("x / L (–)")
     pressure.set_ylabel("pressure / mean load (–)")
     add_legend(figure, FORMULATIONS, columns=3)
@@ -131,21 +133,8 @@ def plot(result: Locking) -> Figure:
 
 def datasets(result: Locking) -> dict[str, xr.Dataset]:
     """Return compliance, roughness, and the pressures of real contact."""
-    dims = ["formulation", "penalty"]
-    table = name_variables(FORMULATIONS) | {
-        "penalty": numbers(["penalty"], PENALTIES, "penalty ε̂ h/E", "1"),
-        "drift": numbers(dims, result.drift, "loss of compliance beside matching meshes", "1"),
-        "roughness": numbers(dims, result.roughness, "range of pressures over that of matching meshes", "1"),
-    }
-    groups = {"": xr.Dataset(table)}
-    for formulation, x, values in zip(WITH_PRESSURES, result.places, result.pressures, strict=True):
-        groups[formulation.name] = xr.Dataset(
-            {
-                "x": numbers(["point"], x, "place of the contact point", "length"),
-                "pressure": numbers(["point"], values, "pressure over the mean load at ε̂ = 1e6 E/h", "1"),
-            }
-        )
-    return groups
+    contacts = zip(WITH_PRESSURES, result.contacts, strict=True)
+    return {"": to_dataset(result)} | {row.name: to_dataset(contact) for row, contact in contacts}
 
 
 ITEM = Item(
@@ -157,7 +146,6 @@ ITEM = Item(
     figures=(
         PaperFigure(
             "locking-stiff",
-            OURS,
             f"(a) The compliance to a wave of pressure that an interface of {FINER[0]} on {FINER[1]} segments loses as "
             f"the penalty rises, beside matching meshes. (b) The pressures of {REAL[0]} on {REAL[1]} segments at "
             "1e6 E/h under 1 + 0.8 cos(2πx/L), in contact that may open.",

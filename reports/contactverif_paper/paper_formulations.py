@@ -6,17 +6,16 @@ A formulation has two names here: `legend`, which the paper's figures use, and `
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
-import xarray as xr
-
+from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Measurement, Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.run.registry import load_formulation
-from contactverif_reports.netcdf.variables import words
+from contactverif.run.judge import judge_case
+from contactverif.run.registry import load_formulation, load_properties
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +45,13 @@ REFERENCE_AREAS = PaperFormulation("VTS-ME, reference areas", "vts-me:area=refer
 VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
 
 
+def measure(property_id: str, case: Case, formulation: PaperFormulation) -> Measurement | None:
+    """Return what a property measures of a formulation on a case."""
+    (question,) = load_properties([property_id])
+    assert isinstance(question, Property)
+    return judge_case(question, case, subject_of(formulation)).measurement
+
+
 @cache
 def subject_of(formulation: PaperFormulation) -> Subject:
     """Load the formulation."""
@@ -53,12 +59,3 @@ def subject_of(formulation: PaperFormulation) -> Subject:
     if isinstance(loaded, NotLoaded):
         raise MisuseError("formulation", f"{formulation.name}, not loaded: {loaded.reason}", "one that loads")
     return loaded
-
-
-def name_variables(formulations: Iterable[PaperFormulation]) -> dict[str, xr.Variable]:
-    """Return the variables `formulation` and `legend` of a dataset with the dimension `formulation`."""
-    rows = list(formulations)
-    return {
-        "formulation": words(["formulation"], [row.name for row in rows], "formulation, as on the command line"),
-        "legend": words(["formulation"], [row.legend for row in rows], "its name in the paper's legends"),
-    }

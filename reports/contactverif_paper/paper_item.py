@@ -2,24 +2,25 @@
 
 Rules for the next editor:
 
-1. An item is one file. It computes its data, draws its figures, names its numbers for `paper.nc`, states its claims
+1. An item is one file. It computes its data, draws its figures, declares its numbers for `paper.nc`, states its claims
    and fills its tables. One line in `items.py` registers it.
-2. Everything else in this package (`paper_run`, `paper_tree`, `paper_page`, the template) works on any list of items
-   and names none of them.
+2. `paper_run`, `paper_columns`, `paper_page` and the template work on any list of items and name none of them.
 3. A statement sets side by side what the paper says and what was computed. Its verdict follows from numbers, never
    from the author's hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import xarray as xr
 from matplotlib.figure import Figure
+
+from contactverif_paper.paper_columns import WORDS, Column, to_dataset
 
 Progress = Callable[[str], None]  # The callback that reports what comes next, in a few words.
 OURS = "ours"  # The source of a figure that the paper does not have.
@@ -37,33 +38,27 @@ class Agreement(IntEnum):
     @property
     def words(self) -> str:
         """The verdict in words, for a table."""
-        return _WORDS[self]
+        return "under a condition" if self is Agreement.CONDITIONAL else self.name.lower()
 
     @classmethod
-    def decide(cls, agrees: bool) -> Agreement:
-        """Return AGREES or DIFFERS, for a statement that a number decides."""
-        return cls.AGREES if agrees else cls.DIFFERS
+    def decide(cls, holds: bool, *, always: bool = True) -> Agreement:
+        """Return AGREES or DIFFERS, or CONDITIONAL for what holds but not always."""
+        return cls.DIFFERS if not holds else cls.AGREES if always else cls.CONDITIONAL
 
 
-_WORDS: Mapping[Agreement, str] = {
-    Agreement.AGREES: "agrees",
-    Agreement.DIFFERS: "differs",
-    Agreement.SILENT: "silent",
-    Agreement.DEFECT: "defect",
-    Agreement.CONDITIONAL: "under a condition",
-}
+_MEANINGS = {agreement.words.replace(" ", "_"): int(agreement) for agreement in Agreement}
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
     """A statement of the paper, in our words, beside what was computed."""
 
-    place: str  # Where in the paper: a figure, a section, an equation.
-    claim: str  # What the paper says.
-    result: str  # What was computed.
-    agreement: Agreement  # The verdict.
-    figure: str = ""  # File name, without its suffix, of the figure that shows it; empty if none does.
-    condition: str = ""  # When the statement holds; empty unless the verdict is CONDITIONAL.
+    place: Annotated[str, Column("", WORDS, "where in the paper")]
+    claim: Annotated[str, Column("", WORDS, "what the paper says, in our words")]
+    result: Annotated[str, Column("", WORDS, "what was computed here")]
+    agreement: Annotated[Agreement, Column("", "1", "how claim and result compare", meanings=_MEANINGS)]
+    figure: Annotated[str, Column("", WORDS, "file name of the figure here; empty: none")] = ""  # Without its suffix.
+    condition: Annotated[str, Column("", WORDS, "when the statement holds; empty: always, or not at all")] = ""
 
     def __post_init__(self) -> None:
         if bool(self.condition) != (self.agreement is Agreement.CONDITIONAL):
@@ -92,15 +87,27 @@ class PageTable:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError(f"table {self.caption!r}: each row needs {len(self.columns)} cells")
 
+    @classmethod
+    def of_numbers(cls, caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> PageTable:
+        """Return a table whose rows have a head and, to its right, numbers."""
+        cells = tuple((Cell((head,)), *(Cell((text,), tone="n") for text in texts)) for head, *texts in rows)
+        return cls(caption, tuple(columns), cells)
+
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
     """A figure of the page, and how it is drawn from the data of its item."""
 
-    name: str  # File name without suffix.
-    source: str  # The paper's figure that it reproduces, or `OURS`.
-    caption: str  # What it shows, in whole sentences.
+    # "fig" and two digits for one of the paper's, else a figure of ours.
+    name: Annotated[str, Column("", WORDS, "file name, without its suffix")]
+    caption: Annotated[str, Column("", WORDS, "what it shows")]  # In whole sentences.
     plot: Callable[[Any], Figure]  # Draws it from the data that the item's `compute` returns.
+
+    @property
+    def source(self) -> Annotated[str, Column("", WORDS, "the paper's figure, or ours")]:
+        """The paper's figure that it reproduces, or `OURS`."""
+        number = self.name.removeprefix("fig")
+        return f"Fig. {int(number)}" if number.isdecimal() else OURS
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +118,10 @@ class Item:
     title: str  # The heading of its section on the page.
     compute: Callable[[Progress], Any]  # Computes its data and calls `Progress` `n_steps` times.
     statements: Callable[[Any], tuple[Statement, ...]]  # Compares the data with what the paper says.
-    # Returns its numbers: {group below its own: dataset}, with "" for its own group.
-    datasets: Callable[[Any], Mapping[str, xr.Dataset]]
+    # Returns its numbers: {group below its own: dataset}, with "" for its own group. The default is the columns of its
+    # data, with `attributes`.
+    datasets: Callable[[Any], Mapping[str, xr.Dataset]] | None = None
+    attributes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     figures: tuple[PaperFigure, ...] = ()  # Its figures, in order.
     tables: Callable[[Any], tuple[PageTable, ...]] = lambda _: ()  # Fills its tables.
     text: str = ""  # A paragraph under the heading.
@@ -120,6 +129,10 @@ class Item:
     choices: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     n_steps: int = 1  # The number of times that `compute` reports progress.
     slow: bool = False  # True if it takes long enough for the tests to skip it.
+
+    def groups(self, data: Any) -> Mapping[str, xr.Dataset]:
+        """Return its numbers by group."""
+        return self.datasets(data) if self.datasets else {"": to_dataset(data, **self.attributes)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

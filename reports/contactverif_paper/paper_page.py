@@ -1,4 +1,7 @@
-"""Writes the reproduction of the paper: one netCDF file, figures as SVG, one HTML page. This file names no item."""
+"""Writes the reproduction of the paper: one netCDF file, figures as SVG, one HTML page. This file names no item.
+
+In `paper.nc` each item has a group of its own name; style and units are those of a report (`reports/README.md`).
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,21 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib
+import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from contactverif_paper.figure_style import render_figure
-from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, Progress, Statement, sentence
-from contactverif_paper.paper_tree import REFERENCE, tree_of
+from contactverif_paper.paper_columns import variables_of
+from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, PaperFigure, Progress, Statement, sentence
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
+from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.write_tree import write_tree
 
+TITLE = "contactverif: the reference paper, computed again"
+REFERENCE = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
+_WORTH_COMPRESSING = 4096  # Bytes: the filter costs 2 kB for each variable.
 NUMBERS, PAGE = "paper.nc", "paper.html"
 MARKS: Mapping[Agreement, str] = {
     Agreement.AGREES: "✓",
@@ -62,6 +70,31 @@ def write(
     paths.append(folder / PAGE)
     write_page(paths[-1], page(paper, inlined), argument)
     return tuple(paths)
+
+
+def tree_of(paper: Paper) -> xr.DataTree:
+    """Return the groups of `paper.nc`: one for each item, one of all statements, one that lists the figures."""
+    root = {name: schema.text(value) for name, value in paper.provenance.items()}
+    root |= {"Conventions": schema.CONVENTIONS, "title": TITLE, "references": REFERENCE, "comment": schema.UNITS_NOTE}
+    statements = "the paper's statements beside what was computed"
+    figures = "the figures, in the order of the page"
+    groups = {
+        "/": xr.Dataset(attrs=root),
+        "/statements": xr.Dataset(
+            variables_of(paper.statements, "statement", kind=Statement), attrs={"comment": statements}
+        ),
+        "/figures": xr.Dataset(variables_of(paper.figures, "figure", kind=PaperFigure), attrs={"comment": figures}),
+    }
+    for result in paper.results:
+        for name, dataset in result.item.groups(result.data).items():
+            path = f"/{result.item.name}/{name}".rstrip("/")
+            if path in groups:
+                raise ValueError(f"{path}: two items have this group")
+            groups[path] = dataset
+    for variable in (variable for group in groups.values() for variable in group.variables.values()):
+        if variable.nbytes < _WORTH_COMPRESSING:
+            variable.encoding = {k: v for k, v in variable.encoding.items() if k not in ("zlib", "complevel")}
+    return xr.DataTree.from_dict(groups)
 
 
 def page(paper: Paper, figures: Mapping[str, Markup]) -> str:

@@ -6,20 +6,28 @@ Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1, with Figs. 9–12,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables
+from contactverif_paper.paper_columns import WORDS, Column, Formulations
+from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
-from contactverif_paper.patch_solutions import FAILS, moderate_error
+from contactverif_paper.patch_solutions import (
+    FAILS,
+    FAILURE,
+    PASSES,
+    PRINTED_COLUMN,
+    SILENT,
+    STRESS_ERROR,
+    moderate_error,
+)
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import codes, numbers, words
 
 FORMULATIONS = (
     formulations.NTS,
@@ -45,7 +53,6 @@ SCENES: Mapping[str, str] = {  # {scene: head of its column}
     "c-prime": "C′ (ours)",
     "example-1bis": "Example 1bis",
 }
-PASSES, FAILURE, SILENT = 1, 0, -1
 _NORMAL, _NON_MATCHING = ("a1", "a2-uniform", "a2-graded"), ("b", "c", "example-1", "example-1bis")
 PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says, by scene; else it is silent.
     formulations.NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
@@ -61,9 +68,24 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says
 class PassTable:
     """The largest error of a stress over the pressure, and what the paper says."""
 
-    errors: FloatArray  # (n_formulations, n_scenes) The errors; NaN where Newton's method ended at no solution.
-    tolerances: FloatArray  # (n_scenes,) What roundoff explains.
-    printed: IntArray  # (n_formulations, n_scenes) PASSES, FAILURE or SILENT.
+    errors: Annotated[
+        FloatArray,
+        Column(
+            "formulation scene",
+            "1",
+            STRESS_ERROR,
+            "NaN: Newton's method ended at no solution",
+            np.nan,
+            name="stress_error",
+        ),
+    ]
+    tolerances: Annotated[
+        FloatArray,
+        Column("scene", "1", "what roundoff explains: an error below it passes", CONDITION_TOLERANCE, name="tolerance"),
+    ]
+    printed: Annotated[IntArray, replace(PRINTED_COLUMN, dims="formulation scene")]
+    formulations: Formulations = FORMULATIONS
+    scene: Annotated[tuple[str, ...], Column("scene", WORDS, "scene, as on the command line")] = tuple(SCENES)
 
     @property
     def verdicts(self) -> np.ndarray:
@@ -132,10 +154,7 @@ def tables(table: PassTable) -> tuple[PageTable, ...]:
             "Elastic patch tests of Sections 4, 5 and 7.1: largest error of a stress over the pressure",
             ("Formulation", *SCENES.values()),
             tuple(
-                (
-                    Cell((formulation.legend,)),
-                    *(_cell(table, row, column) for column in range(len(SCENES))),
-                )
+                (Cell((formulation.legend,)), *(_cell(table, row, column) for column in range(len(SCENES))))
                 for row, formulation in enumerate(FORMULATIONS)
             ),
         ),
@@ -151,31 +170,12 @@ def _cell(table: PassTable, row: int, column: int) -> Cell:
     return Cell((text,), (number(float(table.errors[row, column]), 2),), f"row {tone}")
 
 
-def datasets(table: PassTable) -> dict[str, xr.Dataset]:
-    """Return errors, tolerances and what the paper says."""
-    dims = ["formulation", "scene"]
-    long_name = "largest error of a stress at a Gauss point over the pressure"
-    no_solution = "NaN: Newton's method ended at no solution"
-    variables = name_variables(FORMULATIONS) | {
-        "scene": words(["scene"], list(SCENES), "scene, as on the command line"),
-        "stress_error": numbers(dims, table.errors, long_name, "1", no_solution, fill=np.nan),
-        "tolerance": numbers(
-            ["scene"], table.tolerances, "what roundoff explains: an error below it passes", "1", CONDITION_TOLERANCE
-        ),
-        "printed": codes(
-            dims, table.printed, {"fails": 0, "passes": 1}, "what the paper says", "missing: nothing", fill=-1
-        ),
-    }
-    comment = f"elastic patch tests at the penalty 10 E/h; an error above {FAILS:g} fails"
-    return {"": xr.Dataset(variables, attrs={"comment": comment})}
-
-
 ITEM = Item(
     name="pass_table",
     title="Who passes the elastic patch test",
     compute=compute,
     statements=statements,
-    datasets=datasets,
+    attributes={"comment": f"elastic patch tests at the penalty 10 E/h; an error above {FAILS:g} fails"},
     tables=tables,
     text="Largest error of a stress at a Gauss point over the pressure, at ε̂ = 10 E/h. Pass: roundoff, at most "
     f"{CONDITION_TOLERANCE} with κ = ε̂h/E and the smallest ratio r of two segments. Fail: above {FAILS:g}. “=” stands "

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Annotated
 
 import numpy as np
 
@@ -23,12 +24,14 @@ from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
 from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.paper_columns import WORDS, Column
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
-from contactverif_paper.paper_item import Progress
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene
+from contactverif_reports.netcdf import schema
 
 YOUNG = 1e4  # The modulus of the catalogue's scenes.
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
+STRESS_ERROR = "largest error of a stress at a Gauss point over the pressure"
 _STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffness_limit` searches.
 
 TWO = (formulations.NTS, formulations.NTS_AR)
@@ -36,51 +39,88 @@ FOUR = (*TWO, formulations.TWO_PASS, formulations.VTS_ME)
 FIVE = (*FOUR, formulations.VTS_PPT)
 
 
+def _some(dims: str, units: str, meaning: str) -> Column:
+    return Column(dims, units, meaning, "NaN: nothing there", np.nan)
+
+
+PASSES, FAILURE, SILENT = 1, 0, -1  # What the paper says of a patch test.
+PRINTED_COLUMN = Column(
+    "", "1", "what the paper says", "missing: nothing", SILENT, {"fails": FAILURE, "passes": PASSES}
+)
+
+
 @dataclass(frozen=True, slots=True)
 class PatchSetup:
     """A patch test of the paper as its figures show it."""
 
-    scene: str  # Name of the scene on the command line.
+    scene: Annotated[str, Column("", WORDS, "scene, as on the command line")]
     title: str  # What the paper calls it, at the beginning of a sentence.
     pressures: str  # Numbers of the paper's figures.
     meshes: str
     # Ends of the axes that the paper prints: the coordinate, and the pressure over the exact one.
     x_axis: tuple[float, float]
     axis: tuple[float, float]
-    stiffness: float  # ε̂ over E, per unit of length. It is our choice.
+    stiffness: Annotated[float, Column("", "m-1", "penalty over E")]  # It is our choice.
     formulations: tuple[PaperFormulation, ...]  # The formulations that the figures show.
     close_up: tuple[float, float] | None = None  # Ends of the pressure axis of the close-up; None where there is none.
     origin: float = 0.0  # The scene's coordinate of the origin of the paper's axis, a length.
 
     @property
-    def n_steps(self) -> int:
-        """The number of solutions that `patch_solution` reports."""
-        return len(self.formulations)
+    def figure(self) -> Annotated[str, Column("", WORDS, "meshes, pressures")]:
+        """The numbers of the paper's figures."""
+        return f"{self.meshes}, {self.pressures}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """The pressure that one formulation leaves on a scene."""
 
-    formulation: PaperFormulation  # The formulation.
-    x: FloatArray  # (n_points,) Reference coordinates of the paper's axis, a length.
-    pressure: FloatArray  # (n_points,) The contact pressure over the exact one.
+    formulation: PaperFormulation
+    x: Annotated[FloatArray, _some("point", schema.LENGTH, "reference coordinate on the paper's axis")]
+    pressure: Annotated[FloatArray, _some("point", "1", "contact pressure over the exact one")]
     # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
-    at_points: bool
-    solution: Solution  # The solved scene.
+    at_points: Annotated[
+        bool, Column("", "1", "where pressures are taken", "missing: not shown", -1, {"at_nodes": 0, "at_points": 1})
+    ]
+    solution: Solution
 
     @property
     def departure(self) -> float:
         """The largest |p/p_exact − 1|."""
         return float(abs(self.pressure - 1).max())
 
+    @property
+    def stress_error(self) -> Annotated[float, Column("", "1", STRESS_ERROR, fill=np.nan)]:
+        """The largest error of a stress over the pressure."""
+        return self.solution.stress_error
+
+    @property
+    def iterations(self) -> Annotated[float, Column("", "1", "linear systems solved", fill=np.nan)]:
+        """The number of linear systems solved."""
+        return float(len(self.solution.residuals) - 1)
+
+    @property
+    def end(self) -> Annotated[str, Column("", WORDS, "how Newton's method ended")]:
+        """How Newton's method ended."""
+        return self.solution.end
+
+    @property
+    def displacement_x(self) -> Annotated[FloatArray, _some("node", schema.LENGTH, "displacement along x")]:
+        """The displacements of all nodes along x."""
+        return np.vstack(self.solution.displacements)[:, 0]
+
+    @property
+    def displacement_y(self) -> Annotated[FloatArray, _some("node", schema.LENGTH, "displacement along y")]:
+        """The displacements of all nodes along y."""
+        return np.vstack(self.solution.displacements)[:, 1]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchSolution:
     """A patch test, solved by the formulations of its figures."""
 
-    setup: PatchSetup  # What was solved.
-    exact: float  # The exact pressure, force per length.
+    setup: PatchSetup
+    exact_pressure: Annotated[float, Column("", schema.STRESS, "exact contact pressure")]
     solved: SolvedScene  # The scene with all solutions, ready to be drawn.
     curves: tuple[Curve, ...]  # A curve for each formulation.
 
@@ -95,22 +135,24 @@ class PatchSolution:
         return float(values.min()), float(values.max())
 
     @property
-    def not_converged(self) -> tuple[Curve, ...]:
-        """The curves that are no solutions."""
-        return tuple(curve for curve in self.curves if not curve.solution.converged)
+    def penalty(self) -> Annotated[float, Column("", schema.PENALTY, "penalty")]:
+        """The penalty."""
+        return self.solved.case.penalty
 
+    @property
+    def body(self) -> Annotated[FloatArray, Column("node", "1", "body of the node; 0 is the slave", fill=np.nan)]:
+        """The number of the body of each node that displacements belong to."""
+        return np.repeat(np.arange(2.0), [len(body.nodes) for body in self.solved.bodies])
 
-def patch_item_data(*setups: PatchSetup) -> Callable[[Progress], tuple[PatchSolution, ...]]:
-    """Return the `compute` of an item that consists of these patch tests alone."""
+    @property
+    def node_x(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference x", fill=np.nan)]:
+        """The coordinates of these nodes along x."""
+        return np.vstack([body.nodes for body in self.solved.bodies])[:, 0]
 
-    def compute(report_progress: Progress) -> tuple[PatchSolution, ...]:
-        solutions = []
-        for setup in setups:
-            report_progress(setup.title)
-            solutions.append(patch_solution(setup))
-        return tuple(solutions)
-
-    return compute
+    @property
+    def node_y(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference y", fill=np.nan)]:
+        """The coordinates of these nodes along y."""
+        return np.vstack([body.nodes for body in self.solved.bodies])[:, 1]
 
 
 @cache

@@ -11,22 +11,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
-from contactverif.contract.result import NotLoaded
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_columns import Column, Formulations
+from contactverif_paper.paper_formulations import PaperFormulation, measure, subject_of
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers
 
 FORMULATIONS = (formulations.VTS_ME, formulations.BASIC, formulations.VTS_PPT, formulations.STS)
 SCENE = "example-1bis"
@@ -38,16 +35,16 @@ _TINY = 2.0**-100  # The length of a complex step; lengths are about 1, so it ro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tangents:
-    """Properties of the tangents in the solution, each (n_formulations,)."""
+    """Properties of the tangents in the solution."""
 
-    # (n_formulations,) Largest difference of K d from a complex step along d, over the largest entry of K d, over
-    # random d.
-    error: FloatArray
-    asymmetry: FloatArray  # (n_formulations,) Largest entry of K − Kᵀ over that of K.
-    # (n_formulations,) Order of one Newton step towards the solution; infinite if the step is exact, NaN if nothing
-    # decides.
-    order: FloatArray
-    iterations: IntArray  # (n_formulations,) Linear systems solved from the slave just touching to roundoff.
+    # The largest difference over the largest entry of K d, over random d.
+    error: Annotated[FloatArray, Column("formulation", "1", "difference of K d from a complex step, over K d")]
+    asymmetry: Annotated[FloatArray, Column("formulation", "1", "largest entry of K − Kᵀ over that of K")]
+    # Towards the solution; infinite if the step is exact.
+    order: Annotated[FloatArray, Column("formulation", "1", "order of one Newton step", "NaN: not decided", np.nan)]
+    # From the slave just touching to roundoff.
+    iterations: Annotated[IntArray, Column("formulation", "1", "linear systems solved")]
+    formulations: Formulations = FORMULATIONS
 
 
 @cache
@@ -88,19 +85,6 @@ def statements(result: Tangents) -> tuple[Statement, ...]:
     )
 
 
-def datasets(result: Tangents) -> dict[str, xr.Dataset]:
-    """Return the properties of the tangents."""
-    dims = ["formulation"]
-    table = name_variables(FORMULATIONS) | {
-        "error": numbers(dims, result.error, "difference of K d from a complex step, over K d", "1"),
-        "asymmetry": numbers(dims, result.asymmetry, "largest entry of K − Kᵀ over that of K", "1"),
-        "order": numbers(dims, result.order, "order of one Newton step", "1", "NaN: not decided", fill=np.nan),
-        "iterations": numbers(dims, result.iterations.astype(np.int32), "linear systems solved", "1"),
-    }
-    comment = "in the solution, free sides, a master half as stiff as the slave"
-    return {"": xr.Dataset(table, attrs={"scene": SCENE, "comment": comment})}
-
-
 def _row(formulation: PaperFormulation) -> tuple[float, float, float, int]:
     scene = catalogue.make_scene(SCENE, **OPTIONS)
     plugin = subject_of(formulation).for_case(scene.case())
@@ -118,9 +102,7 @@ def _row(formulation: PaperFormulation) -> tuple[float, float, float, int]:
 
 def _order(formulation: PaperFormulation, trace: Trace) -> float:
     """Return what the property `newton.order` measures on this scene; NaN if it decides nothing."""
-    (question,) = load_properties(["newton.order"])
-    assert not isinstance(question, NotLoaded)
-    measurement = judge_case(question, trace.scene.case(), subject_of(formulation)).measurement
+    measurement = measure("newton.order", trace.scene.case(), formulation)
     if measurement is None or measurement.undecided:
         return np.nan
     return measurement.values.get("order of one Newton step", np.inf)
@@ -131,5 +113,5 @@ ITEM = Item(
     title="Section 6.2: the consistent tangent",
     compute=compute,
     statements=statements,
-    datasets=datasets,
+    attributes={"scene": SCENE, "comment": "in the solution, free sides, a master half as stiff as the slave"},
 )

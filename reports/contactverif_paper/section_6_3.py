@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -21,12 +22,12 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_paper import paper_formulations as formulations
-from contactverif_paper.paper_formulations import PaperFormulation, name_variables, subject_of
+from contactverif_paper.paper_columns import Column, Formulations, to_dataset
+from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.section_6_2 import FORMULATIONS as TANGENT_FORMULATIONS
 from contactverif_paper.section_6_2 import ROUNDOFF, Tangents, tangents
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers
 
 FORMULATIONS = (
     PaperFormulation("VTS-ME", "vts-me:n=1"),
@@ -49,29 +50,54 @@ _VANISHES = 1e-12  # A coefficient below this share of the largest one is zero.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Terms:
+    """The terms of each formulation."""
+
+    terms: Annotated[
+        IntArray,
+        Column(
+            "formulation master",
+            "1",
+            "coefficients of dyads in the tangent of one slave segment, over 1, 2 and 3 master segments",
+        ),
+    ]
+    formulations: Formulations = FORMULATIONS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Cost:
-    """Terms and cost."""
+    """The cost of each formulation, and measured times, on which no two runs agree."""
 
-    # (n_formulations, n_masters) Coefficients of dyads in the tangent of one slave segment, for each of `FORMULATIONS`
-    # and `MASTERS`.
-    terms: IntArray
-    # (n_timed, n_ratios) Entries of the tangent that do not vanish, for each slave segment, of `TIMED` and
-    # `MESH_RATIOS`.
-    entries: FloatArray
-    seconds: FloatArray  # (n_timed, n_ratios, 2) Measured time of a residual and of a tangent, for each slave segment.
-    tangents: Tangents  # The tangents of Section 6.2.
+    entries: Annotated[FloatArray, Column("formulation ratio", "1", "entries of the tangent a slave segment")]
+    residual: Annotated[FloatArray, Column("formulation ratio", "s", "time a slave segment")]
+    tangent: Annotated[FloatArray, Column("formulation ratio", "s", "time a slave segment")]
+    formulations: Formulations = TIMED
+    ratio: Annotated[tuple[float, ...], Column("ratio", "1", "master segments for each slave segment")] = tuple(
+        MESH_RATIOS.values()
+    )
 
 
-def compute(report_progress: Progress) -> Cost:
+@dataclass(frozen=True, slots=True, eq=False)
+class Section63:
+    """Terms and cost, and the tangents of Section 6.2."""
+
+    terms: Terms
+    cost: Cost
+    tangents: Tangents
+
+
+def compute(report_progress: Progress) -> Section63:
     """Count and measure."""
     report_progress("Section 6.3, terms and cost")
     terms = [[count_terms(formulation, master) for master in MASTERS.values()] for formulation in FORMULATIONS]
     cases = [long_interface(ratio) for ratio in MESH_RATIOS.values()]
     entries = [[_entries(formulation, case) / _N_SEGMENTS for case in cases] for formulation in TIMED]
-    costs = measure_costs([subject_of(formulation) for formulation in TIMED], cases)
-    seconds = np.array([[row.seconds["residual"], row.seconds["tangent"]] for row in costs]) / _N_SEGMENTS
-    by_formulation = seconds.reshape(len(cases), len(TIMED), 2).swapaxes(0, 1)
-    return Cost(np.array(terms, dtype=np.int64), np.array(entries), by_formulation, tangents())
+    costs = measure_costs([subject_of(formulation) for formulation in TIMED], cases)  # One case after the other.
+    residual, tangent = (
+        np.reshape([row.seconds[part] for row in costs], (len(cases), len(TIMED))).T / _N_SEGMENTS
+        for part in ("residual", "tangent")
+    )
+    return Section63(Terms(np.array(terms)), Cost(np.array(entries), residual, tangent), tangents())
 
 
 def count_terms(formulation: PaperFormulation, master: tuple[tuple[float, float], ...]) -> int:
@@ -97,18 +123,19 @@ def long_interface(ratio: float) -> Case:
     return Case(interface, np.vstack([upper, lower]).reshape(-1), penalty=PENALTY)
 
 
-def statements(cost: Cost) -> tuple[Statement, ...]:
+def statements(section: Section63) -> tuple[Statement, ...]:
     """Compare terms, feasibility and cost."""
-    return _feasible_statement(cost), _terms_statement(cost), _cost_statement(cost)
+    terms = section.terms.terms
+    return _feasible_statement(terms, section.tangents), _terms_statement(terms), _cost_statement(section.cost)
 
 
-def _feasible_statement(cost: Cost) -> Statement:
-    row, result = TANGENT_FORMULATIONS.index(formulations.STS), cost.tangents
+def _feasible_statement(terms: IntArray, result: Tangents) -> Statement:
+    row = TANGENT_FORMULATIONS.index(formulations.STS)
     return Statement(
         "Section 6.3",
         f"an exact tangent of a segment-to-segment formulation is practically unfeasible, with up to {PRINTED_TERMS} "
         "vector product terms",
-        f"the plugin sts has one, of at most {cost.terms[-1].max()} terms for a slave segment when equal dyads are "
+        f"the plugin sts has one, of at most {terms[-1].max()} terms for a slave segment when equal dyads are "
         f"collected: it differs from a complex step by {number(result.error[row], 2)}, a step of Newton’s method is of "
         f"order {result.order[row]:.2f}, and {result.iterations[row]} iterations solve Example 1bis. Each number of a "
         "point carries its derivatives along, so that no term is written by hand",
@@ -116,10 +143,10 @@ def _feasible_statement(cost: Cost) -> Statement:
     )
 
 
-def _terms_statement(cost: Cost) -> Statement:
-    standard, _, consistent, _ = cost.terms
+def _terms_statement(terms: IntArray) -> Statement:
+    standard, _, consistent, _ = terms
     holds = consistent == standard
-    agreement = Agreement.CONDITIONAL if holds.any() and not holds.all() else Agreement.decide(bool(holds.all()))
+    agreement = Agreement.decide(bool(holds.any()), always=bool(holds.all()))
     heads = [head for head, same in zip(MASTERS, holds, strict=True) if same]
     counts = "; ".join(f"{head}: {b} (standard: {a})" for head, a, b in zip(MASTERS, standard, consistent, strict=True))
     return Statement(
@@ -145,59 +172,41 @@ def _cost_statement(cost: Cost) -> Statement:
     )
 
 
-def tables(cost: Cost) -> tuple[PageTable, ...]:
+def tables(section: Section63) -> tuple[PageTable, ...]:
     """Return the tables of terms and of cost."""
-    terms = tuple(
-        (Cell((row.legend,)), *(Cell((str(count),), tone="n") for count in counts))
-        for row, counts in zip(FORMULATIONS, cost.terms.tolist(), strict=True)
-    )
-    costs = tuple(
-        (
-            Cell((row.legend,)),
-            *(
-                Cell((f"{entries:.1f}",), (f"{1e6 * seconds[0]:.2f} µs, {1e6 * seconds[1]:.2f} µs",), "n")
-                for entries, seconds in zip(cost.entries[index], cost.seconds[index], strict=True)
-            ),
+    cost, terms = section.cost, section.terms.terms
+    microseconds = np.stack([1e6 * cost.residual, 1e6 * cost.tangent], axis=-1)
+    cells = [
+        tuple(
+            Cell((f"{entries:.1f}",), (f"{times[0]:.2f} µs, {times[1]:.2f} µs",), "n")
+            for entries, times in zip(*row, strict=True)
         )
-        for index, row in enumerate(TIMED)
-    )
+        for row in zip(cost.entries, microseconds, strict=True)
+    ]
     return (
-        PageTable(
+        PageTable.of_numbers(
             "Terms of the tangent: coefficients of dyads of t and n for one slave segment with one virtual slave node "
             "(segment-to-segment: all of it), by master segments under it",
             ("Formulation", *MASTERS),
-            terms,
+            [(row.legend, *map(str, counts)) for row, counts in zip(FORMULATIONS, terms.tolist(), strict=True)],
         ),
         PageTable(
             f"Cost for each of {_N_SEGMENTS} slave segments: entries of the tangent; below, measured times of a "
             "residual and of a tangent on this machine",
             ("Formulation", *(f"master {head}" for head in MESH_RATIOS)),
-            costs,
+            tuple((Cell((row.legend,)), *its_cells) for row, its_cells in zip(TIMED, cells, strict=True)),
         ),
     )
 
 
-def datasets(cost: Cost) -> dict[str, xr.Dataset]:
-    """Return the counts; measured times are in a group of their own, since no two runs agree on them."""
-    counts = name_variables(FORMULATIONS) | {
-        "terms": numbers(
-            ["formulation", "master"],
-            cost.terms.astype(np.int32),
-            "coefficients of dyads in the tangent of one slave segment, over 1, 2 and 3 master segments",
-            "1",
-        )
+def datasets(section: Section63) -> dict[str, xr.Dataset]:
+    """Return the counts, and the times in a group of their own."""
+    cost = to_dataset(section.cost)
+    return {
+        "terms": to_dataset(section.terms),
+        "cost": cost.drop_vars(["residual", "tangent"]),
+        "timing": cost.drop_vars("entries"),
     }
-    ratio = numbers(["ratio"], list(MESH_RATIOS.values()), "master segments for each slave segment", "1")
-    entries = name_variables(TIMED) | {
-        "ratio": ratio,
-        "entries": numbers(["formulation", "ratio"], cost.entries, "entries of the tangent a slave segment", "1"),
-    }
-    timing = name_variables(TIMED) | {
-        "ratio": ratio,
-        "residual": numbers(["formulation", "ratio"], cost.seconds[..., 0], "time a slave segment", "s"),
-        "tangent": numbers(["formulation", "ratio"], cost.seconds[..., 1], "time a slave segment", "s"),
-    }
-    return {"terms": xr.Dataset(counts), "cost": xr.Dataset(entries), "timing": xr.Dataset(timing)}
 
 
 def _frame(formulation: PaperFormulation, x: FloatArray) -> FloatArray:

@@ -9,18 +9,17 @@ Source: Zavarise & De Lorenzis (2009), Section 7.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import xarray as xr
+from typing import Annotated
 
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance
 from contactverif_paper import example_1, example_1bis
 from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.paper_columns import WORDS, Column, name_columns
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
-from contactverif_paper.patch_solutions import moderate_error, patch_solution, stiffness_limit
+from contactverif_paper.patch_solutions import PatchSetup, moderate_error, patch_solution, stiffness_limit
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.variables import numbers, words
 
 UNEQUAL = 10.0  # The stiffness of the other foundation over that of the punch.
 _SETUPS = (example_1.PATCH, example_1bis.PATCH)
@@ -31,14 +30,24 @@ _COMPARED = (formulations.NTS_AR, formulations.NTS, formulations.TWO_PASS)
 class Section71:
     """Errors on Examples 1 and 1bis."""
 
-    # The largest |p/p_exact − 1| at the penalty of the figures: (example, formulation) with NTS-AR first.
-    departures: tuple[tuple[float, ...], ...]
-    # For each example the ε̂/E up to which NTS-AR is the best of the three, per unit of length.
-    limits: tuple[float, ...]
-    moderate_one: float  # Stress errors of NTS-AR and of two passes on Example 1 at ε̂ = 10 E/h.
-    moderate_two: float
-    unequal_error: float  # Stress error of VTS-PPT on Example 1bis with the other foundation, and its roundoff.
-    tolerance: float
+    departure: Annotated[
+        tuple[tuple[float, ...], ...], Column("scene formulation", "1", "largest |p/p_exact − 1| of the figures")
+    ]
+    limit: Annotated[tuple[float, ...], Column("scene", "m-1", "penalty over E up to which NTS-AR departs least")]
+    # Of NTS-AR and of two passes.
+    stress_error: Annotated[tuple[float, float], Column("passes", "1", "Example 1: stress error at 10 E/h")]
+    unequal: Annotated[
+        tuple[float, float],
+        Column(
+            "bound",
+            "1",
+            "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance",
+        ),
+    ]
+    setups: Annotated[
+        tuple[PatchSetup, ...], Column("scene", WORDS, "scene, as on the command line", part="scene", name="scene")
+    ] = _SETUPS
+    formulations: Annotated[tuple[PaperFormulation, ...], name_columns("formulation")[0]] = _COMPARED
 
 
 def compute(report_progress: Progress) -> Section71:
@@ -49,10 +58,8 @@ def compute(report_progress: Progress) -> Section71:
     return Section71(
         tuple(tuple(patch.curve(formulation).departure for formulation in _COMPARED) for patch in patches),
         tuple(stiffness_limit(setup, areas_are_best) for setup in _SETUPS),
-        moderate_error(formulations.NTS_AR, "example-1"),
-        moderate_error(formulations.TWO_PASS, "example-1"),
-        moderate_error(formulations.VTS_PPT, "example-1bis", UNEQUAL),
-        condition_tolerance(scene, scene.penalty),
+        (moderate_error(formulations.NTS_AR, "example-1"), moderate_error(formulations.TWO_PASS, "example-1")),
+        (moderate_error(formulations.VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
     )
 
 
@@ -67,19 +74,19 @@ def statements(section: Section71) -> tuple[Statement, ...]:
 
 
 def _quality_statement(section: Section71) -> Statement:
-    holds = all(row[0] <= min(row[1:]) for row in section.departures)
-    always = section.moderate_one <= section.moderate_two
-    agreement = Agreement.CONDITIONAL if holds and not always else Agreement.decide(holds)
-    rows = " and ".join(f"{ar:.2f} (NTS {nts:.2f}, two-pass {two:.2f})" for ar, nts, two in section.departures)
+    holds = all(row[0] <= min(row[1:]) for row in section.departure)
+    one, two = section.stress_error
+    agreement = Agreement.decide(holds, always=one <= two)
+    rows = " and ".join(f"{ar:.2f} (NTS {nts:.2f}, two-pass {passes:.2f})" for ar, nts, passes in section.departure)
     limits = ", ".join(
         f"ε̂ ≤ {limit:.2f} E per unit of length in {setup.title}"
-        for limit, setup in zip(section.limits, _SETUPS, strict=True)
+        for limit, setup in zip(section.limit, _SETUPS, strict=True)
     )
     return Statement(
         "Section 7.1",
         "Examples 1 and 1bis: NTS-AR fails, but does well beside NTS and two-pass NTS-AR",
         f"at the soft penalty of the figures pressures of NTS-AR depart by up to {rows}. At ε̂ = 10 E/h two passes have "
-        f"the smaller error of the stress, {number(section.moderate_two, 2)} to {number(section.moderate_one, 2)} in "
+        f"the smaller error of the stress, {number(two, 2)} to {number(one, 2)} in "
         "Example 1",
         agreement,
         "fig33",
@@ -88,39 +95,14 @@ def _quality_statement(section: Section71) -> Statement:
 
 
 def _material_statement(section: Section71) -> Statement:
+    error, tolerance = section.unequal
     return Statement(
         "Section 7.1",
         "punch and foundation of different materials would have a constant pressure too",
         f"VTS-PPT finds it on Example 1bis with a foundation {UNEQUAL:g} times as stiff: error of the stress "
-        f"{number(section.unequal_error, 2)}",
-        Agreement.decide(section.unequal_error <= section.tolerance),
+        f"{number(error, 2)}",
+        Agreement.decide(error <= tolerance),
     )
-
-
-def datasets(section: Section71) -> dict[str, xr.Dataset]:
-    """Return the errors."""
-    names = words(["scene"], [setup.scene for setup in _SETUPS], "scene, as on the command line")
-    compared = words(["formulation"], [row.name for row in _COMPARED], "formulation, as on the command line")
-    departures = numbers(["scene", "formulation"], section.departures, "largest |p/p_exact − 1| of the figures", "1")
-    return {
-        "": xr.Dataset(
-            {
-                "scene": names,
-                "formulation": compared,
-                "departure": departures,
-                "limit": numbers(["scene"], section.limits, "penalty over E up to which NTS-AR departs least", "m-1"),
-                "stress_error": numbers(
-                    ["passes"], [section.moderate_one, section.moderate_two], "Example 1: stress error at 10 E/h", "1"
-                ),
-                "unequal": numbers(
-                    ["bound"],
-                    [section.unequal_error, section.tolerance],
-                    "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance",
-                    "1",
-                ),
-            }
-        )
-    }
 
 
 ITEM = Item(
@@ -128,5 +110,4 @@ ITEM = Item(
     title="Section 7.1: what is said of both examples",
     compute=compute,
     statements=statements,
-    datasets=datasets,
 )

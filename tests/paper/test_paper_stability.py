@@ -40,8 +40,8 @@ def test_the_table_shows_both_reasons(constants: inf_sup_condition.Constants) ->
 
 
 def test_segment_to_segment_locks_and_mortar_does_not(result: locking.Locking) -> None:
-    rough, smooth = result.pressures
-    assert result.converged
+    rough, smooth = (contact.pressure for contact in result.contacts)
+    assert all(contact.converged for contact in result.contacts)
     assert rough.min() == 0
     assert 10 < rough.max() < 20
     assert smooth.min() > 0.4
@@ -56,4 +56,4 @@ def test_the_figures_have_their_panels(constants: inf_sup_condition.Constants, r
         figure = render_figure(item.figures[0], data)
         assert len(figure.axes) == count
         assert all(axes.lines for axes in figure.axes)
-        assert item.datasets(data)
+        assert item.groups(data)
