@@ -41,17 +41,17 @@ class Column:
         if self.units == WORDS:
             return words(axes, _shaped(values, shape, ""), self.meaning, self.comment)
         if self.meanings is not None:
-            fill = None if self.fill is None else int(self.fill)
-            array = _shaped(values, shape, fill)
+            array, fill = _shaped(values, shape, self.fill), None if self.fill is None else int(self.fill)
             return codes(axes, array, self.meanings, self.meaning, self.comment, fill=fill)
-        if shape and self.dims:
-            rows = [np.zeros(0) if value is None else np.atleast_1d(value) for value in values]
-            array = np.array(list(itertools.zip_longest(*rows, fillvalue=self.pad))).T.reshape(*shape, -1)
-        else:
-            array = np.asarray(_shaped(values, shape, np.nan))
+        array = self._padded(values, shape) if shape and self.dims else np.asarray(_shaped(values, shape, np.nan))
         if array.dtype.kind == "i":
             array = array.astype(np.int32)
         return numbers(axes, array, self.meaning, self.units, self.comment, fill=self.fill)
+
+    def _padded(self, values: Sequence[Any], shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
+        """Return the rows of all cells as one array (*shape, longest)."""
+        rows = [np.zeros(0) if value is None else np.atleast_1d(value) for value in values]
+        return np.array(list(itertools.zip_longest(*rows, fillvalue=self.pad))).T.reshape(*shape, -1)
 
 
 def name_columns(dims: str) -> tuple[Column, Column]:

@@ -91,10 +91,15 @@ def tree_of(paper: Paper) -> xr.DataTree:
             if path in groups:
                 raise ValueError(f"{path}: two items have this group")
             groups[path] = dataset
-    for variable in (variable for group in groups.values() for variable in group.variables.values()):
+    return xr.DataTree.from_dict({path: _without_small_filters(group) for path, group in groups.items()})
+
+
+def _without_small_filters(group: xr.Dataset) -> xr.Dataset:
+    """Store small variables uncompressed."""
+    for variable in group.variables.values():
         if variable.nbytes < _WORTH_COMPRESSING:
             variable.encoding = {k: v for k, v in variable.encoding.items() if k not in ("zlib", "complevel")}
-    return xr.DataTree.from_dict(groups)
+    return group
 
 
 def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
