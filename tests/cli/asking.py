@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from contactverif.cli import app as cli
+from contactverif.run import registry
 
 
 class Answer(NamedTuple):
@@ -41,3 +44,19 @@ def asking(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         return Answer(exit_info.value.code, out, err)
 
     return run_command
+
+
+def check_mistake(answer: Answer, message: str) -> None:
+    """Check that a command refused a mistake of the user with this line (a pattern) and nothing else."""
+    assert (answer.status, answer.out) == (2, "")
+    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
+
+
+def install_formulations(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
+    """Install formulations {name: "module:factory"} beside those that are there."""
+    more = [EntryPoint(name, place, registry.FORMULATIONS) for name, place in places.items()]
+
+    def list_entry_points(*, group: str) -> list[EntryPoint]:
+        return [*entry_points(group=group), *(more if group == registry.FORMULATIONS else [])]
+
+    monkeypatch.setattr(registry, "entry_points", list_entry_points)

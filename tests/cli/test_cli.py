@@ -12,13 +12,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 import meshio
 import pytest
-from asking import Answer, Ask, asking
+from asking import Answer, Ask, check_mistake, install_formulations
 from fresh_process import MAIN
 from rich.cells import cell_len
 
@@ -33,11 +32,6 @@ PUNCH = ROOT / "tests" / "data" / "punch.msh"
 ON_PUNCH = ("--mesh", str(PUNCH), "--slave", "punch", "--master", "base")
 SVG = b"<?xml"
 PNG = b"\x89PNG"
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -138,8 +132,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
     judged: list[Any] = []
     monkeypatch.setattr(judging, "judge_case", lambda *anything: judged.append(anything))
     answer = ask(*arguments)
-    assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
+    check_mistake(answer, message)
     assert not judged
 
 
@@ -154,8 +147,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
 )  # fmt: skip
 def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: Sequence[str], message: str) -> None:
     answer = ask("replay", nts_report, *options)
-    assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
+    check_mistake(answer, message)
 
 
 def test_a_mistake_in_a_process_of_its_own_has_no_traceback() -> None:
@@ -236,19 +228,10 @@ def without_licence(*, penalty: float) -> Broken:
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four more formulations: two that do not load, one that raises, one that returns NaN."""
-    more = [
-        EntryPoint("absent", "no_such_module:make", registry.FORMULATIONS),
-        *(
-            EntryPoint(name, f"{__name__}:{make.__name__}", registry.FORMULATIONS)
-            for name, make in (("unlicensed", without_licence), ("raising", raises), ("nan", gives_nan))
-        ),
-    ]
-
-    def list_entry_points(*, group: str) -> list[EntryPoint]:
-        return [*entry_points(group=group), *(more if group == registry.FORMULATIONS else [])]
-
     monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
-    monkeypatch.setattr(registry, "entry_points", list_entry_points)
+    factories = {"unlicensed": without_licence, "raising": raises, "nan": gives_nan}
+    places = {name: f"{__name__}:{make.__name__}" for name, make in factories.items()}
+    install_formulations(monkeypatch, absent="no_such_module:make", **places)
 
 
 @pytest.mark.usefixtures("strangers")

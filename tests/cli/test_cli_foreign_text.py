@@ -10,7 +10,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from asking import Answer, Ask, asking
+from asking import Answer, Ask
 from foreign_texts import TEXTS, hidden_characters
 from handmade_run import run_with
 from rich.progress import Progress
@@ -42,11 +42,6 @@ def fail(name):
     raise type(kind[:50], (Exception,), {})(TEXTS[name])
 
 """ + "".join(f"loud_{name} = make({name!r})\n" for name in TEXTS)
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -8,18 +8,13 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from asking import Ask, asking
+from asking import Ask
 
 from contactverif.studies.queries.query_making import KINDS
 
 ROOT = Path(__file__).parents[2]
 C_PROGRAM = ROOT / "examples" / "nearest_segment.c"
 NUMBER = 10 * len(KINDS)
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -6,16 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from asking import Answer, Ask, asking
+from asking import Answer, Ask
 
 from contactverif.cli.counterexample_output import announce_stored
 from contactverif.contract.errors import MisuseError
 from contactverif.run.registry import the_property
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 @pytest.fixture

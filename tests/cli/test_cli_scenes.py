@@ -10,7 +10,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from asking import Ask, asking
+from asking import Ask, check_mistake
 from handmade_run import run_with
 
 from contactverif.cli import scene_drawing
@@ -27,11 +27,6 @@ from contactverif_reports.netcdf.write import write
 
 FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
 SVG, PNG = b"<?xml", b"\x89PNG"
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 def ends(out: str) -> dict[str, list[str]]:
@@ -134,8 +129,7 @@ def test_a_mistake_is_one_line_and_nothing_is_solved(
     monkeypatch.setattr(pictures, "solve", never)
     monkeypatch.setattr(judging, "judge_case", never)
     answer = ask(*arguments)
-    assert (answer.status, answer.out) == (2, "")
-    assert re.fullmatch(f"contactverif: {message}\n", answer.err), answer.err
+    check_mistake(answer, message)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from functools import partial
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 import pytest
-from asking import Ask, asking
+from asking import Ask, check_mistake, install_formulations
 from gauss_springs import GaussSprings, by_points_first
 
-from contactverif.run import registry
 from contactverif_reports.netcdf.read import case_ids
 
 
@@ -42,24 +41,16 @@ def make_boaster(*, penalty: float) -> FarSprings:
 
 
 @pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return partial(asking(monkeypatch, capsys), "stability")
+def ask(ask: Ask) -> Ask:
+    return partial(ask, "stability")
 
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Install two formulations that are residuals alone, and one that does not load."""
-    more = [
-        EntryPoint("modest", f"{__name__}:make_modest", registry.FORMULATIONS),
-        EntryPoint("boaster", f"{__name__}:make_boaster", registry.FORMULATIONS),
-        EntryPoint("absent", "no_such_module:make", registry.FORMULATIONS),
-    ]
-
-    def list_entry_points(*, group: str) -> list[EntryPoint]:
-        return [*entry_points(group=group), *(more if group == registry.FORMULATIONS else [])]
-
     monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
-    monkeypatch.setattr(registry, "entry_points", list_entry_points)
+    places = {name: f"{__name__}:make_{name}" for name in ("modest", "boaster")}
+    install_formulations(monkeypatch, absent="no_such_module:make", **places)
 
 
 def test_a_stable_formulation_has_a_table_a_sentence_and_files(ask: Ask, tmp_path: Path) -> None:
@@ -118,7 +109,4 @@ def test_a_broken_promise_and_a_plugin_that_does_not_load_fail(ask: Ask) -> None
 )
 def test_a_wrong_command_line_is_one_line(ask: Ask, arguments: list[str], message: str) -> None:
     answer = ask(*arguments)
-    assert answer.status == 2
-    assert answer.out == ""
-    assert answer.err.startswith(f"contactverif: {message}")
-    assert answer.err.count("\n") == 1
+    check_mistake(answer, re.escape(message) + ".*")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from asking import Ask, asking
+from asking import Ask
 from fresh_process import MAIN, PYTHON
 from lossy_store import lose_one_outcome
 
@@ -20,11 +20,6 @@ from contactverif_reports.netcdf.differences import same_data
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
 RUN = ("verify", "nts", "vts-ppt", *(word for id_ in IDS for word in ("-p", id_)), "--examples", "60", "--seed", "1")
 N_ROWS = 6
-
-
-@pytest.fixture
-def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    return asking(monkeypatch, capsys)
 
 
 @pytest.fixture(scope="module")

@@ -161,52 +161,23 @@ def test_an_axis_may_be_a_rounding_too_long() -> None:
         replace(BLOCK, axis=(cos(angle), sin(angle)))
 
 
+def unit_block(x: Any = (0, 1), y: Any = (0, 1), *, contact: str = "top", young: float = 1.0, **placing: Any) -> Body:
+    return block(Rectangle(x, y, young=young), contact=contact, placing=Placing(**placing))
+
+
 WRONG_BLOCKS: dict[str, tuple[Callable[[], Body], str]] = {
-    "descending": (
-        lambda: block(Rectangle([0, 2, 1], [0, 1]), contact="top"),
-        r"block: x: found \[0.0, 2.0, 1.0\]; needed at l",
-    ),
-    "one line": (
-        lambda: block(Rectangle([0, 1], [3]), contact="top"),
-        r"block: y: found \[3.0\]; needed at least two ascending",
-    ),
-    "equal": (
-        lambda: block(Rectangle([0, 0], [0, 1]), contact="top"),
-        r"block: x: found \[0.0, 0.0\]; needed at least two",
-    ),
-    "nan": (
-        lambda: block(Rectangle([0, np.nan], [0, 1]), contact="top"),
-        r"block: x: found \[0.0, nan\]; needed at least two",
-    ),
-    "inf": (
-        lambda: block(Rectangle([0, np.inf], [0, 1]), contact="top"),
-        r"block: x: found \[0.0, inf\]; needed at least two",
-    ),
-    "text": (lambda: block(Rectangle("ab", [0, 1]), contact="top"), "block: x: found dtype <U2; needed numbers"),
-    "a grid": (
-        lambda: block(Rectangle([[0, 1]], [0, 1]), contact="top"),
-        r"block: x: found shape \(1, 2\); needed shape \(n,\)",
-    ),
-    "side": (
-        lambda: block(Rectangle([0, 1], [0, 1]), contact="left"),
-        "block: contact: found 'left'; needed 'bottom' or 'top'",
-    ),
-    "axis": (
-        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(axis=(1, 1))),
-        r"block: axis: found \(1.0, 1.0\); needed a",
-    ),
-    "axis of 3": (
-        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(axis=(1, 0, 0))),
-        r"block: axis: found shape \(3,\); needed shape \(2,\)",
-    ),
-    "shift": (
-        lambda: block(Rectangle([0, 1], [0, 1]), contact="top", placing=Placing(shift=(1,))),
-        r"block: shift: found shape \(1,\); needed shape \(2,\)",
-    ),
-    "material": (
-        lambda: block(Rectangle([0, 1], [0, 1], young=0), contact="top"),
-        "block: young: found 0; needed Young's",
-    ),
+    "descending": (lambda: unit_block([0, 2, 1]), r"block: x: found \[0.0, 2.0, 1.0\]; needed at l"),
+    "one line": (lambda: unit_block(y=[3]), r"block: y: found \[3.0\]; needed at least two ascending"),
+    "equal": (lambda: unit_block([0, 0]), r"block: x: found \[0.0, 0.0\]; needed at least two"),
+    "nan": (lambda: unit_block([0, np.nan]), r"block: x: found \[0.0, nan\]; needed at least two"),
+    "inf": (lambda: unit_block([0, np.inf]), r"block: x: found \[0.0, inf\]; needed at least two"),
+    "text": (lambda: unit_block("ab"), "block: x: found dtype <U2; needed numbers"),
+    "a grid": (lambda: unit_block([[0, 1]]), r"block: x: found shape \(1, 2\); needed shape \(n,\)"),
+    "side": (lambda: unit_block(contact="left"), "block: contact: found 'left'; needed 'bottom' or 'top'"),
+    "axis": (lambda: unit_block(axis=(1, 1)), r"block: axis: found \(1.0, 1.0\); needed a"),
+    "axis of 3": (lambda: unit_block(axis=(1, 0, 0)), r"block: axis: found shape \(3,\); needed shape \(2,\)"),
+    "shift": (lambda: unit_block(shift=(1,)), r"block: shift: found shape \(1,\); needed shape \(2,\)"),
+    "material": (lambda: unit_block(young=0), "block: young: found 0; needed Young's"),
     "one point": (lambda: rigid_surface([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
     "in line": (lambda: rigid_surface([0, 1, 2]), r"rigid: points: found shape \(3,\); needed shape \(n, 2\)"),
     "ragged": (lambda: rigid_surface([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),

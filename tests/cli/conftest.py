@@ -1,0 +1,11 @@
+"""The fixture by which tests run `contactverif` in their own process."""
+
+from __future__ import annotations
+
+import pytest
+from asking import Ask, asking
+
+
+@pytest.fixture
+def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
+    return asking(monkeypatch, capsys)
