@@ -1,4 +1,4 @@
-"""Where the cases of a property come from, with the stored name on which the drawn cases depend besides the seed.
+"""The source of the cases of a property, with the stored name on which the drawn cases depend besides the seed.
 
 Rule for the next editor: a stored name never changes, wherever its function moves, or the same seed gives other cases.
 """
@@ -14,13 +14,13 @@ from contactverif.contract.case import Case
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def no_cases(given: Any) -> None:
+def return_none(place: Any) -> None:
     """Return None: there are no cases on an interface or a scene."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """Where the cases of a property come from: random ones, random ones of several kinds, or a list.
+    """The source of the cases of a property: random ones, random ones of several kinds, or a list.
 
     Call it with None for the property's own cases. Call it with an interface (or with the case of a scene, if the
     property is about bodies) for cases there; None comes back if the property cannot be checked there.
@@ -29,15 +29,15 @@ class Cases:
     ----------
     make : Callable[..., Any]
         The function that makes the cases.
-    finite : bool
+    is_list : bool
         Whether they are a list, of which all are judged, whatever the number of examples.
-    on_given : Callable[[Any], Any]
+    on_place : Callable[[Any], Any]
         Makes the cases on an interface or a scene, in place of the list.
     """
 
     make: Callable[..., Any]
-    finite: bool = False
-    on_given: Callable[[Any], Any] = no_cases
+    is_list: bool = False
+    on_place: Callable[[Any], Any] = return_none
 
     @classmethod
     def random(cls, make: Callable[..., Any]) -> Cases:
@@ -63,28 +63,28 @@ class Cases:
         return cls(make)
 
     @classmethod
-    def listed(cls, make: Callable[[], tuple[Case, ...]], on_given: Callable[[Any], Any] = no_cases) -> Cases:
+    def from_list(cls, make: Callable[[], tuple[Case, ...]], on_place: Callable[[Any], Any] = return_none) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
         Parameters
         ----------
         make : Callable[[], tuple[Case, ...]]
             Returns the list.
-        on_given : Callable[[Any], Any]
+        on_place : Callable[[Any], Any]
             Takes an interface or a scene, and returns a strategy, or None if there are no cases.
         """
-        return cls(make, finite=True, on_given=on_given)
+        return cls(make, is_list=True, on_place=on_place)
 
     @property
     def random_source(self) -> str:
         """The stored name of the function, or an empty string."""
         return name_of_source(self.make)
 
-    def __call__(self, given: Any) -> Any:
-        """Return the cases on what is given, which may be None."""
-        if not self.finite:
-            return self.make(given)
-        return self.make() if given is None else self.on_given(given)
+    def __call__(self, place: Any) -> Any:
+        """Return the cases on an interface or a scene; on None, the property's own."""
+        if not self.is_list:
+            return self.make(place)
+        return self.make() if place is None else self.on_place(place)
 
 
 def random_source(name: str) -> Callable[[_Function], _Function]:

@@ -362,10 +362,10 @@ class Property(PropertyInfo):
             return super(Property, self).__reduce_ex__(2)
         values = {part.name: getattr(self, part.name) for part in fields(self)}
         changes = {name: value for name, value in values.items() if value is not getattr(at_home, name)}
-        return _defined, (module, name, changes)
+        return _find_defined, (module, name, changes)
 
 
-def _defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:
+def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:
     """Return the property that a module defines under a name, with changes."""
     question: Property = getattr(import_module(module), name)
     return replace(question, **changes) if changes else question

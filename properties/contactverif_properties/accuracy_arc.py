@@ -36,7 +36,7 @@ from contactverif.contract.property import Measurement, Property, Quantity, chec
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import force_error, shape_integrals, traction_forces
 from contactverif.problems.arcs import Arcs
-from contactverif_properties.flat_resultant import refuse_unknown_total
+from contactverif_properties.patch_flat import refuse_unknown_total
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.passes import nearest_sum
 

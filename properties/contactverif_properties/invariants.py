@@ -7,7 +7,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.relabelled import exchange_roles, mirrored
+from contactverif_properties.shared.relabelled import exchange_roles, mirror_case
 from contactverif_properties.shared.same_answer import answer_alike, compare, same_answer_quantities
 
 IN_MIRROR = same_answer_quantities("in the mirror image")
@@ -39,7 +39,7 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
     vertex, a point is as near to one segment as to another, and the mirror image may choose the other.
     """
-    image, carry = mirrored(case)
+    image, carry = mirror_case(case)
     return compare(IN_MIRROR, subject, *answer_alike(case, image, subject), carry)
 
 

@@ -28,7 +28,7 @@ from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases
 from contactverif_properties.shared.applicability import refuse_without_multipliers
-from contactverif_properties.shared.exact_multipliers import exact_multipliers
+from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
 REDUNDANT = Quantity(
     "redundant multipliers",

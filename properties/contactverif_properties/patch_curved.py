@@ -45,7 +45,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, FiniteFit, RingStudy, Role, shrink_fit
-from contactverif_properties.flat_resultant import refuse_unknown_total
+from contactverif_properties.patch_flat import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.finite_lists import unless_given
 from contactverif_properties.shared.passes import nearest_sum

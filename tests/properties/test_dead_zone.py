@@ -23,9 +23,7 @@ from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif.strategies.solids import dead_zone_cases
-from contactverif_properties.dead_zone import DEAD_ZONE
-from contactverif_properties.flat_solve import FLAT_SOLVE
-from contactverif_properties.patch_variants import PATCH_VARIANTS
+from contactverif_properties.patch_solved import patch_dead_zone, patch_flat_solve, patch_variants
 from contactverif_properties.shared.patch_errors import gap_error
 from contactverif_properties.shared.solved_patch import measure_once
 from contactverif_properties.shared.uniform_pressure import consistent_forces
@@ -81,14 +79,14 @@ def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
 def test_who_passes(name: str) -> None:
     assert measure_once(load_scene_case("dead-zone"), load_subject(name)).values["stress error"] <= 1e-14
     for text in ("dead-zone", "dead-zone:degrees=17.3,refine=2", "dead-zone:ratio=1e3,poisson=0.45"):
-        outcome = judge_case(DEAD_ZONE, load_scene_case(text), load_subject(name))
+        outcome = judge_case(patch_dead_zone, load_scene_case(text), load_subject(name))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_who_passes_where_the_master_ends_at_a_slave_node_as_roundoff_will_have_it(name: str) -> None:
     case = load_scene_case("dead-zone:degrees=33,refine=3")  # the right end
-    outcome = judge_case(DEAD_ZONE, case, load_subject(name))
+    outcome = judge_case(patch_dead_zone, case, load_subject(name))
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -124,7 +122,7 @@ def test_the_numbers_of_the_design() -> None:
 
 @pytest.mark.parametrize("name", ["vts-ppt-balanced", "sts"])
 def test_who_is_right_is_not_accused(name: str) -> None:
-    (row,) = run([load_subject(name)], [DEAD_ZONE], examples=200, seed=5).rows
+    (row,) = run([load_subject(name)], [patch_dead_zone], examples=200, seed=5).rows
     assert (row.verdict, row.judged, row.unexpected) == (Verdict.PASS, 200, ""), row.reason
 
 
@@ -149,7 +147,7 @@ def test_who_is_right_is_not_accused(name: str) -> None:
 )
 def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: str) -> None:
     subject = with_promises(make, **promises)
-    (row,) = run([subject], [DEAD_ZONE], examples=20, seed=2).rows
+    (row,) = run([subject], [patch_dead_zone], examples=20, seed=2).rows
     assert row.unexpected == unexpected
     if subject.traits.covers_overhang is False and not unexpected:
         assert row.witness is not None
@@ -157,10 +155,14 @@ def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: s
 
 
 def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
-    result = run([load_subject("vts-ppt")], [DEAD_ZONE, FLAT_SOLVE, PATCH_VARIANTS], scene=load_scene_case("dead-zone"))
+    result = run(
+        [load_subject("vts-ppt")],
+        [patch_dead_zone, patch_flat_solve, patch_variants],
+        scene=load_scene_case("dead-zone"),
+    )
     assert [row.verdict for row in result.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
     assert result.promises_kept
-    (row,) = run([load_subject("sts")], [DEAD_ZONE], scene=load_scene_case("c")).rows
+    (row,) = run([load_subject("sts")], [patch_dead_zone], scene=load_scene_case("c")).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert dead_zone_cases(make_scene("c").case()) is None
 
@@ -225,8 +227,8 @@ def test_what_overhangs_may_bend() -> None:
 
 def test_a_part_of_the_slave_bears_the_rounding_of_all() -> None:
     case = load_scene_case("dead-zone")
-    plain, measurement = (measure(case, load_subject("sts")) for measure in (measure_once, DEAD_ZONE.measure))
+    plain, measurement = (measure(case, load_subject("sts")) for measure in (measure_once, patch_dead_zone.measure))
     assert measurement.values == plain.values
     for name, tolerance in plain.tolerances.items():
         assert measurement.tolerances[name] == pytest.approx(tolerance * 12 / 6.6, rel=1e-14)
-    assert judge(DEAD_ZONE, measurement)[0] is Verdict.PASS
+    assert judge(patch_dead_zone, measurement)[0] is Verdict.PASS

@@ -22,10 +22,8 @@ from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
-from contactverif_properties.flat_solve import FLAT_SOLVE
-from contactverif_properties.patch_variants import PATCH_VARIANTS
+from contactverif_properties.patch_solved import SLOPE, measure_two_penalties, patch_flat_solve, patch_variants
 from contactverif_properties.shared.solved_patch import measure_at_penalty
-from contactverif_properties.shared.two_penalties import SLOPE, measure_two_penalties
 
 
 def textbook() -> Case:
@@ -55,7 +53,7 @@ def test_the_recovered_stress_is_that_pressure(name: str) -> None:
 def test_nts_on_a1_passes_as_the_penalty_grows_because_it_locks() -> None:
     measurement = measure_two_penalties(load_scene_case("a1"), load_subject("nts"))
     assert measurement.details[SLOPE] == pytest.approx(-1, abs=0.05)
-    assert judge(FLAT_SOLVE, measurement)[0] is Verdict.FAIL
+    assert judge(patch_flat_solve, measurement)[0] is Verdict.FAIL
 
 
 def test_nts_ar_on_c_fails_at_any_penalty() -> None:
@@ -75,7 +73,7 @@ def test_a_wrong_tangent_is_no_reason_to_accuse_a_right_residual(wrong: str) -> 
         return Changed(inner, tangent=tangent)
 
     for scene in ("c-prime:lowered=0,degrees=17.3", "example-1bis"):
-        outcome = judge_case(FLAT_SOLVE, load_scene_case(scene), Subject(wrong, make))
+        outcome = judge_case(patch_flat_solve, load_scene_case(scene), Subject(wrong, make))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -88,7 +86,7 @@ def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
 
     aimless = Subject("aimless", make)
     measurement = measure_at_penalty(load_scene_case("c-prime"), aimless, load_scene_case("c-prime").penalty)
-    assert judge(PATCH_VARIANTS, measurement)[0] is Verdict.FAIL
+    assert judge(patch_variants, measurement)[0] is Verdict.FAIL
     assert measurement.values["master force error"] > 1e6 * measurement.tolerances["master force error"]
 
 
@@ -110,7 +108,7 @@ def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
 
 def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
     assert variant_cases(load_scene_case("c:sides=free")) is None
-    result = run([load_subject("vts-ppt")], [FLAT_SOLVE], scene=load_scene_case("c:sides=free"))
+    result = run([load_subject("vts-ppt")], [patch_flat_solve], scene=load_scene_case("c:sides=free"))
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
 
 
@@ -125,7 +123,7 @@ def test_every_variant_is_drawn() -> None:
     assert any(scene_of(case).bodies[1].rigid for case in cases)
 
 
-@pytest.mark.parametrize("question", [FLAT_SOLVE, PATCH_VARIANTS])
+@pytest.mark.parametrize("question", [patch_flat_solve, patch_variants])
 def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
     (row,) = run([load_subject("vts-me")], [question], scene=load_scene_case("b")).rows
     assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)

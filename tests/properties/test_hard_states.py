@@ -20,8 +20,7 @@ from contactverif.problems.hard_flat_states import (
     tiny_segment_states,
 )
 from contactverif.problems.touching_states import touching_states
-from contactverif_properties.shared.bounded_forces import knows_total
-from contactverif_properties.shared.flat_forces import exact_forces
+from contactverif_properties.hard_flat import exact_forces, knows_total
 
 TURNS = (UPRIGHT, TURNED, STEEP)
 FLAT_STATES = [*offset_states(), *deep_states(), *node_hit_states(), *search_states(), *tiny_segment_states()]

@@ -16,9 +16,9 @@ from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif_properties.flat_transmission import FLAT_TRANSMISSION, FORCE_ERROR
 from contactverif_properties.force_balance import FORCE_BALANCE
 from contactverif_properties.moment_balance import MOMENT_BALANCE
+from contactverif_properties.patch_flat import FORCE, patch_flat_transmission
 
 
 def test_the_judge_loads_no_code_of_a_plugin() -> None:
@@ -55,20 +55,20 @@ class Exact(Handmade):
 
 
 def test_exact_forces_pass() -> None:
-    outcome = judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Exact))
+    outcome = judge_case(patch_flat_transmission, named_case("a1"), subject(Exact))
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
-    assert outcome.measurement.values == {FORCE_ERROR.name: 0.0}
+    assert outcome.measurement.values == {FORCE.name: 0.0}
 
 
 @pytest.mark.parametrize("node", range(5))
 @pytest.mark.parametrize("error", [1.0, 1e-6, 1e-12])
 def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) -> None:
-    outcome = judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Exact, node=node, error=error))
+    outcome = judge_case(patch_flat_transmission, named_case("a1"), subject(Exact, node=node, error=error))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     size = [1, 2, 1, 2, 2][node]
-    assert outcome.measurement.values[FORCE_ERROR.name] == pytest.approx(error * size / 4, rel=1e-3)
+    assert outcome.measurement.values[FORCE.name] == pytest.approx(error * size / 4, rel=1e-3)
 
 
 def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
@@ -76,8 +76,8 @@ def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return -super().residual(interface, pairing, z)
 
-    assert judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Wrong)).verdict is Verdict.FAIL
-    assert judge_case(FLAT_TRANSMISSION, named_case("a1"), subject(Handmade)).verdict is Verdict.FAIL
+    assert judge_case(patch_flat_transmission, named_case("a1"), subject(Wrong)).verdict is Verdict.FAIL
+    assert judge_case(patch_flat_transmission, named_case("a1"), subject(Handmade)).verdict is Verdict.FAIL
 
 
 def test_states_that_penetrate_are_not_for_barriers() -> None:

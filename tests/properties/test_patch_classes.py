@@ -28,7 +28,7 @@ from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif_nts import force_tables
-from contactverif_properties.shared.patch_class import LOST_END
+from contactverif_properties.patch_flat import LOST_END
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 EXAMPLES = 30

@@ -22,7 +22,7 @@ from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif_properties.remote import BEHIND, FAR, REMOTE
 from contactverif_properties.renumbering import CLOSED, RENUMBERING, renumbering_cases
-from contactverif_properties.shared.relabelled import exchange_roles, mirrored, renumber
+from contactverif_properties.shared.relabelled import exchange_roles, mirror_case, renumber
 from contactverif_properties.shared.same_answer import BITS
 from contactverif_properties.symmetric import SYMMETRIC
 
@@ -179,7 +179,7 @@ def test_a_relabelled_case_is_the_same_part() -> None:
     other, carry = renumber(state, np.array([1, 0, 4, 2, 3]), np.array([0]), np.array([1, 0]))
     assert other.positions[carry.nodes].tolist() == state.positions.tolist()
     assert other.interface.master.segments.tolist() == [[2, 3], [4, 2]]
-    image, carry = mirrored(state)
+    image, carry = mirror_case(state)
     assert image.positions.tolist() == (state.positions * [-1, 1]).tolist()
     assert image.interface.slave.segments.tolist() == [[1, 0]]
     exchanged, carry = exchange_roles(state)

@@ -15,18 +15,10 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif_properties.shared.applicability import refuse_barrier
-from contactverif_properties.shared.uniform_pressure import unit_forces
+from contactverif_properties.shared.uniform_pressure import forces_of_multiplier
 
 ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.
 _Vector = tuple[Fraction, Fraction]
-
-
-def refuse_unknown_direction(traits: Traits) -> str:
-    """Return why the direction of the forces is unknown from the traits, or an empty string if they state it."""
-    if traits.force_along is None:
-        return "the trait `force_along` is not stated, so the direction of the force is unknown"
-    return refuse_barrier(traits)
 
 
 def knows_linear_total(traits: Traits) -> bool:
@@ -37,15 +29,8 @@ def knows_linear_total(traits: Traits) -> bool:
 
 def slave_forces(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_slave_nodes, 2) that push the slave; multipliers are all `uniform_multiplier`."""
-    formulation, interface = subject.for_case(case), case.interface
-    count = formulation.n_multipliers(interface)
-    state = case.with_multipliers(np.full(count, uniform_multiplier(case)))
-    pairing = formulation.pair(interface, state.z)
-    if count:
-        forces = unit_forces(state, formulation, pairing) @ state.multipliers
-    else:
-        forces = formulation.residual(interface, pairing, state.z)
-    return -forces[: 2 * interface.n_slave_nodes].reshape(-1, 2)
+    forces = forces_of_multiplier(case, subject.for_case(case), uniform_multiplier(case))[2]
+    return forces[: case.interface.n_slave_nodes]
 
 
 def uniform_multiplier(case: Case) -> float:
@@ -76,20 +61,10 @@ def directions(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
-    """Return the exact integrals ε̂ ∫N_i |g| ds n that push the slave's nodes.
+    """Return the exact integrals ε̂ ∫N_i |g| ds n (n_slave_nodes, 2) that push the slave's nodes.
 
-    Parameters
-    ----------
-    case : Case
-        A straight slave that penetrates a flat master with all its length.
-    traits : Traits
-        `gap` and `force_along` name the normals, `area` the configuration of ds. With multipliers the pressure is
-        `uniform_multiplier` everywhere.
-
-    Returns
-    -------
-    FloatArray, shape (n_slave_nodes, 2)
-        The forces; their sum is the total of every formulation with these traits.
+    The traits `gap` and `force_along` name the normals, `area` the configuration of ds. With multipliers the pressure
+    is `uniform_multiplier` everywhere. The sum is the total of every formulation with these traits.
     """
     interface, (of_master, of_slave) = case.interface, directions(case)
     lengths = interface.slave.lengths(interface.nodes if traits.area == "reference" else case.positions)

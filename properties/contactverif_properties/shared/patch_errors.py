@@ -11,34 +11,15 @@ from contactverif.contract.interface import Surface
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import overhangs
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
-from contactverif_properties.shared.uniform_pressure import consistent_forces
+from contactverif_properties.shared.uniform_pressure import consistent_forces, normal_of
 
 
 def force_errors(case: Case, scene: Scene, forces: FloatArray, q: FloatArray, pressure: float) -> tuple[float, float]:
     """Return the largest error of a nodal force on the slave and on the master, over p L.
 
-    Forces are judged twice: those that the bodies need to be in balance, and those that the formulation gives. They
-    differ where the formulation found no balance, and at rollers, which take what the bodies do not need.
-
-    Parameters
-    ----------
-    case : Case
-        The solved state.
-    scene : Scene
-        The scene that was solved.
-    forces : FloatArray, shape (n_unknowns + n_multipliers,)
-        The residual of the formulation in that state.
-    q : FloatArray, shape (n_free,)
-        The unknowns of the bodies in that state.
-    pressure : float
-        The exact pressure p.
-
-    Returns
-    -------
-    slave : float
-        The largest error over the slave's nodes, dimensionless.
-    master : float
-        The same over the master's nodes.
+    Forces are judged twice: those that the bodies need to be in balance with the unknowns q (n_free,), and those that
+    the formulation gives (n_unknowns + n_multipliers,). They differ where the formulation found no balance, and at
+    rollers, which take what the bodies do not need.
     """
     by_bodies = scene.nodal_forces(q)
     by_contact = -forces[: case.interface.n_unknowns].reshape(-1, 2)
@@ -59,18 +40,8 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
     """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
 
     A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
-
-    Parameters
-    ----------
-    case : Case
-        The solved state, with the parameters `along` and `direction` of a flat interface.
-    penetration : float
-        The exact penetration p/ε̂, a length; 0 for multipliers.
-    size : float
-        The length that the error is divided by.
     """
-    along = case.parameters["direction"]
-    heights = case.positions @ [-along[1], along[0]]
+    heights = case.positions @ normal_of(case)
     n_slave = case.interface.n_slave_nodes
     slave, master = np.split(case.parameters["along"], [n_slave])
     order = np.argsort(slave)
@@ -81,27 +52,10 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
 
 
 def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: float) -> tuple[float, float]:
-    """Return the largest errors of the gaps and pressures that a formulation reports at its contact points.
+    """Return the largest error of a reported gap over p/ε̂, and of a reported pressure over p.
 
-    Idle points do not count if they have no weight, no master segment, or lie beside the master.
-
-    Parameters
-    ----------
-    case : Case
-        The solved state.
-    points : ContactPoints
-        What the formulation reports there.
-    penalty : float
-        The distributed penalty ε̂ of the solution.
-    pressure : float
-        The exact pressure p.
-
-    Returns
-    -------
-    gap : float
-        The largest error of a reported gap over p/ε̂.
-    pressure : float
-        The largest error of a reported pressure over p; infinite if no point counts.
+    Idle points do not count if they have no weight, no master segment, or lie beside the master. The error of the
+    pressure is infinite if no point counts.
     """
     in_contact = points.active | (points.master_segment >= 0) & ~beside_master(case, points)
     counted = (points.weight != 0) & in_contact

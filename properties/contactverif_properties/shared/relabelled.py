@@ -44,7 +44,7 @@ def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> 
     return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes)
 
 
-def mirrored(case: Case) -> tuple[Case, Carry]:
+def mirror_case(case: Case) -> tuple[Case, Carry]:
     """Return the mirror image in the y-axis; segments run the other way, so that the body stays on the left."""
     interface = case.interface
     sides = (Surface(side.segments[:, ::-1]) for side in (interface.slave, interface.master))

@@ -28,10 +28,9 @@ from contactverif.problems.uniform_stress import (
     stress_error,
     uniform_tolerances,
 )
-from contactverif_properties.shared.exact_multipliers import exact_multipliers, nearest_multipliers
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.patch_errors import force_errors, gap_error, point_errors
-from contactverif_properties.shared.uniform_pressure import consistent_forces
+from contactverif_properties.shared.uniform_pressure import consistent_forces, exact_multipliers, nearest_multipliers
 
 ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
 SAME_SOLUTION = 2.0**-10  # A solution this close to the exact one, over the penetration, counts as the same one.
@@ -74,24 +73,12 @@ def measure_once(case: Case, subject: Subject) -> Measurement:
 
 
 def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
-    """Solve the scene of the case with a penalty method and return its errors.
+    """Solve the scene of the case with a penalty method at a distributed penalty ε̂, and return its errors.
 
-    Parameters
-    ----------
-    case : Case
-        A uniform scene.
-    subject : Subject
-        The formulation.
-    penalty : float
-        The distributed penalty ε̂ to solve with.
-
-    Returns
-    -------
-    Measurement
-        All dimensionless. Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master
-        force errors: the largest error of a nodal force over p L (`force_errors`). Gap error: the largest error of a
-        node's height, or of a reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p;
-        it is missing where the formulation reports none, or is nodal and so knows forces only.
+    Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master force errors: the
+    largest error of a nodal force over p L (`force_errors`). Gap error: the largest error of a node's height, or of a
+    reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p; it is missing where the
+    formulation reports none, or is nodal and so knows forces only.
     """
     scene, pressure = scene_of(case), pressure_of(case, penalty)
     formulation = subject.for_interface(case.interface, penalty)
@@ -130,23 +117,8 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
 
     Where the exact solution is a solution of the formulation, to roundoff, it counts in place of one that Newton's
     method found less exactly: a saddle point that is nearly singular spoils what Newton's method finds, and not the
-    fact that the exact solution is one.
-
-    Parameters
-    ----------
-    case : Case
-        A uniform scene.
-    subject : Subject
-        A formulation with multipliers.
-    penalty : float
-        The distributed penalty ε̂ of the case. It serves as the scale c, and as the measure of gaps.
-
-    Returns
-    -------
-    Measurement
-        Stress and forces as in `measure_at_penalty`; gaps over p/ε̂. Multiplier error: the largest error of a
-        multiplier over p, where multipliers are pressures. Where they are not unique, the solution nearest to the exact
-        multipliers counts. Details: how the solution ended, and how many multipliers were not unique.
+    fact that the exact solution is one. The penalty ε̂ serves as the scale c, and as the measure of gaps. Multipliers
+    are compared with p where they are pressures; where they are not unique, those nearest to the exact ones count.
     """
     scene, pressure = scene_of(case), pressure_of(case, np.inf)
     formulation = subject.for_interface(case.interface, penalty)
@@ -212,28 +184,10 @@ class _SaddlePoint:
 def solve_patch(
     scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
 ) -> tuple[Trace, FloatArray]:
-    """Solve a scene from its exact solution and return Newton's trace and the solution that is judged.
+    """Solve a scene from its exact solution; return Newton's trace and the unknowns (n_free + n_multipliers,) to judge.
 
     A formulation that passes is in balance there and does not move. Large motions have other solutions too, which
     nobody asks for. A formulation that is not in balance there is judged where it comes nearest to balance afterwards.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene to solve.
-    formulation : CheckedFormulation
-        The formulation, with its penalty.
-    exact : FloatArray, shape (n_free + n_multipliers,)
-        The exact solution.
-    penetration : float
-        The exact penetration p/ε̂, a length; distances from the exact solution are measured by it.
-
-    Returns
-    -------
-    trace : Trace
-        The solution.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns that are judged.
     """
     trace = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     return trace, trace.u[-1] if is_solved(trace, exact, penetration) else nearest_to_balance(trace)

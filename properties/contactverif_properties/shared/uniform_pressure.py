@@ -1,39 +1,40 @@
-"""The exact forces of a uniform pressure on a flat interface, and the forces that multipliers give."""
+"""The exact forces of a uniform pressure on a flat interface, and the multipliers that come nearest to them."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy import linalg, optimize
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.linear import RANK_ROUNDOFF
+from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights
 from contactverif_properties.shared.roundoff import gap_tolerance
 
 
-def consistent_forces(case: Case, pressure: float) -> FloatArray:
-    """Return the forces by which a uniform pressure pushes the nodes of a flat interface, exact to the last digit.
-
-    Parameters
-    ----------
-    case : Case
-        A flat case. Its parameters `along` (n_nodes,) and `direction` (2,) say where the nodes lie on the line.
-    pressure : float
-        The pressure p ≥ 0, a force per length.
-
-    Returns
-    -------
-    FloatArray, shape (n_nodes, 2)
-        Forces that push the two bodies apart: p ∫N_i over the part of the line that both surfaces cover, computed in
-        rationals.
-    """
-    weights = uniform_pressure_weights(case.interface, case.parameters["along"])
+def normal_of(case: Case) -> FloatArray:
+    """Return the unit normal (2,) out of the master of a flat case: to the left of the way the slave runs."""
     along = case.parameters["direction"]
-    normal = np.array([-along[1], along[0]])  # It points out of the master: to the left of the way the slave runs.
+    return np.array([-along[1], along[0]])
+
+
+def push_apart(case: Case, weights: FloatArray, pressure: float) -> FloatArray:
+    """Return the forces (n_nodes, 2) of a pressure over weights (n_nodes,), which push the two bodies apart."""
     sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
-    forces: FloatArray = pressure * (sides * weights)[:, None] * normal
+    forces: FloatArray = pressure * (sides * weights)[:, None] * normal_of(case)
     return forces
+
+
+def consistent_forces(case: Case, pressure: float) -> FloatArray:
+    """Return the forces (n_nodes, 2) by which a uniform pressure pushes the nodes of a flat case, exactly.
+
+    They are p ∫N_i over the part of the line that both surfaces cover, in rationals. The parameters `along` (n_nodes,)
+    and `direction` (2,) say where the nodes lie on the line.
+    """
+    return push_apart(case, uniform_pressure_weights(case.interface, case.parameters["along"]), pressure)
 
 
 def forces_of_penetration(case: Case) -> FloatArray:
@@ -41,28 +42,35 @@ def forces_of_penetration(case: Case) -> FloatArray:
     return consistent_forces(case, case.penalty * case.parameter("penetration"))
 
 
+def forces_of_multiplier(
+    case: Case, formulation: CheckedFormulation, multiplier: float
+) -> tuple[Case, Pairing | None, FloatArray]:
+    """Return the state with all multipliers alike, its pairing, and the forces (n_nodes, 2) that push the nodes.
+
+    Where there are multipliers, the forces are those of the multipliers alone.
+    """
+    interface = case.interface
+    state = case.with_multipliers(np.full(formulation.n_multipliers(interface), multiplier))
+    pairing = formulation.pair(interface, state.z)
+    if state.n_multipliers:
+        forces = unit_forces(state, formulation, pairing) @ state.multipliers
+    else:
+        forces = formulation.residual(interface, pairing, state.z)
+    return state, pairing, -forces.reshape(-1, 2)
+
+
+def uniform_forces(case: Case, subject: Subject) -> FloatArray:
+    """Return the forces (n_nodes, 2) that push the nodes; multipliers, if any, are all ε̂ |g|."""
+    return forces_of_multiplier(case, subject.for_case(case), case.penalty * case.parameter("penetration"))[2]
+
+
 def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[FloatArray, float]:
-    """Return the forces of a formulation in a state that penetrates uniformly, to compare them with the exact ones.
+    """Return the forces (n_nodes, 2) of a state that penetrates uniformly, to be compared with the exact ones.
 
     With multipliers only the distribution of the forces can be right or wrong, and not their size. Uniform multipliers
     count if they are pressures, scaled to the exact total. If they are nodal forces, those count that come nearest to
-    the exact forces.
-
-    Parameters
-    ----------
-    case : Case
-        A case with the parameter `penetration`, a length.
-    subject : Subject
-        The formulation.
-    exact : FloatArray, shape (n_nodes, 2)
-        The exact forces.
-
-    Returns
-    -------
-    forces : FloatArray, shape (n_nodes, 2)
-        The forces that push the nodes.
-    largest : float
-        The largest multiplier over the mean one, by which roundoff grows; 1 without nodal multipliers.
+    the exact forces. The second number is the largest multiplier over the mean one, by which roundoff grows; it is 1
+    without nodal multipliers.
     """
     formulation = subject.for_case(case)
     count = formulation.n_multipliers(case.interface)
@@ -85,21 +93,9 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
 
 
 def transmission_error(case: Case, subject: Subject) -> tuple[float, float]:
-    """Return the largest error of a nodal force of a uniform penetration over ε̂ |g| L, and its tolerance.
+    """Return the largest |F − F_exact| of a uniform penetration over the force on the slave, and its tolerance.
 
-    Parameters
-    ----------
-    case : Case
-        A flat case with the parameter `penetration`, a length.
-    subject : Subject
-        The formulation.
-
-    Returns
-    -------
-    error : float
-        The largest |F − F_exact| over the nodes of both surfaces, over the total force on the slave; dimensionless.
-    tolerance : float
-        `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
+    Both are dimensionless. The tolerance is `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
     """
     exact = forces_of_penetration(case)
     size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
@@ -109,25 +105,11 @@ def transmission_error(case: Case, subject: Subject) -> tuple[float, float]:
 
 
 def unit_forces(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
-    """Return what a unit of each multiplier adds to the position rows of the residual.
+    """Return what a unit of each multiplier adds to the position rows of the residual (n_unknowns, n_multipliers).
 
     On a frozen pairing the residual is affine in the multipliers. What it holds without any multiplier, as that of an
     augmented Lagrangian does, is subtracted. The formulation is asked with multipliers as large as those of the case,
     rounded to a power of two: roundoff would hide a unit beside a large penalty force.
-
-    Parameters
-    ----------
-    case : Case
-        A case with multipliers.
-    formulation : CheckedFormulation
-        The formulation that has them.
-    pairing : Pairing | None
-        The pairing, which stays frozen.
-
-    Returns
-    -------
-    FloatArray, shape (n_unknowns, n_multipliers)
-        One column for each multiplier.
     """
     n, count = case.interface.n_unknowns, case.n_multipliers
     largest = float(np.abs(case.multipliers).max(initial=0.0))
@@ -137,3 +119,42 @@ def unit_forces(case: Case, formulation: CheckedFormulation, pairing: Pairing | 
     forces = formulation.residual(case.interface, pairing, states)[:, :n]
     columns: FloatArray = (forces[:-1] - forces[-1]).T / size
     return columns
+
+
+def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulation, pressure: float) -> FloatArray:
+    """Return the multipliers (n_multipliers,) that stand for a uniform pressure in the exact state of the case.
+
+    They are the pressure itself where it gives the exact forces. Else they are the multipliers ≥ 0 that come nearest to
+    those. A multiplier that transmits nothing, as that of a node that faces nothing, is 0.
+    """
+    uniform = np.full(formulation.n_multipliers(case.interface), pressure)
+    state = case.with_multipliers(uniform)
+    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    exact = consistent_forces(case, pressure).reshape(-1)
+    nearest: FloatArray = optimize.nnls(transfer, exact)[0]  # The formulation would release one below 0.
+    if subject.traits.penalty != "nodal":
+        uniform[~transfer.any(axis=0)] = 0.0
+        errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]
+        if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):
+            return uniform
+    return nearest
+
+
+def nearest_multipliers(
+    case: Case, scene: Scene, formulation: CheckedFormulation, exact: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return, of all multipliers that load the bodies as those of a solved case do, the nearest to the exact ones.
+
+    A combination of multipliers that loads no body may be added to a solution. Such combinations exist where
+    multipliers are not unique, and on a rigid master, where only the sum of the nodal forces counts. The second number
+    is the smallest singular value of the loads of unit multipliers on the bodies over the largest one: forces that are
+    wrong by roundoff leave the multipliers uncertain by roundoff over that number.
+    """
+    solution = case.multipliers
+    pairing = formulation.pair(case.interface, case.z)
+    loads = scene.transformation.T @ unit_forces(case, formulation, pairing)
+    _, sizes, directions = linalg.svd(loads)
+    rank = int((sizes > RANK_ROUNDOFF * max(loads.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
+    free = directions[rank:]
+    nearest: FloatArray = solution + free.T @ (free @ (exact - solution))
+    return nearest, float(sizes[rank - 1] / sizes[0]) if rank else 1.0

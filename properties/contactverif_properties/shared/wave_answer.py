@@ -17,8 +17,8 @@ from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns
 from contactverif.problems.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
-from contactverif_properties.shared.exact_multipliers import exact_multipliers
 from contactverif_properties.shared.frozen_solution import solve_frozen
+from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
 # Springs that add less than this share s to the compliance of the bodies count as adding so much. They are 1/s times as
 # stiff, which is the condition of the matrix, so that roundoff of the solution adds u/s. Both are equal at s = √u.

@@ -1,0 +1,257 @@
+"""Hard states at vertices, at free ends and in touch, judged by what every right formulation fulfils there.
+
+At a kink two right formulations may give different forces. What they have in common:
+
+- The total force on the slave is a sum of pushes along normals that lie between those of the master segments there.
+- No gap is longer than the interface, so no force is larger than the springs on that gap.
+- Where `penalty` and `area` are stated, weights are positive and add up to the slave's length. So the total lies
+  between the least and the largest gap times that length. A formulation that states its rule for gaps (`gap`) gets the
+  bounds of a push along normals of segments; any other gets those of any direction in between.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.property import WITHOUT_BARRIER, Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import Subject
+from contactverif.problems.hard_corner_states import (
+    concave_corner_states,
+    convex_kink_states,
+    free_end_states,
+    steep_slave_states,
+)
+from contactverif.problems.touching_states import touching_states
+from contactverif_properties.hard_flat import knows_total
+from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
+from contactverif_properties.shared.uniform_pressure import uniform_forces
+
+_TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
+DIRECTION = Quantity("part outside the normals", "1", _TOLERANCE, SEGMENT_REASON)
+TOTAL = Quantity("excess of the total", "1", _TOLERANCE, SEGMENT_REASON)
+TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
+SIZE = Quantity("force over ε̂ D L", "1", "4", f"No gap is longer than D; {TWO_PASSES}")
+
+
+def measure_bounded(case: Case, subject: Subject) -> Measurement:
+    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
+    bounds = case.parameters["segment_bounds" if subject.traits.gap else "bounds"] * case.penalty
+    slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
+    total, size = slave.sum(axis=0), float(np.abs(slave).sum())
+    largest = case.penalty * case.diameter * case.slave_length
+    values, tolerances, broken = {SIZE: size / largest}, {SIZE: 4.0}, ""
+    if bounds[1] == 0:
+        broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
+    else:
+        values[DIRECTION] = ratio(_outside(total, case.parameters["edges"]), size)
+        if knows_total(subject.traits):
+            along = float(total @ case.parameters["axis"])
+            values[TOTAL] = max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1])
+    reach = min(case.parameter("penetration"), case.shortest_segment)
+    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments)
+    tolerances |= {name: tolerance for name in values if name != SIZE}
+    details = {"share of the upper bound": ratio(float(total @ case.parameters["axis"]), float(bounds[1]))}
+    # Where the lower bound is 0, no force is as good an answer as any.
+    return Measurement(check_all(values, tolerances), broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
+
+
+def _outside(force: FloatArray, edges: FloatArray) -> float:
+    """Return the part of a force that lies outside the directions between two edges, a force ≥ 0."""
+    right, left = edges
+    middle = right + left
+    sideways = max(-_cross(right, force), -_cross(force, left))
+    return max(0.0, sideways, -float(force @ middle) / float(np.linalg.norm(middle)))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+_define = partial(Property.define, family="hard", quantities=(DIRECTION, TOTAL, SIZE), promise=lambda traits: True)
+
+
+@_define(
+    id="hard.convex-kink",
+    summary="A slave node that passes a convex master vertex within 1e-12 feels no wild force.",
+    cases=Cases.from_list(convex_kink_states),
+)
+def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a slave node that crosses the bisector of a convex vertex feels a sound force on either side.
+
+    **Question.** The master is a roof with a kink of 0.1, 0.5 or 1.5 rad, and the slave is a parallel roof below it.
+    Its vertex is on the bisector, or 1e-3 to 1e-12 to either side. Is the total force what the gap says, and does it
+    point between the two normals?
+
+    **Why it matters.** Where two segments are nearly equally near, one code takes neither, one takes both, and one
+    averages to a direction outside the two. The sliding body then jumps or sticks at each vertex.
+
+    **How it is judged.** The direction of a node's force may jump by the kink's angle as it crosses, since the nearest
+    segment does. What every right formulation fulfils: each push is along a normal between those of the two segments,
+    and each side has one gap, d cos a ∓ δ sin a (a half of the kink, d the depth straight down, δ the distance from the
+    bisector). So where `penalty` and `area` are stated, the vertical force is ε̂ L cos a times a number between these
+    two gaps, on both sides of the bisector: as δ goes to 0 it is continuous. A formulation that states no rule for gaps
+    may look straight up at the vertex, and is allowed the gap d there. The tolerance is u(8X/min(|g|, ℓ) + 4N).
+
+    **Undecided.** Never: on the bisector itself the bounds allow for either segment.
+    """
+    return measure_bounded(case, subject)
+
+
+@_define(
+    id="hard.concave-corner",
+    summary="A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.",
+    cases=Cases.from_list(concave_corner_states),
+)
+def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a corner that sits in a re-entrant corner is pushed by both faces.
+
+    **Question.** The corner of the slave penetrates both faces of a 90° corner of the master. Its node is equally far
+    from both, or nearer to one by a rounding. Are both faces felt, and is the node counted once?
+
+    **Why it matters.** The foot of that node lies on neither face. A code that asks for a foot inside a segment loses
+    the node, and the body falls into the corner. Another one counts it twice.
+
+    **How it is judged.** All gaps are d. Normals are along the axes, so the sum of both components of the total force
+    is ε̂ d times the area that is felt: that of the parts that face a face along its normal at least, and the slave's
+    length at most. A formulation that states no rule for gaps may push along the diagonal, and may lose what is at the
+    node alone. No force pulls. The tolerance is u(8X/min(|g|, ℓ) + 4N). Totals are asked where `penalty` and `area` are
+    stated, directions of everybody.
+
+    **Undecided.** Never: which face takes the node is left open by the bounds.
+    """
+    return measure_bounded(case, subject)
+
+
+@_define(
+    id="hard.free-end",
+    summary="At a free end the force is between that of the inner segments and that of all; beyond it is 0.",
+    cases=Cases.from_list(free_end_states),
+)
+def hard_free_end(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a slave that ends at, past or beyond the master's free end feels a sound force.
+
+    **Question.** The first node of the slave is at the free end of a flat master, a rounding beside it, or up to half a
+    segment past it; or the slave is wholly outside. Is the total force between that of the segments that surely face
+    the master and that of all, and 0 outside?
+
+    **Why it matters.** A body that slides off an edge passes all these states. A master that is continued past its end
+    holds it in the air.
+
+    **How it is judged.** How far past an end a point still counts is a choice, such as the option τ. The jump of the
+    force as a point crosses that distance is the force of the point, so it is no more than that of its segment. Hence
+    where `penalty` and `area` are stated, the total is at least ε̂ |g| times the length of the other segments, and at
+    most that of the whole slave. The detail `share of the upper bound` shows the jump: compare the cases 0.0099 and
+    0.0101 past the end for τ = 0.01. A slave wholly outside, by the length of a segment or more, must feel exactly
+    nothing, whatever the formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N).
+
+    **Undecided.** Never: what a formulation may choose is inside the bounds.
+    """
+    return measure_bounded(case, subject)
+
+
+@_define(
+    id="hard.steep-slave",
+    summary="A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.",
+    cases=Cases.from_list(steep_slave_states),
+)
+def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a slave segment that stands on the master, or faces away from it, gives a sound force.
+
+    **Question.** A slave segment is at 89.9°, 90° or 180° to the master that it penetrates: it stands on it, with
+    either side in front, or lies in it with its back to it. Is the force finite, bounded, and no pull?
+
+    **Why it matters.** A projected length is 0 there, and a gap along the slave's normal is infinite. Thin bodies,
+    edges and corners meet their masters like that.
+
+    **How it is judged.** A formulation may see such a segment or not. What every right formulation fulfils: all numbers
+    are finite; the force points between the master's normal and the direction into the slave's body (at 180°: along the
+    master's normal); it is at most ε̂ D L, since no gap is longer than the interface's diameter D. Where `penalty` and
+    `area` are not stated, springs may act in two passes, and 4 ε̂ D L is allowed.
+
+    **Undecided.** Never.
+    """
+    return measure_bounded(case, subject)
+
+
+DEPTH = 64.0  # The depth d over u X. It is eight times what a gap is rounded to, so that each has its sign.
+FORCE = Quantity(
+    "force in touch", "1", "4 (8u + |g|/X)", "A gap is rounded to 8uX, and springs act in two passes at most."
+)
+SLIDING = Quantity(
+    "stiffness along the surface",
+    "1",
+    "64 u X/ℓ + 4(|g| + d)/ℓ",
+    "Rounding the ends of a segment turns its normal by uX/ℓ. d = 64 u X is the depth of the state.",
+)
+PRESSING = Quantity("stiffness across the surface", "1", "4", TWO_PASSES.capitalize())
+PULLING = Quantity("pull across the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "A spring resists, and never helps.")
+
+
+@Property.define(
+    id="hard.touch",
+    family="hard",
+    summary="Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.",
+    quantities=(FORCE, SLIDING, PRESSING, PULLING),
+    cases=Cases.from_list(touching_states),
+    promise=lambda traits: True,
+    asks=WITHOUT_BARRIER | {"barrier"},
+    applicable=lambda traits: "a barrier is infinite in touch" if traits.enforcement == "barrier" else "",
+)
+def hard_touch(case: Case, subject: Subject) -> Measurement:
+    """Ask whether surfaces that just touch give neither a force nor nonsense.
+
+    **Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. Is the force
+    no more than roundoff makes it, and is the tangent that of a spring across the surface, or of none?
+
+    **Why it matters.** A normal that is computed as the difference of point and foot over their distance is 0/0 in
+    touch, and has any direction at 1e-16. The force is tiny then, and the tangent is as wrong as can be: Newton's
+    method slides the bodies.
+
+    **How it is judged.** The first number is the largest nodal force over ε̂ h, a length, in units of the largest
+    coordinate X, h the longest slave segment: at most 4 (8u + |g|/X), since a gap is rounded to 8uX, and springs act in
+    two passes at most. With an exact tangent, the slave is moved across its surface. It meets between no resistance
+    (open) and that of all springs, 4 ε̂ L. Near the origin, where the gap is ±1e-16, it is also moved along its
+    surface, with the slave d = 64 u X deeper. No gap changes, so the derivative of a force is at most that of rounded
+    directions, 64 u X/ℓ + 4(|g| + d)/ℓ, over ε̂ h. At a gap of 0 there is no derivative: the columns of a complex step
+    take the side of their own rounding there, each for itself. At d every gap has its sign in spite of its rounding of
+    8 u X, while a normal that is a difference over a distance still turns by u X/d = 1/64. All multipliers are 0 here.
+
+    **Undecided.** Never: contact may be active or not, and the numbers allow for both.
+    """
+    formulation, interface = subject.for_case(case), case.interface
+    state = case.with_multipliers(np.zeros(formulation.n_multipliers(interface)))
+    pairing = formulation.pair(interface, state.z)
+    forces = formulation.residual(interface, pairing, state.z)[: interface.n_unknowns]
+    longest = float(interface.slave.lengths(case.positions).max())
+    size, gap = case.largest_coordinate, abs(case.parameter("shift"))
+    values = {FORCE: float(np.abs(forces).max()) / (case.penalty * longest * size)}
+    tolerances = {FORCE: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
+    if "tangent" in subject.provides and subject.traits.tangent == "exact":
+        n = interface.n_unknowns
+        tangent = dense(formulation.tangent(interface, pairing, state.z))[:n, :n]
+        along, across = _motions(case)
+        resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
+        values |= {PRESSING: resistance, PULLING: -resistance}
+        roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
+        tolerances |= {PRESSING: 4.0, PULLING: roundoff}
+        if gap:
+            depth = DEPTH * UNIT_ROUNDOFF * size
+            z = state.z.copy()
+            z[:n] -= depth * across
+            tangent = dense(formulation.tangent(interface, formulation.pair(interface, z), z))[:n, :n]
+            values[SLIDING] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
+            tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
+    return Measurement(check_all(values, tolerances))
+
+
+def _motions(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the motions (n_unknowns,) of the slave by a unit along and across its surfaces."""
+    along = case.parameters["directions"].copy()
+    along[case.interface.n_slave_nodes :] = 0.0
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    return along.reshape(-1), across.reshape(-1)

@@ -1,0 +1,183 @@
+"""Hard states of a flat interface with a uniform penetration: far away, deep, over a node, or near other surfaces.
+
+All rules for gaps agree there, so every formulation is asked something: no force along the surface, and a push out of
+the master (everybody); the total (who states `penalty` and `area`); each nodal force (unless `passes_flat_patch` is
+False).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.property import Measurement, Property, check_all
+from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.problems.hard_flat_states import deep_states, node_hit_states, offset_states, search_states
+from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
+from contactverif_properties.shared.uniform_pressure import (
+    forces_of_gap,
+    forces_of_penetration,
+    normal_of,
+    push_apart,
+    uniform_forces,
+)
+
+TOTAL = stated_gap_quantity("error of the total force")
+NODAL = stated_gap_quantity("error of a nodal force")
+ALONG = replace(
+    TOTAL,
+    name="force along the surface",
+    reason=f"{TOTAL.reason} A flat surface pushes across itself alone.",
+)
+FLAT_QUANTITIES = (ALONG, TOTAL, NODAL)
+VACUOUS = "the gap is smaller than the rounding of positions that far from the origin"
+
+
+def knows_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of a uniform penetration is."""
+    return traits.penalty == "distributed" and traits.area is not None
+
+
+def promise_flat_forces(traits: Traits) -> bool | None:
+    """Return True where the traits promise what is asked, the patch test or at least the total; else None."""
+    return True if traits.passes_flat_patch or (traits.passes_flat_patch is False and knows_total(traits)) else None
+
+
+def measure_flat(case: Case, subject: Subject) -> Measurement:
+    """Compare the forces of a uniform penetration with what is known about them."""
+    penetration, traits = case.parameter("penetration"), subject.traits
+    tolerance = gap_tolerance(case, penetration, rounding_distance(case, traits))
+    if tolerance >= 1:
+        return Measurement(undecided=VACUOUS)
+    exact = exact_forces(case)
+    slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
+    along, normal = case.parameters["direction"], normal_of(case)
+    values = {ALONG: ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum()))}
+    tolerances = {ALONG: tolerance}
+    push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
+    broken = "" if push > 0 else "nothing pushes the slave out of the master"
+    if knows_total(traits):
+        values[TOTAL], tolerances[TOTAL] = abs(push / whole - 1), tolerance
+    if traits.passes_flat_patch is not False:
+        forces, largest = forces_of_gap(case, subject, exact)
+        values[NODAL] = float(np.linalg.norm(forces - exact, axis=1).max()) / whole
+        tolerances[NODAL] = tolerance * largest
+    return Measurement(check_all(values, tolerances), broken=broken)
+
+
+def exact_forces(case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) of the pressure ε̂ |g| that push the nodes of a flat state."""
+    if "weights" not in case.parameters:  # There is no other surface than the flat one.
+        return forces_of_penetration(case)
+    return push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
+
+
+_define = partial(
+    Property.define,
+    family="hard",
+    quantities=FLAT_QUANTITIES,
+    promise=promise_flat_forces,
+    exact=exact_forces,
+)
+
+
+@_define(
+    id="hard.offset",
+    summary="Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.",
+    cases=Cases.from_list(offset_states),
+)
+def hard_offset(case: Case, subject: Subject) -> Measurement:
+    """Ask whether forces stay right far from the origin, where gaps are small differences of large coordinates.
+
+    **Question.** A flat interface with lengths near 1 lies 1e6, 1e8 or 2^10 away from the origin, and penetrates by
+    1e-6, 1e-9, or one step of the doubles. Are the forces those of the gap that the stored numbers say?
+
+    **Why it matters.** Users work in millimetres, with coordinates of a site or of a whole machine. A kernel that
+    rounds a point where it is, and then subtracts a node, loses the gap. At 1e6 and a gap of 1e-6 that costs a part in
+    1e4 of the force, and nobody sees it.
+
+    **How it is judged.** The states are flat to the last bit: upright, or turned by a Pythagorean triple, with
+    coordinates of few enough bits. So the stored gap is uniform, and the forces are exact in rationals. Near 1e8 the
+    stored gap is not the one that was asked for, and the stored one counts. What is asked depends on the traits: no
+    force along the surface (everybody), the total (who states `penalty` and `area`), each nodal force (unless
+    `passes_flat_patch` is False). The tolerance is u(8Z/|g| + 4N). Z is the diameter D of the interface for whoever
+    says `translation_stable`, and the largest coordinate X for everybody else.
+
+    **Undecided.** The case whose gap is one step of the doubles is undecided without that promise: there the tolerance
+    is more than the force.
+    """
+    return measure_flat(case, subject)
+
+
+@_define(
+    id="hard.deep",
+    summary="A penetration of half a segment or two segments gives the forces of that penetration.",
+    cases=Cases.from_list(deep_states),
+)
+def hard_deep(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a deep penetration gives the forces of that penetration.
+
+    **Question.** A flat slave penetrates a flat master by half a segment, and by two segments. Are the forces those of
+    the pressure ε̂ |g|?
+
+    **Why it matters.** A first guess of Newton's method, or a large load step, often penetrates that deep. A search
+    that looks at near segments only, or takes what is deep for the far side of the body, lets the bodies pass through.
+
+    **How it is judged.** As in `hard.offset`: flat states that are exact in binary, no force along the surface, the
+    total and the nodal forces as the traits promise them, with the tolerance u(8Z/|g| + 4N).
+
+    **Undecided.** Never.
+    """
+    return measure_flat(case, subject)
+
+
+@_define(
+    id="hard.node-hit",
+    summary="A point over a master node, or beside it by one rounding, is counted once.",
+    cases=Cases.from_list(node_hit_states),
+)
+def hard_node_hit(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a point that hits a master node, or misses it by one rounding, is counted once.
+
+    **Question.** A slave node, a quarter point or the middle of a slave segment lies over a master node exactly, or one
+    rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Are the forces as if nothing were special there?
+
+    **Why it matters.** A point that belongs to both segments is counted twice by one code, and lost by another. Meshes
+    of two bodies share lines more often than not, so this is the normal case.
+
+    **How it is judged.** As in `hard.offset`: the interface is flat, so both segments give the same gap, and the exact
+    forces are those of a uniform pressure. The tolerance is u(8Z/|g| + 4N).
+
+    **Undecided.** Never: whichever segment a formulation takes, the answer is the same.
+    """
+    return measure_flat(case, subject)
+
+
+@_define(
+    id="hard.search",
+    summary="Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.",
+    cases=Cases.from_list(search_states),
+)
+def hard_search(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the search finds the right master segment where other surfaces are near.
+
+    **Question.** The slave lies on a flat part of the master. Something else is near: a node that is nearer than those
+    of the right segment, the other side of a thin plate or of a sharp wedge, a second body behind the first, or the
+    place where a closed chain begins. Are the forces those of the flat part alone?
+
+    **Why it matters.** These are the named failures of projection in the manuals of contact codes. A search that starts
+    from the nearest node ends on the wrong side of a plate, and pulls where it should push.
+
+    **How it is judged.** The flat part is the nearest surface, and the first that the slave's normal meets, for every
+    point of the slave. So all rules agree, and the exact forces are those of a uniform pressure on it; all other nodes
+    are free. What is asked, and the tolerance u(8Z/|g| + 4N), are as in `hard.offset`.
+
+    **Undecided.** Never.
+    """
+    return measure_flat(case, subject)

@@ -1,0 +1,296 @@
+"""Hard scenes, which are solved: bodies and meshes that differ much, tiny segments and overlaps, no load at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import Subject
+from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import has_bodies, scene_of
+from contactverif.mechanics.system import System
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.hard_flat_states import tiny_segment_states
+from contactverif.problems.hard_scenes import (
+    case_c,
+    contrast_scenes,
+    stiff_scenes,
+    tiny_segment_scenes,
+    unloaded_scenes,
+    vanishing_overlap_scenes,
+)
+from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif_properties.hard_flat import FLAT_QUANTITIES, exact_forces, measure_flat
+from contactverif_properties.patch_solved import patch_dead_zone
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.newton_solution import end_details
+from contactverif_properties.shared.solved_patch import (
+    GAP,
+    MULTIPLIERS,
+    PRESSURE,
+    QUANTITIES,
+    STRESS,
+    forces_to_draw,
+    measure_once,
+)
+from contactverif_properties.shared.uniform_pressure import exact_multipliers
+
+
+def measure_patch(case: Case, subject: Subject) -> Measurement:
+    """Return the errors of a flat state (`measure_flat`), or of a solved scene (`measure_once`)."""
+    if not has_bodies(case):
+        return measure_flat(case, subject)
+    measurement, traits = measure_once(case, subject), subject.traits
+    if traits.passes_flat_patch and traits.independent_multipliers is False:
+        # Newton's method may release a redundant multiplier, and others carry its force: another solution.
+        return replace(measurement, undecided="the multipliers are not independent, so the forces are not unique")
+    return measurement
+
+
+def patch_forces(case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) of a state or a scene, for pictures."""
+    return forces_to_draw(case) if has_bodies(case) else exact_forces(case)
+
+
+_define = partial(Property.define, family="hard", bodies=True)
+_define_patch = partial(
+    _define,
+    quantities=(*FLAT_QUANTITIES, *QUANTITIES, MULTIPLIERS),
+    promise=lambda traits: True if traits.passes_flat_patch else None,  # Which of the cases would fail is not stated.
+    exact=patch_forces,
+)
+
+
+@_define_patch(
+    id="hard.c",
+    summary="Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.",
+    cases=Cases.from_list(case_c),
+)
+def hard_c(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the reference paper's case C, and its variant off the kink, give exact forces and stresses.
+
+    **Question.** Two slave segments of 2 and two of 4 lie on four master segments of 3. One area of competence covers
+    two master segments, and its virtual slave node is exactly on a master node (C), or beside it (C′). Are the forces
+    of a uniform penetration exact, and is the stress of two blocks under a uniform pressure?
+
+    **Why it matters.** It is the smallest mesh on which VTS-ME and its relatives fail the patch test, and the one by
+    which the paper shows that VTS-PPT passes. In C roundoff decides between two segments in every iteration of Newton's
+    method.
+
+    **How it is judged.** The states have the paper's forces, in rationals, and are judged as in `hard.offset`. The
+    scenes have a master three times as stiff, and ε̂ = E and 1e4 E; they are judged as in `patch.flat.solve`, with its
+    tolerances. The promise is `passes_flat_patch`.
+
+    **Undecided.** Never: on a flat interface both partners of the kink give the same gap.
+    """
+    return measure_patch(case, subject)
+
+
+@_define_patch(
+    id="hard.contrast",
+    summary="A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.",
+    cases=Cases.from_list(contrast_scenes),
+)
+def hard_contrast(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the choice of the slave matters where stiffness and mesh differ much.
+
+    **Question.** A block with 8 segments lies on one with 2. Either is the slave, and either is softer by 1e6, or they
+    are equally stiff. Is the stress of a uniform pressure exact at 10 E/h and at 1e5 E/h?
+
+    **Why it matters.** Manuals tell users to take the softer or the finer body as the slave, and warn of locking
+    otherwise. A formulation that passes the patch test must pass it for every choice.
+
+    **How it is judged.** As in `patch.flat.solve`, with its tolerances. The promise is `passes_flat_patch`. Whether
+    pressures that vary lock is another question, which this one does not answer.
+
+    **Undecided.** Never.
+    """
+    return measure_patch(case, subject)
+
+
+@_define_patch(
+    id="hard.short-segment",
+    summary="One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.",
+    cases=Cases.from_list(lambda: tiny_segment_states() + tiny_segment_scenes()),
+)
+def hard_short_segment(case: Case, subject: Subject) -> Measurement:
+    """Ask whether one tiny segment among ordinary ones spoils forces or stresses.
+
+    **Question.** An interface of length 12 has a segment of 1.2e-5 on the slave, on the master, on both facing each
+    other, or at the end. Are forces and stresses still those of a uniform pressure, at ε̂ = 1, 1e4 and 1e8?
+
+    **Why it matters.** Meshes that were cut or merged have slivers. Whoever divides by a length, or compares it with an
+    absolute number, finds out there.
+
+    **How it is judged.** As states, with the penalties as they are: as in `hard.offset`. Solved, with E = 1 in both
+    blocks: as in `patch.flat.solve`, whose tolerances have the term 5e-15/r for the ratio r = 4e-6 of the shortest to
+    the longest segment. The promise is `passes_flat_patch`.
+
+    **Undecided.** A scene that fails is undecided for multipliers that are not independent: Newton's method may release
+    one that is redundant on the tiny segment, and others carry its force.
+    """
+    return measure_patch(case, subject)
+
+
+@_define_patch(
+    id="hard.stiff",
+    summary="Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.",
+    cases=Cases.from_list(stiff_scenes),
+)
+def hard_stiff(case: Case, subject: Subject) -> Measurement:
+    """Ask whether very stiff springs between very unequal bodies spoil the stress.
+
+    **Question.** The penalty is 1e4 or 1e10 E/h, E that of the softer body, and E of the master is 1e-6, 1 or 1e6 times
+    that of the slave. Is the stress of a uniform pressure still as exact as the condition of the matrix allows?
+
+    **Why it matters.** Users raise the penalty until the penetration is small, and press rubber on steel. A tangent
+    that subtracts large numbers, or a pressure that is computed from a gap near roundoff, then gives noise in place of
+    stress.
+
+    **How it is judged.** As in `patch.flat.solve`. Its tolerances contain the condition κ of the matrix and the
+    rounding X ε̂/p of gaps, so they are wide at 1e10: up to 1 part in 10 for pressures. What is asked there is that
+    nothing is worse than conditioning, that Newton's method comes near a solution, and that all numbers are finite. The
+    promise is `passes_flat_patch`.
+
+    **Undecided.** Never.
+    """
+    return measure_patch(case, subject)
+
+
+POINTWISE = (GAP.name, PRESSURE.name)
+
+
+def _divide_by_share(quantity: Quantity) -> Quantity:
+    """Return the quantity with the tolerance that the share adds."""
+    term = " + 64 u X ε̂/(p s)" if quantity.name in POINTWISE else ""
+    tolerance = f"{quantity.tolerance}{term}; with multipliers X/s in place of X"
+    reason = "s is the share of the slave segment that the master covers, by which roundoff of its gap grows."
+    return replace(quantity, tolerance=tolerance, reason=f"{quantity.reason} {reason}")
+
+
+@_define(
+    id="hard.dead-zone",
+    summary="A uniform pressure stays exact where the master covers 1e-1 to 1e-12 of a slave segment.",
+    quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
+    cases=Cases.from_list(vanishing_overlap_scenes),
+    promise=lambda traits: True if traits.covers_overhang else None,
+    exact=forces_to_draw,
+)
+def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the patch test holds where the master covers almost nothing of the last slave segment.
+
+    **Question.** The master ends inside a slave segment, of which it covers 1e-1 to 1e-12. Is the stress of a uniform
+    pressure exact?
+
+    **Why it matters.** As a body slides off an edge, every such share occurs. A nodal gap is then an integral over the
+    share, divided by another one. A multiplier has next to nothing to act on, and the matrix loses rank.
+
+    **How it is judged.** As in `patch.dead-zone`, and promised by the same trait, `covers_overhang`. Where the master
+    covers a share s of a segment, roundoff of a gap there grows by 1/s. So what is measured at single points (gaps and
+    pressures) has the rounding term 64 u X ε̂/(p s) more, and with multipliers all that is measured has X/s in place of
+    X: a force that no gap holds is known no better. Details say what the matrix of the exact solution is like: its
+    reciprocal condition, with multipliers scaled to the bodies, and how many of its singular values are 0 to roundoff.
+    Nobody promises anything about these two. A rank that falls by one is what an overlap of 0 means for a method with
+    multipliers.
+
+    **Undecided.** Never.
+    """
+    measurement = patch_dead_zone.measure(case, subject)
+    rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure_of(case, case.penalty)
+    more = rounding / covered_share(case)
+    if subject.traits.enforcement == "multiplier":
+        growth = 1 + more / measurement.tolerances[STRESS.name]  # The other tolerances are multiples of this one.
+        numbers = [replace(number, tolerance=growth * number.tolerance) for number in measurement.numbers]
+    else:
+        numbers = [
+            replace(number, tolerance=number.tolerance + more) if number.quantity.name in POINTWISE else number
+            for number in measurement.numbers
+        ]
+    return replace(measurement, numbers=numbers, details={**measurement.details, **_rank(case, subject)})
+
+
+def covered_share(case: Case) -> float:
+    """Return the least share of a slave segment that the master covers, of those of which it covers something."""
+    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    ends = np.sort(slave[case.interface.slave.segments], axis=1)
+    covered = np.minimum(ends[:, 1], master.max()) - np.maximum(ends[:, 0], master.min())
+    shares = covered / (ends[:, 1] - ends[:, 0])
+    return float(shares[shares > 0].min())
+
+
+def _rank(case: Case, subject: Subject) -> dict[str, float]:
+    """Return the reciprocal condition and the lack of rank of the matrix at the exact solution."""
+    scene, formulation, multipliers = scene_of(case), subject.for_case(case), np.zeros(0)
+    penalty = np.inf if subject.traits.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty)
+    exact = exact_unknowns(scene, pressure, penalty)
+    if formulation.n_multipliers(case.interface):
+        state = replace(case, z=scene.positions(exact))
+        multipliers = exact_multipliers(state, subject, formulation, pressure)
+    system, u = System(scene, formulation, use_tangent=False), np.append(exact, multipliers)
+    matrix = system.matrix(u, system.pair(u))[0]
+    rows, columns = scale_factors(matrix, scene.n_free)
+    sizes = linalg.svdvals(rows[:, None] * matrix * columns)
+    floor = RANK_ROUNDOFF * len(sizes) * UNIT_ROUNDOFF * sizes[0]
+    return {"reciprocal condition": float(sizes[-1] / sizes[0]), "lack of rank": float((sizes <= floor).sum())}
+
+
+ITERATIONS = 10  # From touch, Newton's method ends at once or wanders; then rest itself is judged.
+NO_STRESS = Quantity(
+    "stress without a load",
+    "1",
+    f"({CONDITION_TOLERANCE}) S/ℓ + 64 u (X/ℓ)(1 + ε̂ ℓ/E)",
+    "Displacements and gaps are rounded like coordinates X, which strains the shortest segment ℓ. "
+    "The step from a start that is S away is solved as exactly as the condition of the matrix allows.",
+)
+NO_FORCE = replace(NO_STRESS, name="force without a load")
+
+
+@_define(
+    id="hard.zero-load",
+    summary="Two bodies that touch without a load stay without stress, wherever Newton's method starts.",
+    quantities=(NO_STRESS, NO_FORCE),
+    cases=Cases.from_list(unloaded_scenes),
+    promise=lambda traits: True,
+    applicable=refuse_dependent_multipliers,
+)
+def hard_zero_load(case: Case, subject: Subject) -> Measurement:
+    """Ask whether two bodies that touch without a load stay at rest.
+
+    **Question.** Two blocks touch each other and carry no load. They start in touch, pushed into each other, or lifted.
+    Does Newton's method end in a state without stress, and is rest in touch a solution?
+
+    **Why it matters.** Every assembly begins like this: gap zero, force zero. The active set hangs on the sign of a gap
+    of 1e-16 there. A normal that is computed as a difference over a distance is 0/0.
+
+    **How it is judged.** Without a load the exact answer is no stress, wherever the upper block rests. The first number
+    is the largest stress over E of the stiffer body, the second the largest contact force over E H. Both are at most 64
+    u (X/ℓ)(1 + ε̂ ℓ/E), since displacements and gaps are rounded like coordinates X on the shortest segment ℓ, and what
+    the condition of the matrix leaves of a start that is S away. The iterate with the least residual counts: against
+    terms that all vanish, no residual is small. Where Newton's method does not end by itself, as in touch it may not,
+    the state of rest itself is judged: nothing is strained there, so the formulation must give no force.
+
+    **Undecided.** Never.
+    """
+    scene, formulation = scene_of(case), subject.for_case(case)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    u = trace.u[int(np.argmin(trace.residuals))] if trace.converged else np.zeros(trace.u.shape[1])
+    q = u[: scene.n_free]
+    z = np.append(scene.positions(q), u[scene.n_free :])
+    forces = formulation.residual(case.interface, formulation.pair(case.interface, z), z)[: case.interface.n_unknowns]
+    young = max(body.young for body in scene.bodies)
+    height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
+    stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))
+    tolerance = 64 * UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
+    tolerance *= 1 + case.penalty * case.shortest_segment / young
+    tolerance += condition_tolerance(scene, case.penalty) * float(np.abs(scene.start).max()) / case.shortest_segment
+    values = {NO_STRESS: stress / young, NO_FORCE: float(np.abs(forces).max()) / (young * height)}
+    return Measurement(check_all(values, tolerance), details=end_details(trace))

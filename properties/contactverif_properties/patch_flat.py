@@ -1,0 +1,393 @@
+"""The patch test on the interface alone: a uniform penetration of flat surfaces gives the exact forces.
+
+Who passes the test of a class of meshes passes that of each smaller class. A formulation that states the larger promise
+alone is asked about all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.errors import ContractError
+from contactverif.contract.property import Measurement, Property, check_all
+from contactverif.contract.published_forces import parse_forces
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
+from contactverif.oracle import nodal_spring_weights
+from contactverif.problems.named_states import FLAT_NAMES, named_case
+from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif_properties.shared.kinks import explain_by_kink
+from contactverif_properties.shared.patch_errors import point_errors
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
+from contactverif_properties.shared.uniform_pressure import (
+    consistent_forces,
+    forces_of_multiplier,
+    forces_of_penetration,
+    push_apart,
+    transmission_error,
+    unit_forces,
+)
+
+FORCE = gap_quantity("error of a nodal force")
+TOTAL = gap_quantity("error of the total force")
+GAP = gap_quantity("error of a reported gap")
+PRESSURE = gap_quantity("error of a reported pressure")
+REPORTED_FORCE = gap_quantity("error of a reported nodal force")
+STATED = gap_quantity("difference from the stated forces")
+LOST_END = "a slave node faces a free end of the master exactly, and roundoff decides whether it is over the master"
+_MOVED = 16.0  # A moved end node bends shares by 128uX over a segment, which the tolerance 8uX/|g| does not cover.
+
+_define = partial(Property.define, family="patch")
+
+
+@_define(
+    id="patch.flat.transmission",
+    summary="A uniform penetration of a flat interface gives the exact nodal forces on both sides.",
+    quantities=(FORCE,),
+    cases=Cases.random(flat_cases),
+    promise=lambda traits: traits.passes_flat_patch,
+    exact=forces_of_penetration,
+)
+def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a uniform penetration of a flat interface gives the exact nodal forces on both sides.
+
+    **Question.** Two flat surfaces with different meshes penetrate each other by the same depth everywhere. Are the
+    nodal forces the consistent forces of the pressure ε̂ |g|, on the slave and on the master?
+
+    **Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure onto
+    the bodies that is not there. Finer meshes do not help, because the error is made anew at every node.
+
+    **How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces.
+    The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap
+    is a difference of coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation,
+    because the state is turned and moved, and stored as it is rounded; `stability.local` asks on states that are exact.
+    With multipliers only the distribution of the forces is judged, and not their size: of uniform multipliers if they
+    are pressures, and of those that come nearest to the exact forces if they are nodal forces.
+
+    **Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
+    give the same gap.
+
+    **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
+    """
+    error, tolerance = transmission_error(case, subject)
+    return Measurement([FORCE.check(error, tolerance)])
+
+
+def refuse_unknown_total(traits: Traits) -> str:
+    """Return why the total force is unknown from the traits, or an empty string if they say enough."""
+    if traits.penalty == "nodal":
+        return "there are no distributed springs"
+    if traits.penalty is None or traits.area is None:
+        return "the traits `penalty` and `area` are not both stated, so the total is unknown"
+    return ""
+
+
+@_define(
+    id="patch.flat.resultant",
+    summary="A uniform penetration of a flat interface gives the total force penalty × penetration × area.",
+    quantities=(TOTAL,),
+    cases=Cases.random(flat_cases),
+    promise=lambda traits: None if refuse_unknown_total(traits) else True,
+    applicable=refuse_unknown_total,
+    usual_undecided=0.004,  # Eleven of 3330 cases of right formulations, all of one that takes the last of ties.
+)
+def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a uniform penetration of a flat interface gives the right total force.
+
+    **Question.** Two flat surfaces penetrate each other by the same depth everywhere. Is the total force on the slave
+    the penalty times the penetration times the slave's area, in the configuration that the traits name?
+
+    **Why it matters.** A formulation with distributed springs must get the total right, whether it passes the patch
+    test or not. A wrong total means a wrong area of competence, and so a wrong stiffness of the contact.
+
+    **How it is judged.** The measured number is |ΣF − ε̂ |g| A n| / (ε̂ |g| A) over the slave's nodes, with the current
+    or the reference length A. The reference is scaled by a power of two, so that the two configurations differ.
+    Multipliers that are pressures are all ε̂ |g| here. The tolerance is u(8X/|g| + 4N): a gap is a difference of
+    coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation, because the state is
+    turned and moved, and stored as it is rounded.
+
+    **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly: roundoff
+    decides whether the node is over the master.
+    """
+    stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
+    interface, penetration = case.interface.at(case.interface.nodes * stretch), case.parameter("penetration")
+    formulation, stretched = subject.for_case(case), replace(case, interface=interface)
+    state, pairing, forces = forces_of_multiplier(stretched, formulation, case.penalty * penetration)
+    exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
+    if subject.traits.area == "reference":
+        exact = exact * stretch
+    error = float(np.linalg.norm(forces[: interface.n_slave_nodes].sum(axis=0) - exact))
+    value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
+    undecided = ""
+    if value > tolerance:
+        rounding = COORDINATE_ROUNDING * case.largest_coordinate
+        undecided = explain_by_kink(state, formulation, pairing, rounding, {"forces": error})
+    return Measurement([TOTAL.check(value, tolerance)], undecided)
+
+
+def promise_single(traits: Traits) -> bool | None:
+    """Return the promise for meshes with master nodes on slave nodes and in the middle of slave segments."""
+    return True if traits.passes_flat_patch else traits.passes_single_patch
+
+
+def promise_normal(traits: Traits) -> bool | None:
+    """Return the promise for meshes with master nodes on slave nodes."""
+    return True if promise_single(traits) else traits.passes_normal_patch
+
+
+def measure_class(case: Case, subject: Subject) -> Measurement:
+    """Compare forces, reported gaps and reported pressures of a uniform penetration with the exact ones."""
+    measurement = _measure_once(case, subject)
+    if _is_within(measurement, 1.0):
+        return measurement
+    inside = _move_ends_inwards(case)
+    loses_end = inside is not None and _heals(measurement, _measure_once(inside, subject))
+    return replace(measurement, undecided=LOST_END if loses_end else "")
+
+
+def _measure_once(case: Case, subject: Subject) -> Measurement:
+    """Return the numbers of `measure_class`; nothing is undecided yet."""
+    error, tolerance = transmission_error(case, subject)
+    values, tolerances = {FORCE: error}, {FORCE: tolerance}
+    formulation = subject.for_case(case)
+    if "contact_points" in formulation.provides:
+        tolerance = gap_tolerance(case, case.parameter("penetration"))
+        gap, pressure = _point_errors(case, formulation)
+        values[GAP], tolerances[GAP] = gap, tolerance
+        if subject.traits.penalty != "nodal":  # A nodal formulation knows forces only.
+            values[PRESSURE], tolerances[PRESSURE] = pressure, tolerance
+    return Measurement(check_all(values, tolerances))
+
+
+def _is_within(measurement: Measurement, factor: float) -> bool:
+    """Return whether all values are at most `factor` times their tolerances."""
+    return all(number.value <= factor * number.tolerance for number in measurement.numbers)
+
+
+def _heals(before: Measurement, after: Measurement) -> bool:
+    """Return whether values that failed are at roundoff afterwards, and a quarter of what they were or less."""
+    failures = [number.quantity.name for number in before.numbers if number.value > number.tolerance]
+    return _is_within(after, _MOVED) and all(4 * after.values[name] <= before.values[name] for name in failures)
+
+
+def _point_errors(case: Case, formulation: CheckedFormulation) -> tuple[float, float]:
+    """Return `point_errors` of a uniform penetration; multipliers, if any, are all ε̂ |g|."""
+    pressure = case.penalty * case.parameter("penetration")
+    state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), pressure))
+    points = formulation.contact_points(state.interface, formulation.pair(state.interface, state.z), state.z)
+    return point_errors(state, points, case.penalty, pressure)
+
+
+def _move_ends_inwards(case: Case) -> Case | None:
+    """Return the case with end nodes of the slave that face a free end of the master exactly moved inwards by roundoff.
+
+    Roundoff decides whether such a node is over the master. None if there is no such node.
+    """
+    interface, along = case.interface, case.parameters["along"].copy()
+    reach = COORDINATE_ROUNDING * case.largest_coordinate
+    slave = interface.slave
+    master_ends = along[interface.master.segments[interface.master.neighbours < 0]]
+    positions = case.positions.copy()
+    moved = False
+    for segment, end in np.argwhere(slave.neighbours < 0):
+        node, other = slave.segments[segment, [end, 1 - end]]
+        if np.abs(master_ends - along[node]).min(initial=np.inf) <= reach:
+            step = 2 * reach * np.sign(along[other] - along[node])
+            along[node] += step
+            positions[node] += step * case.parameters["direction"]
+            moved = True
+    if not moved:
+        return None
+    return replace(case, z=positions.reshape(-1), parameters={**case.parameters, "along": along})
+
+
+_define_class = partial(
+    _define,
+    quantities=(FORCE, GAP, PRESSURE),
+    exact=forces_of_penetration,
+    usual_undecided=0.07,  # The share for NTS-AR without a tolerance past free ends; built-in formulations have 0.
+)
+
+
+@_define_class(
+    id="patch.flat.normal",
+    summary="Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.",
+    cases=Cases.random(normal_cases),
+    promise=promise_normal,
+)
+def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
+    """Ask for exact forces, gaps and pressures on flat meshes whose inner master nodes all lie on slave nodes.
+
+    **Question.** Two flat surfaces penetrate each other by the same depth everywhere. The master covers the slave, and
+    each inner master node lies on a slave node, as in cases A1 and A2. Are the nodal forces on both sides, the reported
+    gaps and the reported pressures exact?
+
+    **Why it matters.** Many formulations state that they fail the general patch test, and a general test cannot tell
+    whether they fail as their theory says or by a mistake. On this class NTS-AR, VTS-G and VTS-ME are exact too,
+    because the master's shape functions are linear along each slave segment. So a wrong area of competence shows, a
+    wrong weight, a wrong sign of what is reported.
+
+    **How it is judged.** The measured numbers are the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both
+    surfaces, the largest error of a reported gap over |g|, and that of a reported pressure over ε̂ |g|. The exact
+    forces are computed in rationals. The tolerance is u(8X/|g| + 4N), as in `patch.flat.transmission`, and multipliers
+    are judged as there. The promise is `passes_normal_patch`; a formulation that passes any flat patch test is asked
+    too.
+
+    **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly, and roundoff
+    decides whether the node is over the master.
+
+    **Source.** Zavarise & De Lorenzis (2009), Figs. 8 and 11, Section 4.
+    """
+    return measure_class(case, subject)
+
+
+@_define_class(
+    id="patch.flat.single",
+    summary="They are exact too where inner master nodes lie in the middle of slave segments.",
+    cases=Cases.random(single_cases),
+    promise=promise_single,
+)
+def patch_flat_single(case: Case, subject: Subject) -> Measurement:
+    """Ask for exact forces, gaps and pressures on flat meshes with master nodes on slave nodes and on midpoints.
+
+    **Question.** Two flat surfaces penetrate each other by the same depth everywhere. The master covers the slave, and
+    each inner master node lies on a slave node or in the middle of a slave segment, as in case B. Are the nodal forces
+    on both sides, the reported gaps and the reported pressures exact?
+
+    **Why it matters.** The area of each quarter point of a slave segment then lies over one master segment. VTS-ME with
+    an even number of points passes here and fails elsewhere. VTS-G, whose points are elsewhere on the segment, fails
+    here. So this is the test that tells them apart, and that a VTS-ME with misplaced points cannot pass.
+
+    **How it is judged.** As in `patch.flat.normal`, with the same tolerances. The promise is `passes_single_patch`; a
+    formulation that passes any flat patch test is asked too.
+
+    **Undecided.** As in `patch.flat.normal`.
+
+    **Source.** Zavarise & De Lorenzis (2009), Fig. 16, Section 5.1.2.
+    """
+    return measure_class(case, subject)
+
+
+@_define(
+    id="patch.flat.nodal",
+    summary="Nodal springs push each node with their stiffness times the gap, shared by the lever rule.",
+    quantities=(FORCE, GAP, REPORTED_FORCE),
+    cases=Cases.random(overhung_cases),
+    promise=lambda traits: True if traits.penalty == "nodal" and traits.enforcement == "penalty" else None,
+    asks=frozenset({"penalty"}),
+    applicable=lambda traits: "" if traits.penalty == "nodal" else "there are no nodal springs",
+)
+def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the springs of a nodal method give ε |g| at each node, shared by the lever rule, on flat surfaces.
+
+    **Question.** Two flat surfaces penetrate each other by the same depth everywhere. Does each slave node get the
+    force ε |g| of its spring, and each master node what the lever rule makes of those?
+
+    **Why it matters.** A nodal method such as NTS fails every patch test but the simplest, because its springs know no
+    areas. Yet what it must do is known exactly. Without this question any mistake in it would hide behind that failure.
+
+    **How it is judged.** The measured numbers are the largest |F − F_exact| over all nodes, over the forces of all
+    springs, and the errors of reported gaps over |g| and of reported nodal forces over ε |g|. A method whose traits say
+    `unbiased` has springs at the nodes of both surfaces, all with the same stiffness. How they share the penalty is its
+    own choice, so their size is not judged here, but in `patch.flat.published`. The meshes are those of
+    `patch.flat.single`, with a master that goes beyond the slave. The exact shares are computed in rationals. The
+    tolerance is u(8X/|g| + 4N).
+
+    **Undecided.** Never: no node faces a free end of the other surface, and at a kink of a flat interface both partners
+    give the same gap and the same force.
+
+    **Source.** Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
+    """
+    formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
+    pairing, spring = formulation.pair(interface, case.z), subject.penalty(case) * depth
+    unbiased = bool(subject.traits.unbiased)
+    weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
+    exact = spring * push_apart(case, weights, 1.0)
+    forces = -formulation.residual(interface, pairing, case.z).reshape(-1, 2)
+    if unbiased:
+        likeness = float((forces * exact).sum())
+        forces = forces * (float((exact**2).sum()) / likeness if likeness > 0 else 1.0)
+    tolerance, size = gap_tolerance(case, depth), spring * float(weights[: interface.n_slave_nodes].sum())
+    values = {FORCE: float(np.linalg.norm(forces - exact, axis=1).max()) / size}
+    if "contact_points" in formulation.provides:
+        points = formulation.contact_points(interface, pairing, case.z)
+        values[GAP] = point_errors(case, points, case.penalty, case.penalty * depth)[0]
+        if not unbiased:
+            values[REPORTED_FORCE] = point_errors(case, points, case.penalty, spring)[1]
+    return Measurement(check_all(values, tolerance))
+
+
+@_define(
+    id="patch.flat.published",
+    summary="The forces that the traits state of named flat cases, right or wrong, come out exactly.",
+    quantities=(STATED,),
+    cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
+    promise=lambda traits: True if traits.published_forces else None,
+    applicable=lambda traits: "" if traits.published_forces else "the traits state no forces of named cases",
+    least_contact=0.0,  # Nothing is asked on a case of which nothing is stated, and one table is better than none.
+)
+def patch_flat_published(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the forces that a formulation states of itself on named flat cases come out, right or wrong.
+
+    **Question.** The trait `published_forces` gives the nodal forces of a uniform penetration on named cases, as
+    fractions: those of the reference paper for A1, A2, B and C, or an author's own. Does the formulation give just
+    these?
+
+    **Why it matters.** A formulation that states that it fails the patch test fails by a known amount. Two wrong codes
+    of the same method fail by different amounts, and a promise to fail hides the difference. The table shows it.
+
+    **How it is judged.** The measured number is the largest |F − F_stated| over all nodes, over the forces of all slave
+    nodes. Forces are over penalty × penetration, with the penalty in the formulation's own unit. With multipliers, they
+    are those of unit multipliers. On a case of which nothing is stated the consistent forces are asked of a formulation
+    that promises them, and nothing of any other. The tolerance is u(8X/|g| + 4N): a gap is a difference of coordinates,
+    and N forces are summed.
+
+    **Undecided.** Never: at a kink of a flat interface both partners give the same gap and the same force.
+
+    **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
+    """
+    stated = _stated_forces(case, subject.traits)
+    if stated is None:
+        return Measurement(idle=True)
+    n_slave, forces = case.interface.n_slave_nodes, _forces_of_unit(case, subject)
+    error = float(np.linalg.norm(forces - stated, axis=1).max() / np.abs(stated[:n_slave]).sum())
+    return Measurement([STATED.check(error, gap_tolerance(case, case.parameter("penetration")))])
+
+
+def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
+    """Return the forces (n_nodes, 2) that must come out; None if that is not known."""
+    if strangers := traits.published_forces.keys() - set(FLAT_NAMES):
+        needed = f"names of flat cases: {', '.join(FLAT_NAMES)}"
+        raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
+    if case.name not in traits.published_forces:
+        consistent = traits.passes_flat_patch and traits.penalty == "distributed"
+        return consistent_forces(case, 1.0) if consistent else None
+    slave, master = parse_forces(traits.published_forces[case.name])
+    slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    if (len(slave), len(master)) != (len(slave_x), len(master_x)):
+        counts = f"{len(slave)} and {len(master)} forces on {case.name}"
+        needed = f"{len(slave_x)} on the slave nodes and {len(master_x)} on the master nodes"
+        raise ContractError(f"Traits.published_forces: found {counts}; needed {needed}")
+    from_left = np.append(np.argsort(slave_x), len(slave_x) + np.argsort(master_x))
+    forces = np.zeros((len(from_left), 2))
+    forces[from_left, 1] = [*map(float, slave), *(-float(force) for force in master)]
+    return forces
+
+
+def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
+    """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
+    formulation = subject.for_case(case)
+    state = case.with_multipliers(np.ones(formulation.n_multipliers(case.interface)))
+    pairing = formulation.pair(state.interface, state.z)
+    if state.n_multipliers:
+        forces: FloatArray = -unit_forces(state, formulation, pairing).sum(axis=1)
+    else:
+        unit = subject.penalty(case) * case.parameter("penetration")
+        forces = -formulation.residual(case.interface, pairing, case.z) / unit
+    return forces.reshape(-1, 2)
