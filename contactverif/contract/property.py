@@ -17,8 +17,7 @@ from sys import modules
 from typing import Any, Literal, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import clean, refuse
 from contactverif.contract.subject import Subject

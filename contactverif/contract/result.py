@@ -11,8 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, key_of, percent, total
-from contactverif.contract.chance import exceeds
+from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, exceeds, key_of, percent, total
 from contactverif.contract.foreign_text import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 

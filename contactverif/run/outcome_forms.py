@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import freeze
-from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.case import CaseSummary
 from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
 
 _ALWAYS = 6  # Seconds, numbers of segments, penalty and two lengths.

@@ -22,32 +22,32 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
-from contactverif.strategies import segment_kinds, vertex_kinds
+from contactverif.strategies import sketch_kinds
 from contactverif.strategies.parts import penalties, seeds
 from contactverif.strategies.sketches import ROUND_PLACES, Sketch, gaps, sketch_cases
 
 _SKETCHES: dict[str, SearchStrategy[Sketch]] = {
-    "inside a segment": segment_kinds.inside(),
-    "first of several segments": segment_kinds.one_of_several("first"),
-    "intermediate of several segments": segment_kinds.one_of_several("intermediate"),
-    "last of several segments": segment_kinds.one_of_several("last"),
-    "node hit exactly": vertex_kinds.node_hit(),
-    "coincident nodes": vertex_kinds.coincident_nodes(),
-    "convex vertex": vertex_kinds.vertex("convex vertex"),
-    "concave vertex": vertex_kinds.vertex("concave vertex"),
-    "master angle below 90°": vertex_kinds.vertex("master angle below 90°"),
-    "equidistant from three segments": vertex_kinds.three_segments(),
-    "equidistant from three nodes": vertex_kinds.three_nodes(),
-    "free end hit exactly": segment_kinds.free_end(),
-    "past a free end, inside τ": segment_kinds.past_end("past a free end, inside τ"),
-    "past a free end, outside τ": segment_kinds.past_end("past a free end, outside τ"),
-    "overlap going to zero": segment_kinds.small_overlap(),
-    "edge-on, 89.9°": segment_kinds.angle("edge-on, 89.9°", 89.9),
-    "edge-on, 90°": segment_kinds.angle("edge-on, 90°", 90.0),
-    "from behind": segment_kinds.angle("from behind", 180.0),
-    "second body behind": segment_kinds.second_body(),
-    "closing segment": segment_kinds.closing_segment(),
-    "nearest node not on nearest segment": segment_kinds.other_node(),
+    "inside a segment": sketch_kinds.inside(),
+    "first of several segments": sketch_kinds.one_of_several("first"),
+    "intermediate of several segments": sketch_kinds.one_of_several("intermediate"),
+    "last of several segments": sketch_kinds.one_of_several("last"),
+    "node hit exactly": sketch_kinds.node_hit(),
+    "coincident nodes": sketch_kinds.coincident_nodes(),
+    "convex vertex": sketch_kinds.vertex("convex vertex"),
+    "concave vertex": sketch_kinds.vertex("concave vertex"),
+    "master angle below 90°": sketch_kinds.vertex("master angle below 90°"),
+    "equidistant from three segments": sketch_kinds.three_segments(),
+    "equidistant from three nodes": sketch_kinds.three_nodes(),
+    "free end hit exactly": sketch_kinds.free_end(),
+    "past a free end, inside τ": sketch_kinds.past_end("past a free end, inside τ"),
+    "past a free end, outside τ": sketch_kinds.past_end("past a free end, outside τ"),
+    "overlap going to zero": sketch_kinds.small_overlap(),
+    "edge-on, 89.9°": sketch_kinds.angle("edge-on, 89.9°", 89.9),
+    "edge-on, 90°": sketch_kinds.angle("edge-on, 90°", 90.0),
+    "from behind": sketch_kinds.angle("from behind", 180.0),
+    "second body behind": sketch_kinds.second_body(),
+    "closing segment": sketch_kinds.closing_segment(),
+    "nearest node not on nearest segment": sketch_kinds.other_node(),
 }
 KINDS = tuple(_SKETCHES)
 _NEAR = st.integers(1, 20).map(lambda k: ldexp(1.0, -k))

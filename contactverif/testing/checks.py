@@ -18,7 +18,7 @@ from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.registry import load_formulation, load_properties, subject_of
 from contactverif.run.runner import run
 from contactverif.testing.failure_text import explain
-from contactverif.testing.mark import CheckOptions
+from contactverif.testing.parametrize import CheckOptions
 
 
 @dataclass(slots=True, repr=False)

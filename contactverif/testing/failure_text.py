@@ -9,17 +9,7 @@ from contactverif.contract.result import OPPOSITE_SIGN, Row
 
 
 def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
-    """Say to a person why a row makes a run fail.
-
-    Parameters
-    ----------
-    row : Row
-        A row that is not as it was expected.
-    command : str
-        The command that runs the check again.
-    opposite_sign : bool
-        The forces have the opposite sign. That is said first.
-    """
+    """Return why a row makes a run fail; that the forces have the opposite sign is said first."""
     question = row.info
     lines = [f"{row.formulation}: {OPPOSITE_SIGN}"] if opposite_sign else []
     lines += [f"{row.formulation}, {question.id}: {row.unexpected}"] if row.unexpected else []

@@ -6,20 +6,33 @@
     def test_mine(check):
         check()
 
-Several decorators on one test add up.
+Several decorators on one test add up. Nothing that takes long is imported here: every run of pytest loads this file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.testing.mark import MARK, CheckOptions
 
+MARK = "contactverif_properties"  # The mark that carries the arguments of the decorator to the pytest plugin.
 _Test = TypeVar("_Test", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, slots=True)
+class CheckOptions:
+    """The arguments of `parametrize_with_properties`, until pytest collects the test."""
+
+    formulations: tuple[str | Callable[..., Any], ...]  # Names as on the command line, or factories.
+    properties: tuple[str, ...]  # Patterns of property ids.
+    examples: int | None  # The size of the run; None where the test file leaves it open.
+    seed: int | None
+    profile: str | None
+    known: Mapping[str, str]  # {property id: why its failure is known}.
 
 
 def parametrize_with_properties(

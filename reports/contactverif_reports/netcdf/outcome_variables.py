@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.case import CaseSummary
 from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo
 from contactverif_reports.netcdf import schema

@@ -12,8 +12,7 @@ from typing import Any, overload
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, freeze
-from contactverif.contract.case import Case
-from contactverif.contract.case_summary import CaseSummary
+from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.property import (
     LEAST_CONTACT,
     NONE_UNDECIDED,
