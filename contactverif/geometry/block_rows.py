@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 
 NumberArray = NDArray[np.int32]
 AnyIntArray = NDArray[Any]  # int32 or int64
@@ -45,13 +45,7 @@ class Couplings(NamedTuple):
 
 
 def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> sparse.csr_array:
-    """Return the matrix whose pattern is the union of all couplings, with zeros as entries.
-
-    Returns
-    -------
-    sparse.csr_array, shape (n_unknowns, n_unknowns)
-        Its columns are ascending in each row. They are int32 where scipy numbers entries so, else int64.
-    """
+    """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows."""
     size = 2 * n_nodes + n_multipliers
     begins, ends, columns = _columns_of_rows(n_nodes + n_multipliers, *couplings)
     n_entries = _count_entries(n_nodes, begins, ends, columns)
@@ -85,7 +79,7 @@ def _columns_of_rows(
     return begins, ends, columns
 
 
-@compile_kernel
+@compile_part
 def _couplings_of_columns(
     n_numbers: int, nodes: NumberArray, starts: IntArray, first_row: IntArray
 ) -> tuple[IntArray, IntArray, NumberArray]:
@@ -118,7 +112,7 @@ def _count_entries(n_nodes: int, begins: IntArray, ends: IntArray, columns: Numb
     return n_entries
 
 
-@compile_kernel
+@compile_part
 def _width(n_nodes: int, begin: int, end: int, columns: NumberArray) -> int:
     """Return how many unknowns the nodes and multipliers columns[begin:end] have."""
     width = 2 * (end - begin)
@@ -163,7 +157,7 @@ def find_node(indices: AnyIntArray, first: int, last: int, column: int) -> int:
     return first
 
 
-@compile_kernel
+@compile_part
 def find_entry(indices: AnyIntArray, first: int, last: int, column: int) -> int:
     """Return the place of a column among indices[first:last], the ascending columns of a row; it must be there."""
     count = last - first
@@ -217,7 +211,7 @@ def add_column(
     data[place + second - first] += y
 
 
-@compile_kernel
+@compile_part
 def add_entry(indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, column: int, value: float) -> None:
     """Add a number to one entry, whose row and column are unknowns."""
     data[find_entry(indices, indptr[row], indptr[row + 1], column)] += value

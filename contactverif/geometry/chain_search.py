@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline
+from contactverif.geometry.compiled import compile_inline, constant
 from contactverif.geometry.projection import (
     LEAF,
     PointOnSegment,
@@ -35,7 +35,7 @@ from contactverif.geometry.projection import (
     node,
 )
 
-NO_PLACE = -1  # There is no last answer.
+NO_PLACE = constant(-1)  # There is no last answer.
 # Relative. It is far above the 16u of a tie of `is_nearer` and the rounding of squared distances, and so small that the
 # search from the root is seldom asked. No answer depends on it, only the time.
 LEVEL = 1e-9

@@ -107,26 +107,9 @@ def add_local_matrix(
     owner: NumberArray,
     part: int,
 ) -> None:
-    """Add the rows and columns of the nodes of a coupling, nodes[start:start + n_nodes], to the matrix.
+    """Add the matrix `local` of a coupling to the rows and columns of its nodes, nodes[start:start + n_nodes].
 
-    Indices here are unsigned. Of a signed one numba asks each time whether it counts from the end.
-
-    Parameters
-    ----------
-    indptr, indices, data : AnyIntArray, AnyIntArray, FloatArray
-        The matrix in compressed rows.
-    nodes : NumberArray, shape (n_entries,)
-        The nodes of all couplings.
-    start, n_nodes : int
-        Where the nodes of this coupling begin, and how many there are.
-    runs : NumberArray, shape (MOST_NODES,)
-        What `find_runs` wrote.
-    local : FloatArray, shape (WIDTH, WIDTH)
-        The dense matrix of this coupling.
-    owner : NumberArray, shape (n_nodes_of_all,)
-        The part of the work that writes the rows of each node.
-    part : int
-        The part that calls.
+    `runs` is what `find_runs` wrote. Rows whose `owner` is another `part` are left out.
     """
     for q in range(n_nodes):
         row = nodes[np.uint64(start + q)]

@@ -16,21 +16,7 @@ from contactverif_mortar.integration_cells import GAP, NORMAL_X, WEIGHT, XI, C, 
 def at_points(
     interface: Interface, cells: Cells, points: FloatArray, z: FloatArray, pressure: FloatArray, active: BoolArray
 ) -> ContactPoints:
-    """Return the quadrature points of the cells as contact points.
-
-    Parameters
-    ----------
-    interface : Interface
-        The interface.
-    cells : Cells
-        The cells.
-    points : FloatArray, shape (n_points, 6)
-        The points of `Quadrature.points` at one state.
-    z : FloatArray, shape (n_unknowns,)
-        The state.
-    pressure, active : FloatArray or BoolArray, shape (n_points,)
-        Pressures, and which points are in contact.
-    """
+    """Return the quadrature points (n_points, 6) of the cells as contact points of the state z."""
     n_q = len(points) // max(len(cells.slave), 1)
     segment, master = np.repeat(cells.slave, n_q), np.repeat(cells.master, n_q)
     c = points[:, C, None]
@@ -61,24 +47,11 @@ def at_nodes(
     pressure: FloatArray,
     active: BoolArray,
 ) -> ContactPoints:
-    """Return the slave nodes as contact points, with ∫N_j, weighted gap and nodal pressure.
+    """Return the slave nodes as contact points, with ∫N_j, weighted gap and nodal pressure (n_slave_nodes,).
 
     A node has the master segment that it sees itself. Where two cells meet there, that is the one behind it along the
     slave. A node that overhangs sees none (−1): it has the normal at the near end of the cell that begins beside it,
     and a node without such a cell has NaN.
-
-    Parameters
-    ----------
-    interface : Interface
-        The interface.
-    cells : Cells
-        The cells.
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    areas, gaps, pressure : FloatArray, shape (n_slave_nodes,)
-        ∫N_j, weighted gaps and nodal pressures.
-    active : BoolArray, shape (n_slave_nodes,)
-        The nodes in contact.
     """
     n_nodes = interface.n_slave_nodes
     carrier, place = np.full(n_nodes, -1), np.full(n_nodes, np.nan)

@@ -20,23 +20,10 @@ from contactverif_mortar.integration_cells import NORMAL_X, NORMAL_Y, WEIGHT, XI
 
 @compile_kernel
 def forces(points: Array, pressure: Array, nodes: NumberArray, n_nodes: int) -> Array:
-    """Compute nodal forces from pressures at points.
+    """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_points), positive where the surfaces press.
 
-    Parameters
-    ----------
-    points : Array, shape (n_states, n_points, 6)
-        The points of `Quadrature.points`; the points of a cell follow each other.
-    pressure : Array, shape (n_states, n_points)
-        Pressures, force per length, positive where the surfaces press.
-    nodes : NumberArray, shape (n_cells, n_local)
-        Node numbers of each cell; A, B, 1, 2 come first.
-    n_nodes : int
-        Number of nodes of the interface.
-
-    Returns
-    -------
-    Array, shape (n_states, n_nodes, 2)
-        Internal forces.
+    The `points` (n_states, n_points, 6) of a cell follow each other; of its `nodes` (n_cells, n_local) A, B, 1, 2 come
+    first.
     """
     totals = np.zeros((points.shape[0], n_nodes, 2), dtype=points.dtype)
     n_q = points.shape[1] // max(len(nodes), 1)

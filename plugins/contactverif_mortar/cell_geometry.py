@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, cross, dot, frame, minus, node
 
 A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes
@@ -45,7 +45,7 @@ class SlaveView(NamedTuple):
     straight: bool  # both ends look along the segment's own normal
 
 
-@compile_kernel
+@compile_part
 def turn(n: Vector) -> Vector:
     """Return τ of a normal n: the tangent that belongs to it in `frame`."""
     return -n[1], n[0]
@@ -67,7 +67,7 @@ def slave_view(x: FloatArray, slave: IntArray, segment: int, before: int, behind
     return SlaveView(x_a, x_b, n_a, n_b, before < 0 and behind < 0)
 
 
-@compile_kernel
+@compile_part
 def _average_normal(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Vector:
     """Return the unit vector along the sum of the normal n and that of another slave segment."""
     _, _, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
@@ -76,7 +76,7 @@ def _average_normal(x: FloatArray, slave: IntArray, n: Vector, other: int) -> Ve
     return total[0] / size, total[1] / size
 
 
-@compile_kernel
+@compile_part
 def seen_from(x_e: Vector, view: SlaveView) -> float:
     """Return the c from which the point x_e is seen: the root at which it passes from ahead to behind as c grows."""
     x_a, x_b, n_a, n_b, straight = view
@@ -92,7 +92,7 @@ def seen_from(x_e: Vector, view: SlaveView) -> float:
     return c
 
 
-@compile_kernel
+@compile_part
 def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[float, float, Vector]:
     """Return ξ, the gap g and the normal n (out of the slave) at c."""
     d, along = arm(x_1, PointOnSegment(view.x_a, view.x_b, c)), minus(x_2, x_1)
@@ -106,7 +106,7 @@ def facing_point(view: SlaveView, x_1: Vector, x_2: Vector, c: float) -> tuple[f
     return dot(d, tau) / length, cross(along, d) / length, n
 
 
-@compile_kernel
+@compile_part
 def turn_of_ends(
     x: FloatArray, slave: IntArray, segment: int, before: int, behind: int, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
@@ -126,7 +126,7 @@ def turn_of_ends(
         _average_turn(d_omega_b, x, slave, behind, t, n, B, BEHIND)
 
 
-@compile_kernel
+@compile_part
 def _average_turn(
     row: FloatArray, x: FloatArray, slave: IntArray, other: int, t: Vector, n: Vector, first: int, second: int
 ) -> None:
@@ -145,7 +145,7 @@ def _average_turn(
         row[second, i] += share * n_other[i]
 
 
-@compile_kernel
+@compile_part
 def cut_gains(
     d_c: FloatArray,
     c: float,
@@ -178,7 +178,7 @@ def cut_gains(
         d_c[B, i] -= (1 + c) / 2 * tau[i] / slope
 
 
-@compile_kernel
+@compile_part
 def point_gains(
     gains: FloatArray,
     c: float,

@@ -21,7 +21,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
 from contactverif_mortar.strip_search import Region, collect_segments, holds, make_region, make_strip
@@ -131,7 +131,7 @@ def find_cells(
     )
 
 
-@compile_kernel
+@compile_part
 def _lengthen(values: Array, room: int) -> Array:
     """Return an array with more room behind the same values."""
     longer = np.empty(room, dtype=values.dtype)
@@ -189,7 +189,7 @@ def _hides(table: FloatArray, count: int, depth: float) -> bool:
     return reached >= 1
 
 
-@compile_kernel
+@compile_part
 def _largest_gap(view: SlaveView, x_1: Vector, x_2: Vector, low: float, high: float) -> float:
     """Return the largest |gap| between two points of a slave segment.
 
@@ -228,7 +228,7 @@ def _is_nearest(
     return True
 
 
-@compile_kernel
+@compile_part
 def overlap(view: SlaveView, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     """Return the lower and upper end on the slave of what it sees of the master segment 1 2; (1, −1) if nothing.
 

@@ -71,29 +71,9 @@ def _write_touching(x: FloatArray, segments_and_cells: Fields, rule: Fields, tou
 def springs_at_points(
     interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, penalty: float, active: BoolArray
 ) -> tuple[FloatArray, sparse.csr_array]:
-    """Compute the forces of springs at the points of cells, p = −ε̂ g, and their derivative.
+    """Compute forces (n_unknowns,) and tangent of springs p = −ε̂ g at the `active` points (n_points,).
 
-    Parameters
-    ----------
-    interface : Interface
-        The interface.
-    cells : Cells
-        The cells, with no averaged normals.
-    rule : Quadrature
-        The rule of the points.
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    penalty : float
-        Distributed stiffness ε̂.
-    active : BoolArray, shape (n_points,)
-        The points that have a spring.
-
-    Returns
-    -------
-    forces : FloatArray, shape (n_unknowns,)
-        Internal forces.
-    tangent : sparse.csr_array, shape (n_unknowns, n_unknowns)
-        Their derivative. Its pattern holds the nodes of all cells that have a spring.
+    The cells have no averaged normals. The pattern of the tangent holds the nodes of all cells that have a spring.
     """
     segments_and_cells, places_and_weights = cell_arguments(interface, cells, rule)
     nodes = _nodes_of_cells(interface.slave.segments, interface.master.segments, cells.slave, cells.master, active)

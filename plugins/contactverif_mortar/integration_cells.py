@@ -22,7 +22,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_kernel, match_precision
+from contactverif.geometry.compiled import compile_kernel, compile_part, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
@@ -172,41 +172,14 @@ class Quadrature:
         return len(self.places)
 
     def points(self, interface: Interface | Sides, cells: Cells, x: Array) -> Array:
-        """Compute the points of all cells.
+        """Compute the points (n_states, n_cells × n_q, 6) at real or complex x (n_states, n_nodes, 2).
 
-        Parameters
-        ----------
-        interface : Interface
-            The meshes.
-        cells : Cells
-            The cells that the pairing holds.
-        x : Array, shape (n_states, n_nodes, 2)
-            Positions, real or complex.
-
-        Returns
-        -------
-        Array, shape (n_states, n_cells × n_q, 6)
-            Six numbers a point: c, ξ, gap (negative in penetration), weight (a length), normal out of the slave.
+        Their numbers are c, ξ, gap (negative in penetration), weight (a length), and the normal out of the slave.
         """
         return _points(x, *self._arguments(interface, cells, x))
 
     def gains(self, interface: Interface, cells: Cells, x: FloatArray) -> FloatArray:
-        """Compute the Δ of the points of all cells.
-
-        Parameters
-        ----------
-        interface : Interface
-            The meshes.
-        cells : Cells
-            The cells that the pairing holds.
-        x : FloatArray, shape (n_nodes, 2)
-            Positions.
-
-        Returns
-        -------
-        FloatArray, shape (n_cells × n_q, 5, n_local, 2)
-            Δ of c, ξ, gap and weight, and the turn ω of the normal.
-        """
+        """Compute Δ of c, ξ, gap, weight, and the turn ω of the normal: (n_cells × n_q, 5, n_local, 2)."""
         n_local = 6 if cells.averaged else 4
         return _gains(x, n_local, *self._arguments(interface, cells, x))
 
@@ -252,7 +225,7 @@ def _local_nodes(
     return nodes
 
 
-@compile_kernel
+@compile_part
 def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
     """Return the lower and the upper end of a cell on the slave, as c, cut by the nodes 2 and 1 of the master."""
     zero = 0 * view.x_a[0]  # has the type of the positions
@@ -328,7 +301,7 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
     return gains
 
 
-@compile_kernel
+@compile_part
 def _place_gains(
     d: FloatArray, d_low: FloatArray, d_high: FloatArray, place: float, weight: float, length: float
 ) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.geometry.block_rows import Couplings, NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 
 LARGE_GROUP = 64  # Groups of more nodes count in the estimate of a product's size; smaller ones overlap too much.
 MOST_BYTES = 2**35  # 32 GiB: more than a workstation spares for one matrix.
@@ -44,22 +44,9 @@ class RowGroups(NamedTuple):
 def group_nodes(
     n_nodes: int, slave: IntArray, carrier: IntArray, local: NumberArray, active: BoolArray, dual: bool
 ) -> RowGroups:
-    """Return the groups of slave nodes, and for dual shapes of slave segments.
+    """Return the groups of `active` slave nodes, and for dual shapes those of slave segments with an active node.
 
-    Parameters
-    ----------
-    n_nodes : int
-        The number of nodes of the interface.
-    slave : IntArray, shape (n_slave_segments, 2)
-        The nodes of the slave segments.
-    carrier : IntArray, shape (n_cells,)
-        The slave segment of each cell, ascending.
-    local : NumberArray, shape (n_cells, n_local)
-        The nodes of each cell.
-    active : BoolArray, shape (n_slave_nodes,)
-        The nodes that have a row; a segment has its rows if one of its nodes is active.
-    dual : bool
-        Whether slave segments have rows.
+    `carrier` (n_cells,), ascending, is the slave segment of each cell, `local` (n_cells, n_local) its nodes.
     """
     first = _first_of_each(carrier, len(slave))
     nodes, starts = _group_nodes(n_nodes, active, slave, local, first, dual)
@@ -67,15 +54,7 @@ def group_nodes(
 
 
 def check_product(starts: IntArray) -> None:
-    """Check that the assembled tangent has a size that fits into memory.
-
-    Two neighbours share one slave segment, so at least half of the entries of all dense groups are different ones.
-
-    Parameters
-    ----------
-    starts : IntArray, shape (n_rows + 1,)
-        Where the group of each slave node begins.
-    """
+    """Raise MisuseError if the assembled tangent takes more than 32 GiB; `starts` are those of the slave nodes."""
     sizes = np.diff(starts)
     large = sizes[sizes > LARGE_GROUP].astype(np.float64)
     size = BYTES_OF_ENTRY * (4 * large**2).sum() / 2
@@ -130,7 +109,7 @@ def _group_nodes(
     return nodes[:count].copy(), starts
 
 
-@compile_kernel
+@compile_part
 def _segments_of_rows(active: BoolArray, slave: IntArray, dual: bool) -> IntArray:
     """Return the slave segments to which each row belongs (n_rows, 2), −1 for none."""
     n_slave = len(active)

@@ -154,21 +154,7 @@ def node_rows(
     groups: RowGroups,
     pattern: Couplings,
 ) -> NodeRows:
-    """Compute forces and factors.
-
-    Parameters
-    ----------
-    interface, cells, rule, x : Interface, Cells, Quadrature, or FloatArray of shape (n_nodes, 2)
-        The interface, its cells with an active node, the rule of their points, and positions.
-    shapes : FloatArray, shape (n_slave_segments, 5)
-        The numbers of the shapes, from `weigh`.
-    state : NodeState
-        The slave nodes.
-    groups : RowGroups
-        The groups of the rows; with rows of segments the shapes are dual.
-    pattern : Couplings
-        The pattern of the derivative at fixed pressures; it holds the nodes of each cell.
-    """
+    """Compute forces and factors on cells with no averaged normals, with `shapes` of `weigh` at the same state."""
     matrix = zero_matrix(interface.n_nodes, 0, pattern)
     forces, left, right = np.zeros(interface.n_unknowns), *np.zeros((2, 2 * len(groups.nodes)))
     _add_rows(

@@ -49,20 +49,8 @@ def add_shaped_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Add forces and their derivative at fixed pressures, and return `left` and `right`.
 
-    Parameters
-    ----------
-    shaped : ShapedPoints
-        The points.
-    groups : RowGroups
-        The groups of the rows; with rows of segments the shapes are dual.
-    state : NodeState
-        The slave nodes.
-    n_pushed : int
-        The number of local nodes that forces act on: 4, or 2 where they act on the slave alone.
-    forces : FloatArray, shape (n_unknowns,)
-        The forces.
-    matrix : sparse.csr_array, shape (n_unknowns, n_unknowns)
-        The derivative. It has the places of all pushed nodes and local nodes of each cell.
+    Forces act on the first `n_pushed` local nodes: 4, or 2 where they act on the slave alone. `matrix` has the places
+    of all pushed nodes and local nodes of each cell.
     """
     shapes, n_cells = shaped.shapes, len(groups.local)
     left, right = np.zeros((2, 2 * len(groups.nodes)))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector, minus
 from contactverif_mortar.cell_geometry import SlaveView
 
@@ -35,7 +35,7 @@ class Strip(NamedTuple):
     straight: bool  # n_a and n_b are the normal of the segment.
 
 
-@compile_kernel
+@compile_part
 def make_strip(view: SlaveView, reach: float) -> Strip:
     """Return the strip over a slave segment."""
     a, b, n_a, n_b, straight = view
@@ -76,7 +76,7 @@ def holds(region: Region, strip: Strip) -> bool:
     return True
 
 
-@compile_kernel
+@compile_part
 def make_region(strip: Strip, boxes: FloatArray) -> Region:
     """Return the region that is `AHEAD` times as large as the box around a strip, on each side of it.
 
@@ -133,7 +133,7 @@ def collect_segments(
     return count
 
 
-@compile_kernel
+@compile_part
 def _meets(strip: Strip, low_x: float, low_y: float, high_x: float, high_y: float) -> bool:
     """Return whether a box may meet the strip. An empty box, from infinity to minus infinity, meets nothing."""
     a, b, n_a, n_b, reach, low, high, straight = strip

@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_kernel, compile_part
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, cross, dot, frame, minus, node
 from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
@@ -81,23 +81,9 @@ class VirtualSlaveNode(NamedTuple):
 
 @compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields) -> tuple[Array, Array]:
-    """Compute the nodal forces and the constraint rows of Box 3 for a batch of states.
+    """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
 
-    Parameters
-    ----------
-    x : Array, shape (n_states, n_nodes, 2)
-        Positions, real or complex.
-    multipliers : Array, shape (n_states, n_multipliers)
-        Multipliers λ, of the type of x; without columns for a penalty.
-    surfaces, areas, options : Fields
-        The fields of `Surfaces`, `Areas` and `Options`.
-
-    Returns
-    -------
-    forces : Array, shape (n_states, n_nodes, 2)
-        Internal forces.
-    rows : Array, shape (n_states, n_multipliers)
-        Constraint rows.
+    `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
     """
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
@@ -142,7 +128,7 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
     return forces, rows
 
 
-@compile_kernel
+@compile_part
 def _fill_idle_rows(
     rows: Array, multipliers: Array, reference: FloatArray, slave: IntArray, active: BoolArray, n: int
 ) -> None:
@@ -152,7 +138,7 @@ def _fill_idle_rows(
             rows[i] = multipliers[i] * segment_length(reference, slave, i // n) / n
 
 
-@compile_kernel
+@compile_part
 def _parts(x_f: Vector, x_m: Vector, v: VirtualSlaveNode, area: Area, j: int) -> tuple[float, float]:
     """Return W_f and W_m of master segment j with the nodes f and m."""
     length = dot(minus(x_m, x_f), v.t)
@@ -165,7 +151,7 @@ def _parts(x_f: Vector, x_m: Vector, v: VirtualSlaveNode, area: Area, j: int) ->
     return length * ((b - a) - (b * b - a * a) / 2), w_m
 
 
-@compile_kernel
+@compile_part
 def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: float, c_q: float) -> VirtualSlaveNode:
     """Return the virtual slave node in the middle of the area of competence [c_q, c_p] of A B, against 1 2."""
     c = (c_p + c_q) / 2
@@ -176,7 +162,7 @@ def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: 
     return VirtualSlaveNode(x_a, x_b, p, q, d, c, c_p, c_q, l_12, t, normal, g)
 
 
-@compile_kernel
+@compile_part
 def sum_of_parts(v: VirtualSlaveNode) -> float:
     """Return S = ΣW, which telescopes to s(Q) − s(P).
 
@@ -186,14 +172,14 @@ def sum_of_parts(v: VirtualSlaveNode) -> float:
     return (v.c_q - v.c_p) / 2 * dot(minus(v.x_b, v.x_a), v.t)
 
 
-@compile_kernel
+@compile_part
 def from_p_to_q(v: VirtualSlaveNode) -> Vector:
     """Return x_Q − x_P, a part of the slave segment."""
     ab, share = minus(v.x_b, v.x_a), (v.c_q - v.c_p) / 2
     return share * ab[0], share * ab[1]
 
 
-@compile_kernel
+@compile_part
 def length_of_area(x_a: Vector, x_b: Vector, ref_a: Vector, ref_b: Vector, current_area: bool) -> float:
     """Return the length of the slave segment A B that counts for the area, of the type of its current positions."""
     l_ab, _, _ = frame(x_a, x_b)
@@ -224,13 +210,13 @@ def area_of_competence(
     return c_p, c_q
 
 
-@compile_kernel
+@compile_part
 def _cut_at(x_a: Vector, x_b: Vector, x_e: Vector, t: Vector) -> float:
     """Return where the slave segment A B meets the master node e, both projected along t, as c."""
     return -dot(arm(x_e, PointOnSegment(x_a, x_b, 0.0)), t) / (dot(minus(x_b, x_a), t) / 2)
 
 
-@compile_kernel
+@compile_part
 def segment_length(x: FloatArray, slave: IntArray, segment: int) -> float:
     """Return the length of a slave segment at the positions x (n_nodes, 2)."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))

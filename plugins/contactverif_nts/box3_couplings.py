@@ -16,13 +16,14 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, IntArray
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part, constant
 from contactverif.geometry.local_matrix import MOST_NODES, NO_NODE, insert_node
 from contactverif_nts.box3 import Area
 from contactverif_nts.eq6 import Fields
 from contactverif_nts.walk import NOT_CUT
 
-WHOLE = -1  # All master segments, where the number of one may stand.
+WHOLE = constant(-1)  # All master segments, where the number of one may stand.
+_BEGIN = constant(0)
 _FEW = 2  # The nodes of a point over so many master segments always fit: A, B, four that cut, and three.
 
 
@@ -48,7 +49,7 @@ def list_couplings(surfaces: Fields, areas: Fields, n: int, group: int, first_mu
     n_most, n_entries = _bound_couplings(neighbours, first, last, active, has_multipliers)
     nodes, starts = np.empty(n_entries, dtype=np.int32), np.empty(n_most + 1, dtype=np.int64)
     first_point, end_point, segment = np.empty((3, n_most), dtype=np.int64)
-    coupling, place, starts[0] = 0, 0, 0
+    coupling, place, starts[0] = 0, _BEGIN, 0
     for begin in range(0, len(active), group):
         i, end, j = begin, begin + group, WHOLE
         while i < begin + group:
@@ -127,7 +128,7 @@ def _insert_core(
     return place
 
 
-@compile_kernel
+@compile_part
 def _bound_couplings(
     neighbours: IntArray, first: IntArray, last: IntArray, active: BoolArray, has_multipliers: bool
 ) -> tuple[int, int]:

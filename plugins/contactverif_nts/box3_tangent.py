@@ -1,19 +1,13 @@
 """The exact tangent of VTS-PPT: the derivative of `box3.residual`, as Appendix A of the paper derives it.
 
-The small dense matrix `local` of a coupling (`box3_couplings`) takes the blocks of all its nodes, and is added to the
-tangent as a whole. In the frame n, t of the master segment of a virtual slave node the block
+The small dense matrix `local` of a coupling (`box3_couplings`) takes the blocks of all its nodes, and no others. In the
+frame n, t of the master segment of a virtual slave node the block
 
     Δ(F n) = n ΔF + F Δn,   Δn = −t ω
 
-has three numbers: ΔF for a displacement along n, ΔF along t, and F Δω along n. `box3_gains` has the Δ.
-
-The same sweep makes the forces. They are those of `box3.residual`, which reads like the paper, up to roundoff.
-
-Rules for the next editor:
-
-1. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `eq6` says why.
-2. Nothing is allocated for a point: vectors and named tuples of numbers are free, arrays are not.
-3. `box3_couplings` lists which nodes feel which. No other block is written.
+has three numbers: ΔF for a displacement along n, ΔF along t, and F Δω along n. `box3_gains` has the Δ. The same sweep
+makes the forces, those of `box3.residual` up to roundoff. Nothing is allocated for a point: vectors and named tuples of
+numbers are free, arrays are not.
 
 Source: Zavarise & De Lorenzis (2009), Eqs. 8–11, A1–A28.
 """
@@ -74,24 +68,9 @@ def add_forces_and_tangent(
     couplings: Fields,
     share: Fields,
 ) -> None:
-    """Add the residual at one state, and its derivative, to the rows of one share of the work.
+    """Add the residual (n_unknowns,) at one state, and its derivative, to the rows of one share of the work.
 
-    Parameters
-    ----------
-    rows : FloatArray, shape (n_unknowns,)
-        The residual: forces, then constraint rows.
-    matrix : Fields
-        The arrays indptr, indices and data of a matrix with the pattern of the couplings.
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    multipliers : FloatArray, shape (n_multipliers,)
-        Multipliers λ, empty for a penalty.
-    surfaces, areas, options, couplings, share : Fields
-        The fields of `Surfaces`, `Areas`, `Options`, `Box3Couplings` and `Share`.
-
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Box 3, Eqs. A1–A28.
+    `matrix` has indptr, indices and data of a matrix with the pattern of the couplings.
     """
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas

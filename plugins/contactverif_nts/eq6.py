@@ -31,7 +31,7 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_kernel, compile_part
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -104,22 +104,10 @@ def pair(
     options: Fields,
     threads: int = 1,
 ) -> tuple[IntArray, BoolArray]:
-    """Return the nearest master segment of each point, and whether the point is active.
+    """Return the nearest master segment of each point at x (n_nodes, 2), and whether the point is active.
 
-    Parameters
-    ----------
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    multipliers : FloatArray, shape (n_multipliers,)
-        Multipliers λ, empty for a penalty.
-    surfaces, tree : Fields
-        The fields of `Surfaces`, and a tree over the master.
-    points : Fields
-        Slave segment and slot of each point, (n_points,) each, and the places c (n_slots,) on a segment.
-    options : Fields
-        The part τ of a master segment by which a foot may lie past its free end, and the penalty.
-    threads : int
-        How many threads share the points.
+    `points` are slave segment and slot of each, (n_points,), and the places c (n_slots,); `options` are τ, the part of
+    a master segment by which a foot may lie past its free end, and the penalty.
     """
     n_points = len(points[0])
     answers = np.empty(n_points, dtype=np.int64), np.empty(n_points, dtype=np.bool_)
@@ -169,7 +157,7 @@ def _pair_points(
         active[i] = is_pressed(g, multipliers, i, penalty) and on_surface
 
 
-@compile_kernel
+@compile_part
 def is_pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> bool:
     """Return whether point i is in contact by its gap: g ≤ 0, or with multipliers λ − c g ≥ 0, the penalty being c."""
     if len(multipliers) == 0:
@@ -179,23 +167,9 @@ def is_pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> boo
 
 @compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields) -> tuple[Array, Array]:
-    """Compute the nodal forces and the constraint rows of Eq. 6 for a batch of states.
+    """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
 
-    Parameters
-    ----------
-    x : Array, shape (n_states, n_nodes, 2)
-        Positions, real or complex.
-    multipliers : Array, shape (n_states, n_multipliers)
-        Multipliers λ, of the type of x; without columns for a penalty.
-    surfaces, points, options : Fields
-        The fields of `Surfaces`, `Points` and `Options`.
-
-    Returns
-    -------
-    forces : Array, shape (n_states, n_nodes, 2)
-        Internal forces.
-    rows : Array, shape (n_states, n_multipliers)
-        Constraint rows.
+    `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
     """
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
@@ -228,14 +202,14 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, opt
     return forces, rows
 
 
-@compile_kernel
+@compile_part
 def push(forces: Array, number: int, size: float, direction: Vector) -> None:
     """Add a force of this size along a direction to the force on a node."""
     forces[number, 0] += size * direction[0]
     forces[number, 1] += size * direction[1]
 
 
-@compile_kernel
+@compile_part
 def contact_at(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> Contact:
     """Return the point at c on the slave segment a b against the master segment 1 2, at x (n_nodes, 2)."""
     x_1, x_2 = node(x, node_1), node(x, node_2)
@@ -246,7 +220,7 @@ def contact_at(x: Array, a: int, b: int, node_1: int, node_2: int, c: float) -> 
     return Contact(a, b, node_1, node_2, c, l_12, t, normal, g, xi)
 
 
-@compile_kernel
+@compile_part
 def area_length(x: Array, slave: IntArray, segment: int, other: int) -> float:
     """Return the length of a slave segment, plus that of the other one at a slave node where there is one."""
     length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))

@@ -61,23 +61,7 @@ def add_tangent(
     points: Fields,
     options: Fields,
 ) -> None:
-    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`.
-
-    Parameters
-    ----------
-    indptr, indices, data : AnyIntArray, AnyIntArray, FloatArray
-        The matrix in compressed rows.
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    multipliers : FloatArray, shape (n_multipliers,)
-        Multipliers λ, empty for a penalty.
-    surfaces, points, options : Fields
-        The fields of `Surfaces`, `Points` and `Options`.
-
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Eqs. A1–A12.
-    """
+    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`."""
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
     places, weights, area_from, penalty = options

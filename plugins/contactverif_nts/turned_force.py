@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.geometry.block_rows import AnyIntArray, add_block
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector
 
 ZERO = (0.0, 0.0)
 
 
-@compile_kernel
+@compile_part
 def times(factor: float, a: Vector) -> Vector:
     """Return factor × a."""
     return factor * a[0], factor * a[1]
 
 
-@compile_kernel
+@compile_part
 def plus(a: Vector, b: Vector) -> Vector:
     """Return a + b."""
     return a[0] + b[0], a[1] + b[1]
@@ -40,18 +40,7 @@ def add_turned_force(
 ) -> None:
     """Add Δ(force n) = n Δforce + force Δn, with Δn = −t ω, to the rows of one node and the columns of another.
 
-    Parameters
-    ----------
-    indptr, indices, data : AnyIntArray, AnyIntArray, FloatArray
-        The matrix in compressed rows.
-    row, column : int
-        The node on which the force acts, and the node that is displaced.
-    normal, t : Vector
-        Normal and tangent of the master segment.
-    force : float
-        The force along the normal.
-    d_force, omega : Vector
-        What the force and the angle of the master segment gain for a displacement of the node `column`.
+    `d_force` and `omega` are gained for a displacement of the node `column`.
     """
     xx = normal[0] * d_force[0] - force * t[0] * omega[0]
     xy = normal[0] * d_force[1] - force * t[0] * omega[1]

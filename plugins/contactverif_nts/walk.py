@@ -93,19 +93,7 @@ def pair(
     options: Fields,
     threads: int = 1,
 ) -> Fields:
-    """Return the fields of `Areas` for the virtual slave nodes on each slave segment, at x (n_nodes, 2).
-
-    Parameters
-    ----------
-    x : FloatArray, shape (n_nodes, 2)
-        Positions.
-    multipliers : FloatArray, shape (n_multipliers,)
-        Multipliers λ, empty for a penalty.
-    surfaces, tree, options : Fields
-        The fields of `Surfaces`, a tree over the master and the fields of `Search`.
-    threads : int
-        How many threads share the virtual slave nodes.
-    """
+    """Return the fields of `Areas` for the virtual slave nodes, at x (n_nodes, 2); `options` are `Search`."""
     n, n_segments = options[0], len(surfaces[1])
     integers = np.full((8, n_segments * n), NOT_CUT, dtype=np.int64)
     active = np.zeros(n_segments * n, dtype=np.bool_)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import itertools
+import re
 import sys
 import types
 from collections.abc import Callable
@@ -63,7 +64,7 @@ def changed_line(
     package.__path__ = []
     sys.modules[copy] = package
     for name, source in sources.items():
-        source = source.replace(PACKAGE, copy).replace("\n@compile_kernel\n", "\n").replace("\n@compile_inline\n", "\n")
+        source = re.sub(r"\n@compile_\w+\n", "\n", source.replace(PACKAGE, copy))
         part = types.ModuleType(f"{copy}.{name}")
         sys.modules[f"{copy}.{name}"] = part
         setattr(package, name, part)
