@@ -13,7 +13,7 @@ from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.hertz_box import BOX, COARSEST, HERTZ_STUDIES, MESHES, PENALTIES, HertzStudy, hertz_cases
 from contactverif.problems.problem import Errors
 from contactverif.run.judge import judge_case
-from contactverif_properties.accuracy_hertz import ACCURACY_HERTZ
+from contactverif_properties.convergence import accuracy_hertz
 
 CASES = {case.name: case for case in hertz_cases()}
 
@@ -29,14 +29,14 @@ def test_a_case_that_was_stored_is_the_same_study() -> None:
     case = CASES["flat-soft"]
     again = Case.from_arrays(case.to_arrays())
     subject = load_subject("sts")
-    values = [ACCURACY_HERTZ.measure(each, subject).values for each in (case, again)]
+    values = [accuracy_hertz.measure(each, subject).values for each in (case, again)]
     assert values[0] == values[1]
 
 
 def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
-    assert ACCURACY_HERTZ.exact is not None
+    assert accuracy_hertz.exact is not None
     case = CASES["parabola-soft"]
-    forces = ACCURACY_HERTZ.exact(case)
+    forces = accuracy_hertz.exact(case)
     assert forces.sum(axis=0) == pytest.approx(0, abs=1e-12)
     total = BOX.pressure(case.penalty).force
     assert forces[: case.interface.n_slave_nodes].sum(axis=0) == pytest.approx([0, total], rel=1e-12)
@@ -46,7 +46,7 @@ def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
 def test_who_passes_the_patch_test_converges(name: str) -> None:
     subject = load_subject(name)
     for case in CASES.values():
-        outcome = judge_case(ACCURACY_HERTZ, case, subject)
+        outcome = judge_case(accuracy_hertz, case, subject)
         assert outcome.verdict is Verdict.PASS, (case.name, outcome.reason)
         assert outcome.measurement is not None
         assert all(len(values) == len(MESHES) for values in outcome.measurement.series.values())
@@ -55,7 +55,7 @@ def test_who_passes_the_patch_test_converges(name: str) -> None:
 @pytest.mark.parametrize("name", ["nts", "vts-g:n=3", "vts-me:n=4", "two-pass/nts"])
 def test_the_master_forces_of_others_do_not_converge_even_at_a_fixed_penalty(name: str) -> None:
     """More points a segment make the error smaller, and leave the rate what it is."""
-    outcome = judge_case(ACCURACY_HERTZ, CASES["parabola-layer"], load_subject(name))
+    outcome = judge_case(accuracy_hertz, CASES["parabola-layer"], load_subject(name))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     assert outcome.measurement.values["rate of master forces"] <= 0.1
@@ -77,13 +77,13 @@ def test_a_stranger_who_clips_cells_has_the_same_errors(make: type, name: str) -
 def test_half_of_a_balance_is_found_at_a_stiff_penalty() -> None:
     """Two half passes push both bodies with different forces where these are not parallel."""
     subject = load_subject("mortar-two-half-pass")
-    verdicts = [judge_case(ACCURACY_HERTZ, CASES[f"parabola-{word}"], subject).verdict for word in PENALTIES]
+    verdicts = [judge_case(accuracy_hertz, CASES[f"parabola-{word}"], subject).verdict for word in PENALTIES]
     assert verdicts == [Verdict.PASS, Verdict.PASS, Verdict.FAIL]
 
 
 def test_what_has_no_solution_is_not_asked() -> None:
-    assert "no solution" in ACCURACY_HERTZ.refusal(load_subject("vts-ppt-lm").traits)
-    assert "barrier" in ACCURACY_HERTZ.refusal(with_promises(ClippedCells, enforcement="barrier").traits)
+    assert "no solution" in accuracy_hertz.refusal(load_subject("vts-ppt-lm").traits)
+    assert "barrier" in accuracy_hertz.refusal(with_promises(ClippedCells, enforcement="barrier").traits)
 
 
 def test_the_penalty_is_that_of_its_word() -> None:

@@ -18,8 +18,7 @@ from contactverif.contract.traits import Traits
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
 from contactverif.run.judge import judge_case
-from contactverif_properties.accuracy_wavy import ACCURACY_WAVY
-from contactverif_properties.accuracy_wavy_curved import ACCURACY_WAVY_CURVED, promise_without_locking
+from contactverif_properties.convergence import accuracy_wavy, accuracy_wavy_curved, promise_without_locking
 
 NAMES = ("upper slave, 10 E/h", "upper slave, 1000 E/h", "lower slave, 10 E/h", "lower slave, 1000 E/h")
 CONTRAST_NAMES = ("finer slave, 10 E/h", "coarser slave, 10 E/h")
@@ -35,7 +34,7 @@ def _verdict(question: Property, name: str, subject: Subject) -> Verdict:
 
 
 @pytest.mark.parametrize(
-    ("question", "names"), [(ACCURACY_WAVY, NAMES + CONTRAST_NAMES), (ACCURACY_WAVY_CURVED, CURVED_NAMES)]
+    ("question", "names"), [(accuracy_wavy, NAMES + CONTRAST_NAMES), (accuracy_wavy_curved, CURVED_NAMES)]
 )
 def test_there_are_these_studies_and_none_on_a_given_interface(question: Property, names: tuple[str, ...]) -> None:
     cases = question.cases(None)
@@ -45,14 +44,14 @@ def test_there_are_these_studies_and_none_on_a_given_interface(question: Propert
 
 
 def test_a_stored_case_is_the_same_study() -> None:
-    case = _case(ACCURACY_WAVY_CURVED, "lower slave, 100 E/h")
+    case = _case(accuracy_wavy_curved, "lower slave, 100 E/h")
     study = WavyStudy.from_case(Case.from_arrays(case.to_arrays()))
     assert study == WavyStudy(LOWER, 100.0, 1e-6)
     assert study.penalty(1) == pytest.approx(100 * 6 / 4)
 
 
 def test_a_coarser_slave_has_a_quarter_of_the_segments_and_none_of_the_inner_nodes() -> None:
-    case = _case(ACCURACY_WAVY, CONTRAST_NAMES[1])
+    case = _case(accuracy_wavy, CONTRAST_NAMES[1])
     study = WavyStudy.from_case(Case.from_arrays(case.to_arrays()))
     assert study == WavyStudy(LOWER, 10.0, contrast=True)
     for refine in study.meshes:
@@ -80,20 +79,20 @@ def _right(name: str) -> Subject:
 @pytest.mark.parametrize("case", NAMES[::2] + CONTRAST_NAMES)
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formulation_of_another_kind_is_cleared(name: str, case: str) -> None:
-    outcome = judge_case(ACCURACY_WAVY, _case(ACCURACY_WAVY, case), _right(name))
+    outcome = judge_case(accuracy_wavy, _case(accuracy_wavy, case), _right(name))
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-me", "vts-me:n=12"])
 def test_a_slave_coarser_than_the_master_tells_who_fails_the_patch_test(name: str) -> None:
     """Many points hide the error of VTS-ME where meshes are alike, and not here."""
-    measurement = ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, CONTRAST_NAMES[1]), load_subject(name))
+    measurement = accuracy_wavy.measure(_case(accuracy_wavy, CONTRAST_NAMES[1]), load_subject(name))
     assert measurement.values["rate of forces"] < 0.1
 
 
 def test_constant_pressures_have_the_error_that_the_bound_is_made_of() -> None:
-    case = _case(ACCURACY_WAVY, NAMES[0])
-    measurement = ACCURACY_WAVY.measure(case, _right("constant pressures at points"))
+    case = _case(accuracy_wavy, NAMES[0])
+    measurement = accuracy_wavy.measure(case, _right("constant pressures at points"))
     error = WavyStudy(UPPER, 10.0).pose(MESHES[-1], Traits()).best[PRESSURE]
     assert measurement.values["pressure error on the finest mesh"] == pytest.approx(error, rel=0.02)
     assert measurement.tolerances["pressure error on the finest mesh"] == 2 * error
@@ -101,10 +100,10 @@ def test_constant_pressures_have_the_error_that_the_bound_is_made_of() -> None:
 
 
 @pytest.mark.parametrize(("name", "question", "case"), [
-    ("nts-ar", ACCURACY_WAVY, NAMES[0]),
-    ("vts-me", ACCURACY_WAVY, NAMES[0]),
-    ("sts", ACCURACY_WAVY_CURVED, CURVED_NAMES[1]),
-    ("vts-ppt", ACCURACY_WAVY_CURVED, CURVED_NAMES[1]),
+    ("nts-ar", accuracy_wavy, NAMES[0]),
+    ("vts-me", accuracy_wavy, NAMES[0]),
+    ("sts", accuracy_wavy_curved, CURVED_NAMES[1]),
+    ("vts-ppt", accuracy_wavy_curved, CURVED_NAMES[1]),
 ])  # fmt: skip
 def test_the_errors_of_all_meshes_are_kept_and_a_witness_fails_clearly(
     name: str, question: Property, case: str
@@ -121,12 +120,12 @@ def test_the_errors_of_all_meshes_are_kept_and_a_witness_fails_clearly(
 def test_a_solution_with_multipliers_is_the_one_without_springs() -> None:
     """The penalty is the scale of the contact decision alone, so both cases measure the same."""
     mortar = load_subject("mortar-lm")
-    soft, stiff = (ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, name), mortar) for name in NAMES[:2])
+    soft, stiff = (accuracy_wavy.measure(_case(accuracy_wavy, name), mortar) for name in NAMES[:2])
     np.testing.assert_allclose(list(soft.values.values()), list(stiff.values.values()), rtol=1e-6)
 
 
 def test_pressures_that_two_passes_share_are_not_judged() -> None:
-    measurement = ACCURACY_WAVY.measure(_case(ACCURACY_WAVY, NAMES[0]), load_subject("two-pass/nts-ar"))
+    measurement = accuracy_wavy.measure(_case(accuracy_wavy, NAMES[0]), load_subject("two-pass/nts-ar"))
     assert "pressure error" not in measurement.series
     assert "pressure error on the finest mesh" not in measurement.values
 
@@ -138,7 +137,7 @@ def test_no_solution_is_undecided() -> None:
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return 1e-6 * np.sin(1e9 * z)
 
-    outcome = judge_case(ACCURACY_WAVY, _case(ACCURACY_WAVY, NAMES[0]), Subject("w", lambda *, penalty: Wanderer()))
+    outcome = judge_case(accuracy_wavy, _case(accuracy_wavy, NAMES[0]), Subject("w", lambda *, penalty: Wanderer()))
     assert outcome.verdict is Verdict.UNDECIDED
     assert "finds no solution on mesh 1" in outcome.reason
 

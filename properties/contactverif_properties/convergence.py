@@ -1,0 +1,333 @@
+"""Whether forces, pressures and displacements come near to the exact ones where pressures vary or surfaces bend.
+
+The problems state their bounds, beside what right and wrong formulations measure. They stand nowhere else.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
+from contactverif.problems.arcs import Arcs
+from contactverif.problems.hertz_box import HERTZ_STUDIES
+from contactverif.problems.problem import ITERATIONS, Bound, Errors, PosedProblem, Studies, Study
+from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
+from contactverif_properties.patch_flat import refuse_unknown_total
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.passes import nearest_sum
+
+
+def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:
+    """Solve a study on all meshes, and return the rates of its errors and their sizes on the finest mesh.
+
+    All errors are kept as series. A number whose errors are not reported is left out.
+    """
+    study, lost, rows = studies.read(case), [], []
+    for mesh in study.meshes:
+        posed = study.pose(mesh, subject.traits)
+        solution = solve_for_accuracy(posed.scene, subject, posed.start, posed.step)
+        largest = float(np.abs(posed.exact_forces(solution.state)).max())
+        if not solution.is_balanced_to(studies.nearly * largest):
+            lost.append(f"mesh {mesh}: {solution.end}")
+        rows.append(posed.errors(solution) | {ITERATIONS: float(solution.n_iterations)})
+    undecided = f"Newton's method finds no solution on {', '.join(lost)}" if lost else ""
+    details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: rows[-1][ITERATIONS]}
+    errors = _by_kind(rows)
+    series = {name: np.array(errors[kind]) for name, kind in studies.series.items() if kind in errors}
+    group = study.group(subject.traits)
+    numbers = [
+        bound.quantity.check(_value(bound, study, errors), _tolerance(bound, group, posed))
+        for bound in studies.bounds
+        if errors.keys() >= set(bound.kinds)
+    ]
+    return Measurement(numbers, undecided, details=details, series=series)
+
+
+def _by_kind(rows: list[Errors]) -> dict[str, list[float]]:
+    """Return the errors of all meshes by kind, where all have it."""
+    kinds = [kind for kind in rows[0] if all(kind in row for row in rows)]
+    return {kind: [row[kind] for row in rows] for kind in kinds}
+
+
+def _value(bound: Bound, study: Study, errors: dict[str, list[float]]) -> float:
+    """Return the least rate of the errors, or the largest one on the finest mesh."""
+    if not bound.rate:
+        return max(errors[kind][-1] for kind in bound.kinds)
+    sizes = [study.size(mesh) for mesh in study.meshes]
+    return min(fit_rate(sizes, errors[kind]) for kind in bound.kinds)
+
+
+def _tolerance(bound: Bound, group: str, finest: PosedProblem) -> float:
+    limit = bound.limit(group)
+    return limit * max(finest.best[kind] for kind in bound.kinds) if bound.of_best else limit
+
+
+def exact_forces(studies: Studies, case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) that push the nodes of the coarsest mesh, for pictures."""
+    study = studies.read(case)
+    return study.pose(study.meshes[0], Traits()).exact_forces(case)
+
+
+@Property.define(
+    id="accuracy.wavy",
+    family="accuracy",
+    summary="Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.",
+    quantities=WAVY_STUDIES.quantities,
+    cases=Cases.from_list(WAVY_STUDIES.cases),
+    promise=lambda traits: traits.converges,
+    applicable=refuse_dependent_multipliers,
+    series=dict.fromkeys(WAVY_STUDIES.series, "1"),
+    bodies=True,
+    exact=partial(exact_forces, WAVY_STUDIES),
+)
+def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
+    """Ask whether forces, pressures and displacements converge to an exact solution in which the pressure varies.
+
+    **Question.** Two wavy bodies are pressed together until they touch everywhere. On finer and finer meshes that do
+    not match, how fast do nodal forces, reported pressures and displacements come near to the exact ones?
+
+    **Why it matters.** The patch test asks about uniform pressures. A method that fails it need not be wrong by much,
+    and one that passes it may be poor where pressures vary, as they do in every real contact. What counts for an
+    engineer is that a finer mesh gives a better answer.
+
+    **How it is judged.** The exact field of wavy half-planes is elementary (`docs/concepts/accuracy.md`), and the
+    profiles are such that the interface is flat in the end. Meshes are 6r on 8r cells, r = 1, 2, 4 and 8, and the
+    penalty grows as E/h, so that its layer of springs, which the exact solution has too, vanishes with h. A case is one
+    choice of the slave and one penalty. The rates are the slopes of log error over log h:
+
+    - forces: E_F = sqrt(Σ|F_i − F_i^exact|²/m_i) over sqrt(Σ|F_i^exact|²/m_i) with m_i = ∫N_i ds, on slave and master;
+      right ones measure 1.41 to 1.90 (two half passes, whose sides are not in balance, 1.22), and formulations that
+      fail the patch test at most 0.42 on one of the sides at 10 E/h with the upper body as the slave;
+    - displacements of both surfaces in L2: right ones 1.89 to 2.08; the rate is 2 but for the coarsest mesh;
+    - reported pressures, if there are any, with the formulation's own weights: 1.08 to 2.20 against at most 0.87;
+      pressures that are constant on each segment have the rate 1, but for the coarsest mesh.
+
+    On the finest mesh pressures are judged by the best pressure that is constant on each segment, which is off by
+    kh/√24 of the wave's amplitude. Roundoff is uXε̂/p = 5e-6, and no error comes near to it. Pressures that two passes
+    share are not judged.
+
+    In two more cases the slave is four times finer, or four times coarser, than the master: 4r on r cells, r = 6, 9, 13
+    and 18, at 10 E/h with the h of the coarser mesh. A pressure that jumps between coarse slave segments, as that of
+    few points or of dual shapes does, has the rate 1 on a finer master. Forces of right ones have at least 0.95 there,
+    others at most 0.58. On the finer slave right ones have at least 1.62, and several wrong ones hide below the error
+    of the coarse body. Less is asked of displacements, since the coarse body has at most 18 cells and not 48: right
+    ones have 1.84, half passes 1.72.
+
+    **Undecided.** Where Newton's method finds no solution on one of the meshes.
+
+    References: K. L. Johnson, Contact Mechanics (1985), Chapter 13.
+    """
+    return measure_convergence(WAVY_STUDIES, case, subject)
+
+
+def promise_without_locking(traits: Traits) -> bool | None:
+    """Return whether the traits promise convergence without locking; None if they leave one of them open."""
+    if traits.converges is False or traits.locks is True:
+        return False
+    return True if traits.converges and traits.locks is False else None
+
+
+@Property.define(
+    id="accuracy.wavy-curved",
+    family="accuracy",
+    summary="Wavy bodies converge to the exact solution on a curved interface too, at a high penalty as well.",
+    quantities=CURVED_STUDIES.quantities,
+    cases=Cases.from_list(CURVED_STUDIES.cases),
+    promise=promise_without_locking,
+    applicable=refuse_dependent_multipliers,
+    series=dict.fromkeys(CURVED_STUDIES.series, "1"),
+    bodies=True,
+    exact=partial(exact_forces, CURVED_STUDIES),
+)
+def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
+    """Ask whether that still holds where the interface stays curved, so that facets of both meshes cross.
+
+    **Question.** The bodies of `accuracy.wavy` fit along a wave of 1e-6 of their size. Do nodal forces, pressures and
+    displacements converge there too, at a moderate and at a high penalty?
+
+    **Why it matters.** On a curved interface the facets of two meshes do not lie on one another. At 100 E/h the
+    distance between them is up to ten times the penetration. A method that presses every point of every facet then
+    carries the load on the few places where facets cross: it locks. Its pressures are wrong by half of their own size
+    and more, on any mesh.
+
+    **How it is judged.** As `accuracy.wavy`, with the same exact field: a slope of 1e-6 changes it by as much. Chords
+    leave a part of the error that falls with h alone, so less is asked of the rate of forces and of the size of
+    pressures; right ones have at least 1.13 and at most 1.4kh/√24. Displacements and pressures are asked for the rates
+    of `accuracy.wavy`: right ones have at least 1.89 and 1.28. At 100 E/h the pressures of formulations that lock are
+    off by 0.17 and more, where 0.08 to 0.11 is allowed, or displacements converge with 1.3. The promise is that a
+    formulation converges (`converges`) and does not lock (`locks`). At 1000 E/h forces of those that lock fall with at
+    most 0.82, but Newton's method finds no solution for some there. `docs/concepts/accuracy.md` has a picture.
+
+    **Undecided.** Where Newton's method finds no solution on one of the meshes.
+    """
+    return measure_convergence(CURVED_STUDIES, case, subject)
+
+
+@Property.define(
+    id="accuracy.hertz",
+    family="accuracy",
+    summary="Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.",
+    quantities=HERTZ_STUDIES.quantities,
+    cases=Cases.from_list(HERTZ_STUDIES.cases),
+    promise=lambda traits: traits.converges,
+    applicable=lambda traits: refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits),
+    series=dict.fromkeys(HERTZ_STUDIES.series, "1"),
+    bodies=True,
+    exact=partial(exact_forces, HERTZ_STUDIES),
+)
+def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a contact that has an edge converges to Hertz' solution as meshes are refined.
+
+    **Question.** A parabola is pressed on a flat. Do nodal forces on both sides, reported pressures, the peak and the
+    half-width converge to those of the exact solution as both meshes become finer?
+
+    **Why it matters.** This is what analysts use contact for: the stress in a contact whose size is not known
+    beforehand. A method that fails the patch test leaves forces that do not converge at all unless the penalty stays
+    soft on fine meshes.
+
+    **How it is judged.** Four meshes, with 16 to 33 segments of the parabola across the contact; the flat's segments
+    are shorter, and match nowhere. The sides of both bodies carry the exact stresses of half-planes. Each body is the
+    slave once. The penalty is E/a, the same on all meshes ("layer"), or 1 E/h ("soft") or 100 E/h ("stiff"), which grow
+    on finer meshes. The exact solution of each mesh is that of its own penalty: Hertz on a layer of springs, solved to
+    1e-10 of the peak; for multipliers Hertz himself.
+
+    - E_F is sqrt(Σ|F − F_exact|²/m) over sqrt(Σ|F_exact|²/m), with m = ∫N ds. Its rate is fitted over the meshes.
+      Hertz' pressure falls to 0 like a root of the distance from the edge, which allows the rate 1; on a layer that
+      stays as it is, the pressure has a kink there, which allows 1.5. Measured on formulations that pass the patch
+      test: 0.97 to 1.09 (0.86 at 100 E/h, where facets are felt), and 1.28 to 1.49 on the layer. All others have less
+      than 0.75 on one side at E/h, and less than 0.5 on the layer: the forces on their master do not converge there at
+      all.
+    - Reported pressures have rates from 0.78 to 1.03, and from 1.14 to 1.64 on the layer. Their size at 100 E/h is that
+      of the facets: segments of the parabola are straight, so the gap varies by h²/8R along each, and the penetration
+      is smaller than that.
+    - Errors on the finest mesh are at most half of the tolerances for formulations that converge.
+
+    The trait `converges` is the promise. `docs/concepts/accuracy.md` has a picture.
+
+    **Undecided.** A case in which Newton's method ends out of balance on some mesh, by more than 1e-4 of the largest
+    force. It starts at the exact displacements, where nothing but the formulation's own kinks can keep it from ending.
+    """
+    return measure_convergence(HERTZ_STUDIES, case, subject)
+
+
+REFINEMENTS = (8, 16, 32)  # The last one is judged.
+TOTAL, NODAL = 4e-3, 1.2e-2  # Three times the largest error of a right formulation.
+
+_REASON = "Straight segments differ from an arc by the square of their length; three times the largest measured error."
+SLAVE = Quantity("error of the total force on the slave", "1", f"{TOTAL:g}", _REASON)
+MASTER = Quantity("error of the total force on the master", "1", f"{TOTAL:g}", _REASON)
+FORCES = Quantity(
+    "error of the slave's nodal forces",
+    "1",
+    f"{NODAL:g}",
+    "A node's share of a segment differs by the length of the segment; three times the largest measured error.",
+)
+SUM = Quantity("error of the sum of reported pressures", "1", f"{TOTAL:g}", _REASON)
+PRESSURE = Quantity("error of the reported pressures", "1", f"{TOTAL:g}", _REASON)
+
+
+@cache
+def arc_cases() -> tuple[Case, ...]:
+    """Return a convex and a concave slave on the coarsest mesh."""
+    return tuple(
+        Arcs(convex_slave=convex).case(1, name) for name, convex in (("convex slave", True), ("concave slave", False))
+    )
+
+
+@Property.define(
+    id="accuracy.arc",
+    family="accuracy",
+    summary="Springs between two concentric arcs press with ε̂ d, and reported pressures say so.",
+    quantities=(SLAVE, MASTER, FORCES, SUM, PRESSURE),
+    cases=Cases.from_list(arc_cases),
+    promise=lambda traits: None if refuse_unknown_total(traits) else True,
+    applicable=refuse_unknown_total,
+)
+def accuracy_arc(case: Case, subject: Subject) -> Measurement:
+    """Ask whether springs between two concentric arcs press as they do between flats.
+
+    **Question.** Two concentric arcs penetrate each other by the same depth d everywhere. Do the forces and the
+    reported pressures tend to those of a uniform pressure ε̂ d as the mesh is refined, whether the slave is convex or
+    concave?
+
+    **Why it matters.** No flat test sees what a formulation does where the surface bends. Here no body hides it: the
+    pressure is known at every place (`docs/concepts/curved-surfaces.md`).
+
+    **How it is judged.** The slave reaches from 10° to 80° in 96 equal segments, the master from 0° to 90° in 128
+    graded ones, of radius R = 4 at d = R/40. Whatever the rule by which gaps are measured, the limit is the pressure ε̂
+    d on the slave's arc. Its integral is compared with the total force on the slave, and on the master where the traits
+    promise `conserves_force`, over the length of that integral: the formulations here have at most 1.4e-3, and springs
+    a quarter as stiff where the surface bends have 0.75. The nodal forces of the slave are compared too (E_F, of which
+    3.7e-3 is the largest), and the reported pressures: their sum over the weights, and their root mean square error
+    with the plugin's own weights (6e-4 is the largest of both). Of two passes the slave's points count, or for the sum
+    the points of both, whichever comes nearer to the forces. Multipliers that are pressures are all ε̂ d here. Errors
+    on meshes of a half and a quarter of these segments are details.
+
+    The total is known from the traits only if `penalty` is "distributed" and `area` is stated. These formulations are
+    asked to pass.
+
+    **Undecided.** Never: the bounds are far above what a tie between two master segments changes.
+    """
+    arcs = Arcs.from_case(case)
+    errors = {refine: _errors(arcs, refine, subject) for refine in REFINEMENTS}
+    values = errors.pop(REFINEMENTS[-1])
+    tolerances = {quantity: NODAL if quantity == FORCES else TOTAL for quantity in values}
+    details = {
+        f"{quantity.name}, m = {refine}": value for refine, part in errors.items() for quantity, value in part.items()
+    }
+    return Measurement(check_all(values, tolerances), details=details)
+
+
+def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[Quantity, float]:
+    """Return the errors {quantity: number} on one mesh."""
+    case = arcs.case(refine)
+    formulation, interface, n_slave = subject.for_case(case), case.interface, case.interface.n_slave_nodes
+    case = case.with_multipliers(np.full(formulation.n_multipliers(interface), arcs.pressure))
+    # Areas of the reference are those of the master's arc, on which the slave lies there.
+    share = arcs.radius / arcs.slave_radius if subject.traits.area == "reference" else 1.0
+    pairing = formulation.pair(interface, case.z)
+    forces = -formulation.residual(interface, pairing, case.z)[: interface.n_unknowns].reshape(-1, 2)
+    exact = share * arcs.slave_force
+    totals = forces[:n_slave].sum(axis=0), -forces[n_slave:].sum(axis=0)
+    slave, master = (float(np.linalg.norm(total - exact) / np.linalg.norm(exact)) for total in totals)
+    values = {SLAVE: slave, FORCES: _nodal_error(arcs, case, forces, share)}
+    if subject.traits.conserves_force:
+        values[MASTER] = master
+    if "contact_points" in formulation.provides:
+        points = formulation.contact_points(interface, pairing, case.z)
+        radial = forces[:n_slave] * case.positions[:n_slave] / arcs.slave_radius
+        total = nearest_sum(points, abs(float(radial.sum())))
+        values[SUM] = abs(total / (share * arcs.length * arcs.pressure) - 1)
+        values[PRESSURE] = _pressure_error(points, arcs.pressure)
+    return values
+
+
+def _pressure_error(points: ContactPoints, pressure: float) -> float:
+    """Return the root mean square of p/p_exact − 1 over the weights; infinite if no point of the slave has any."""
+    counted = ~points.on_master & (points.weight > 0)
+    if not counted.any():
+        return np.inf
+    errors = np.where(points.active, points.pressure, 0.0)[counted] / pressure - 1
+    return float(np.sqrt(np.average(errors**2, weights=points.weight[counted])))
+
+
+def _nodal_error(arcs: Arcs, case: Case, forces: FloatArray, share: float) -> float:
+    """Return the error E_F of the slave's nodal forces."""
+    towards = share * (-arcs.pressure if arcs.convex_slave else arcs.pressure)
+
+    def traction(places: FloatArray) -> FloatArray:
+        pressures: FloatArray = towards * places / np.linalg.norm(places, axis=1)[:, None]
+        return pressures
+
+    surface = case.interface.slave
+    exact = traction_forces(surface, case.positions, traction)
+    return force_error(forces, exact, shape_integrals(surface, case.positions))

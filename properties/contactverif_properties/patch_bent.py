@@ -1,0 +1,391 @@
+"""The patch test where the interface is bent: two rings that are shrunk onto each other, and blocks on a kink."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import product
+from math import inf, pi
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.trace import Trace
+from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
+from contactverif.problems.problem import FORCES
+from contactverif.problems.shrink_fit import FIT, FiniteFit, RingStudy, Role, shrink_fit
+from contactverif.problems.uniform_stress import uniform_forces
+from contactverif_properties.patch_flat import refuse_unknown_total
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.newton_solution import end_details
+from contactverif_properties.shared.passes import nearest_sum
+from contactverif_properties.shared.solved_patch import ITERATIONS, is_solved, nearest_to_balance
+
+REFINEMENTS = (2, 4)  # Two meshes, one twice as fine, so that an error of second order can be taken away.
+PENALTIES = (1e2, 1e3)
+ROLES: tuple[Role, Role] = ("inner", "outer")
+BOUND = 4e-3  # Nearly twice the largest value of a right formulation, a thirtieth of the smallest of a wrong one.
+
+_SECOND_ORDER = (
+    "Straight segments have an error of second order, which two meshes take away; what is left is below 2.4e-3."
+)
+SLAVE_MEAN = Quantity("error of the mean force on the slave", "1", f"{BOUND:g}", _SECOND_ORDER)
+MASTER_MEAN = Quantity("error of the mean force on the master", "1", f"{BOUND:g}", _SECOND_ORDER)
+REPORTED = Quantity("error of the mean reported pressure", "1", f"{BOUND:g}", _SECOND_ORDER)
+BESIDE = Quantity(
+    "mean reported pressure against the forces",
+    "1",
+    f"{BOUND:g}",
+    "Both are of the same solution; normals of segments and of nodes differ by their half angle.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """The relative errors of the mean pressure on one mesh, by forces and by what is reported (NaN if nothing is)."""
+
+    slave: float
+    master: float
+    reported: float
+
+
+@cache
+def rings() -> tuple[Case, ...]:
+    """Return the coarser of both meshes, with either ring as the slave and at two penalties."""
+    return tuple(
+        replace(
+            shrink_fit(FIT, slave=slave, refine=REFINEMENTS[0]),
+            penalty=penalty,
+            name=f"{slave} slave, ε̂ = {penalty:g}",
+        ).case()
+        for slave, penalty in product(ROLES, PENALTIES)
+    )
+
+
+def refuse_unknown_mean(traits: Traits) -> str:
+    """Return why the mean pressure is unknown from the traits, or an empty string if they say enough."""
+    if traits.enforcement == "multiplier":
+        return refuse_dependent_multipliers(traits)
+    return refuse_unknown_total(traits)
+
+
+def promise_mean(traits: Traits) -> bool | None:
+    """Return True where the traits say what the mean pressure is, and for multipliers, that they are unique."""
+    if refuse_unknown_mean(traits) or (traits.enforcement == "multiplier" and not traits.independent_multipliers):
+        return None
+    return True
+
+
+@Property.define(
+    id="patch.curved",
+    family="patch",
+    summary="Two rings that are shrunk onto each other find Lamé's pressure, whichever is the slave.",
+    quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE),
+    cases=Cases.from_list(rings),
+    promise=promise_mean,
+    applicable=refuse_unknown_mean,
+    bodies=True,
+)
+def patch_curved(case: Case, subject: Subject) -> Measurement:
+    """Ask whether two rings that are shrunk onto each other find Lamé's pressure.
+
+    **Question.** Two elastic rings do not fit by δ = c/150, and the interface is a circle of radius c. Do the mean of
+    the forces and the mean of the reported pressures tend to the exact pressure as the mesh is refined, whichever ring
+    is the slave, and whatever the penalty?
+
+    **Why it matters.** A patch test on flat surfaces says nothing of bent ones: pipes, shafts, bearings. Springs that
+    are too soft wherever the surface bends, or pressures that are reported right only between parallel surfaces, pass
+    every flat test (`docs/concepts/curved-surfaces.md`).
+
+    **How it is judged.** A quarter of both rings is solved on two meshes, of 24 on 32 and 48 on 64 segments, at two
+    penalties (ε̂ c = E/2 and 5 E, E that of the softer ring) or with multipliers. The exact pressure is uniform, so
+    that its mean is asked: the sum of radial forces over all nodes of one side. Straight segments have an error of
+    second order, so that the combination (4 e_4 − e_2)/3 of both errors is judged, which is free of it. Where both
+    sides get the same force, 1e-7 to 4e-4 is measured, and 2.4e-3 where each has the pressure on its own radius (half
+    passes). Springs a quarter as stiff where the surface bends have 0.1 and more. The exact forces are Lamé's with
+    contact measured after the fit (`contactverif.problems.shrink_fit`): his formula alone is wrong by δ/c. The sum of
+    reported pressures over their weights is judged in the same way, and also beside the forces on the finer mesh, where
+    1e-4 is usual. Of two passes the slave's points count, or the points of both, whichever comes nearer to the forces.
+    The formulation's tangent plays no part in the verdict: where Newton's method does not converge with it, it
+    differentiates the residual. The error E_F of nodal forces is a detail, because facets press with their middles at a
+    high penalty, and no formulation is to blame for that.
+
+    The total is known from the traits only if `penalty` is "distributed" and `area` is stated, or for multipliers.
+    These formulations are asked to pass.
+
+    **Undecided.** A case whose solution Newton's method does not find. A failing case in which an end of the slave has
+    no force: it faces the end of the master, and without a tolerance there roundoff decides whether it is in contact.
+    """
+    study = RingStudy.from_case(case)
+    fit = study.fit(subject.traits)
+    means: list[Means] = []
+    details: dict[str, float] = {}
+    undecided = ""
+    for refine in REFINEMENTS:
+        posed = study.pose(refine, subject.traits)
+        solution = solve_for_accuracy(posed.scene, subject)
+        if not solution.balanced:
+            return Measurement(undecided=f"Newton's method: {solution.end} at refine = {refine}")
+        undecided = undecided or _lost_end(solution)
+        means.append(_mean_errors(solution, fit, study.slave))
+        forces = posed.errors(solution)[FORCES[0]]
+        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": forces}
+    coarse, fine = means
+    details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf
+    values = {
+        SLAVE_MEAN: _extrapolate(coarse.slave, fine.slave),
+        MASTER_MEAN: _extrapolate(coarse.master, fine.master),
+    }
+    if not np.isnan(fine.reported):
+        values[REPORTED] = _extrapolate(coarse.reported, fine.reported)
+        values[BESIDE] = abs(fine.reported - fine.slave)
+    return Measurement(check_all(values, BOUND), undecided, details=details)
+
+
+def _lost_end(solution: Solution) -> str:
+    """Return the reason why a failure means nothing if an end of the slave, and no more, has no force at all."""
+    segments = solution.interface.slave.segments
+    at_end: BoolArray = np.asarray(np.bincount(segments.ravel()) == 1)
+    idle: BoolArray = np.asarray(~solution.forces[: len(at_end)].any(axis=1))
+    lost = bool(idle[at_end].any()) and not idle[~at_end].any()
+    return "an end of the slave faces that of the master, and roundoff decides whether it is in contact" if lost else ""
+
+
+def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role) -> Means:
+    """Return the relative errors of the mean pressure over a quarter turn."""
+    nodes, n_slave = solution.interface.nodes, solution.interface.n_slave_nodes
+    outwards = nodes / np.linalg.norm(nodes, axis=1)[:, None]
+    radial = (solution.forces * outwards).sum(axis=1) * (-1 if slave == "inner" else 1)
+    exact, points = fit.force * pi / 2, solution.points
+    reported = np.nan
+    if points is not None:
+        reported = nearest_sum(points, float(radial[:n_slave].sum())) / exact - 1
+    return Means(float(radial[:n_slave].sum() / exact - 1), float(-radial[n_slave:].sum() / exact - 1), reported)
+
+
+def _extrapolate(coarse: float, fine: float) -> float:
+    """Return the size of an error on two meshes, one twice as fine, without its part of second order."""
+    return abs(4 * fine - coarse) / 3
+
+
+LINES = {
+    "roof of 41°": ((0.0, 0.0), (4.0, 1.5), (8.0, 0.0)),
+    "roof of 90°": ((0.0, -2.0), (4.0, 2.0), (8.0, -2.0)),
+    "edge of 53°": ((0.0, 0.0), (4.0, 0.0), (7.0, -4.0)),
+}
+MODERATE = 10.0  # ε̂ ℓ/E with two normals.
+STIFF = (3e3, 3e4, 3e5)  # ε̂ ℓ/E with three normals.
+STRAINS = (
+    1e-6,
+    1e-4,
+)  # p/E with two and three normals: roundoff is over the penetration, which stiff springs make small.
+SHARE = 4.0  # Bound of the stress error with three normals over E/(ε̂ ℓ); 0.01 to 2.4 is measured.
+SLOPE = 0.95  # Decades by which the error falls over a decade of the penalty; 0.99 to 1.00 is measured.
+
+_TOLERANCE = "4 (g/ℓ) tan(φ/2) + u (8X/g + 4N)"
+_REASON = "The kink moves along a facet by g tan(φ/2), gaps are differences of positions, and N forces are summed."
+STRESS = Quantity("stress error", "1", _TOLERANCE, _REASON)
+SLAVE = Quantity("slave force error", "1", _TOLERANCE, _REASON)
+MASTER = Quantity("master force error", "1", _TOLERANCE, _REASON)
+PRESSURE = Quantity(
+    "reported pressure error",
+    "1",
+    f"{_TOLERANCE} + p (1 + ν)(1 − 2ν)/E",
+    f"{_REASON} Lengths of the reference are longer than current ones by the contraction of the blocks.",
+)
+CUT = Quantity(
+    "stress error, three normals",
+    "1",
+    f"max({SHARE:g} E/(ε̂ ℓ), {_TOLERANCE})",
+    "Springs give way unequally, by 1/ε̂ over ℓ/E.",
+)
+FALL = Quantity(
+    "fall of the stress error over a decade of ε̂",
+    "1",
+    f"{SLOPE}",
+    "The error is of first order in 1/ε̂; its part of second order is left.",
+    sense="at least",
+)
+
+
+@cache
+def kinked_cases() -> tuple[Case, ...]:
+    """Return blocks on three broken lines, either block as the slave."""
+    return tuple(
+        replace(
+            kinked_patch(KinkedPatch(line, pressure=STRAINS[0]), upper_slave=upper, penalty=MODERATE),
+            name=f"{name}, {'upper' if upper else 'lower'} slave",
+        ).case()
+        for (name, line), upper in product(LINES.items(), (True, False))
+    )
+
+
+def forces_to_draw(case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2), for pictures."""
+    problem, _ = patch_of(case)
+    return uniform_forces(case.interface, problem.pressure)
+
+
+@Property.define(
+    id="patch.kinked",
+    family="patch",
+    summary="A uniform pressure stays exact on an interface with a kink.",
+    quantities=(STRESS, SLAVE, MASTER, PRESSURE, CUT, FALL),
+    cases=Cases.from_list(kinked_cases),
+    promise=lambda traits: traits.passes_kinked_patch,
+    bodies=True,
+    exact=forces_to_draw,
+)
+def patch_kinked(case: Case, subject: Subject) -> Measurement:
+    """Ask whether two blocks find a uniform pressure on an interface with a kink.
+
+    **Question.** The interface of two blocks of one material is a broken line, and the same pressure acts on all sides.
+    Are the stress, the forces on both sides and the reported pressure the exact ones, on both sides of the kink?
+
+    **Why it matters.** Corners, chamfers and the facets of any curved mesh are kinks. A normal that is averaged over a
+    kink, or a slave node at a kink that is pushed along one facet alone, gives wrong forces there, whatever the mesh.
+
+    **How it is judged.** The stress is hydrostatic. Nodes of both meshes lie at the kink and nowhere else on one
+    another.
+
+    - *Two normals.* Springs of ε̂ = 10 E/ℓ give way by g = p/ε̂, which is a translation of one block, so that the
+      uniform state is exact. The stress at Gauss points over p, the nodal forces over the largest exact one, and the
+      mean absolute error of the reported pressures, with the plugin's weights, over p are at most 4 (g/ℓ) tan(φ/2) + u
+      (8X/g + 4N) at p = 1e-6 E: penetration moves the slave's kink along the facet by g tan(φ/2), and gaps are
+      differences of positions. The reported pressure may count current or reference lengths, which differ by the
+      contraction of the blocks. As in `patch.flat.solve` the residual alone is asked, by differences. Newton's method
+      starts at the first guess, and where it ends elsewhere, again at the exact solution.
+    - *Three normals.* The ridge is cut off. Springs cannot give way uniformly along three normals, so that the stress
+      error falls like 1/ε̂. At ε̂ = 3e4 E/ℓ it is at most 4 E/(ε̂ ℓ). From 3e3 to 3e4 E/ℓ, or from there to 3e5 E/ℓ, it
+      falls by at least 0.95 decades: earlier the part of second order counts, later roundoff may. Where the error is
+      below 4 (g/ℓ) tan(φ/2) + u (8X/g + 4N) at p = 1e-3 E, as that of multipliers, nothing need fall.
+
+    The trait `passes_kinked_patch` promises it.
+
+    **Undecided.** A case whose uniform state is exact, but whose solution with three normals Newton's method does not
+    find.
+    """
+    problem, upper_slave = patch_of(case)
+    measurement = _measure_two_normals(problem, upper_slave, case.penalty, subject)
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
+    return _add_three_normals(measurement, fails, problem, upper_slave, subject)
+
+
+def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float, subject: Subject) -> Measurement:
+    """Return the errors of the uniform state, which is exact."""
+    scene = kinked_patch(problem, upper_slave=upper_slave, penalty=penalty)
+    traits, pressure, gap = subject.traits, problem.pressure, problem.pressure / penalty
+    start = Case(scene.interface, scene.positions(scene.start), penalty)
+    formulation, multiplier = subject.for_case(start), traits.enforcement == "multiplier"
+    trace, u = _solve(scene, formulation, exact_unknowns(problem, scene, 0.0 if multiplier else gap), gap)
+    q, multipliers = u[: scene.n_free], u[scene.n_free :]
+    z = np.concatenate([scene.positions(q), multipliers])
+    pairing = formulation.pair(scene.interface, z)
+    by_contact = -formulation.residual(scene.interface, pairing, z)[: scene.interface.n_unknowns].reshape(-1, 2)
+    exact, n_slave = uniform_forces(scene.interface, pressure), scene.interface.n_slave_nodes
+    by_bodies = scene.nodal_forces(q)
+    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
+    errors /= np.linalg.norm(exact, axis=1).max()
+    values = {
+        STRESS: _stress_error(problem, scene, q),
+        SLAVE: float(errors[:n_slave].max()),
+        MASTER: float(errors[n_slave:].max()),
+    }
+    tolerances = dict.fromkeys(values, _floor(problem, start, gap))
+    unique = not multiplier or traits.independent_multipliers is True
+    if "contact_points" in formulation.provides and traits.penalty == "distributed" and unique:
+        points = formulation.contact_points(scene.interface, pairing, z)
+        if not points.on_master.any():  # Nobody says how two passes share a pressure.
+            values[PRESSURE] = _pressure_error(points, pressure)
+            tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
+    idle = not by_contact.any()
+    return Measurement(check_all(values, tolerances), details=end_details(trace), idle=idle)
+
+
+def _solve(
+    scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
+) -> tuple[Trace, FloatArray]:
+    """Solve a scene and return Newton's trace and the solution that is judged.
+
+    Newton's method may end elsewhere than at the exact solution, since large motions have other solutions too. Then it
+    starts again at the exact solution, where a formulation that passes is in balance and does not move. A formulation
+    that is not in balance there is judged where it comes nearest to balance afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene to solve.
+    formulation : CheckedFormulation
+        The formulation, with its penalty.
+    exact : FloatArray, shape (n_free + n_multipliers,)
+        The exact solution.
+    penetration : float
+        The exact penetration p/ε̂, a length; distances from the exact solution are measured by it.
+
+    Returns
+    -------
+    trace : Trace
+        The first solution.
+    u : FloatArray, shape (n_free + n_multipliers,)
+        The unknowns that are judged.
+    """
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    if is_solved(trace, exact, penetration):
+        return trace, trace.u[-1]
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    return trace, nearest_to_balance(again)
+
+
+def _add_three_normals(
+    measurement: Measurement, fails: bool, problem: KinkedPatch, upper_slave: bool, subject: Subject
+) -> Measurement:
+    """Return the measurement with what the cut ridge adds; a failure of the uniform state decides without it."""
+    stiff = replace(problem.cut(), pressure=STRAINS[1] * problem.young)
+    errors, floors = [], []
+    for stiffness in STIFF:
+        penalty = stiffness * problem.young
+        scene = kinked_patch(stiff, upper_slave=upper_slave, penalty=penalty)
+        solution = solve_for_accuracy(scene, subject)
+        if not solution.balanced or solution.trace is None:
+            break
+        errors.append(_stress_error(stiff, scene, solution.trace.solution))
+        floors.append(_floor(stiff, solution.state, stiff.pressure / penalty))
+    if len(errors) < 2:
+        reason = f"Newton's method with three normals: {solution.end}"
+        return measurement if fails else Measurement(undecided=reason, details=measurement.details)
+    numbers = [*measurement.numbers, CUT.check(errors[1], max(SHARE / STIFF[1], floors[1]))]
+    if errors[1] > floors[1]:
+        numbers.append(FALL.check(float(-np.diff(np.log10(errors)).min()), SLOPE))
+    names = [f"stress error, three normals, ε̂ = {stiffness:g} E/ℓ" for stiffness in STIFF]
+    details = {**measurement.details, **dict(zip(names, errors, strict=False))}
+    return replace(measurement, numbers=numbers, details=details)
+
+
+def _floor(problem: KinkedPatch, state: Case, gap: float) -> float:
+    """Return 4 (g/ℓ) tan(φ/2) + u (8X/g + 4N)."""
+    moved = 4 * gap / state.shortest_segment * problem.sharpest
+    return moved + UNIT_ROUNDOFF * (8 * state.largest_coordinate / gap + 4 * state.n_segments)
+
+
+def _stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
+    """Return the largest entry of σ + p I at the Gauss points over p."""
+    exact = np.array([-problem.pressure, -problem.pressure, 0.0])
+    return max(float(np.abs(stresses - exact).max()) for stresses in scene.stresses(q)) / problem.pressure
+
+
+def _pressure_error(points: ContactPoints, pressure: float) -> float:
+    """Return the mean of |p − p_exact|/p over the weights; infinite if no point has any."""
+    counted = points.weight > 0
+    if not counted.any():
+        return np.inf
+    errors = np.abs(np.where(points.active, points.pressure, 0.0)[counted] / pressure - 1)
+    return float(np.average(errors, weights=points.weight[counted]))
