@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from hypothesis import strategies as st
@@ -15,9 +16,10 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_points import (
@@ -48,25 +50,11 @@ FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reported:
-    """The answers of a formulation in a state.
-
-    Attributes
-    ----------
-    formulation : CheckedFormulation
-        The formulation, with the penalty of the state.
-    state : Case
-        The case, with multipliers if the formulation has any.
-    forces : FloatArray, shape (n_nodes, 2)
-        The position rows of the residual.
-    points : ContactPoints
-        The contact points.
-    traits : Traits
-        The promises.
-    """
+    """The answers of a formulation in a state."""
 
     formulation: CheckedFormulation
-    state: Case
-    forces: FloatArray
+    state: Case  # With multipliers, if the formulation has any.
+    forces: FloatArray  # The position rows of the residual, of shape (n_nodes, 2).
     points: ContactPoints
     traits: Traits
 
@@ -99,39 +87,21 @@ class Reported:
 class Places:
     """The points of a pass that name a place on a slave segment and a master segment.
 
-    Attributes
-    ----------
-    interface : Interface
-        The interface in the roles of the pass.
-    lattice : Lattice
-        Its state.
-    reported : ContactPoints
-        What the formulation says of these points.
-    exact : ExactPoints
-        The points.
-    view : View
-        What they see of the reported master segment, by the rule of the formulation.
-    scale : FloatArray, shape (n_points,)
-        The length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over the
-        cosine; infinite where the rule sees nothing of the segment.
-    gap_scale : FloatArray, shape (n_points,)
-        The same for the gap. Past an end of the master segment by ξ', its ends are extrapolated: D ξ' is added.
-    foot_scale : FloatArray, shape (n_points,)
-        The same for the foot. Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which
-        moves the foot by |gap| uD/ℓ. So |gap| D/ℓ is added too.
-    facing : BoolArray, shape (n_points,)
-        True where the slave segment and the master segment run against each other.
+    A scale is the length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over
+    the cosine; infinite where the rule sees nothing of the segment.
     """
 
-    interface: Interface
+    interface: Interface  # In the roles of the pass.
     lattice: Lattice
     reported: ContactPoints
     exact: ExactPoints
-    view: View
-    scale: FloatArray
-    gap_scale: FloatArray
+    view: View  # Of the reported master segment, by the rule of the formulation.
+    scale: FloatArray  # (n_points,), as are the others.
+    gap_scale: FloatArray  # Past an end of the master segment by ξ', its ends are extrapolated: D ξ' is added.
+    # Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which moves the foot by
+    # |gap| uD/ℓ. So |gap| D/ℓ is added too.
     foot_scale: FloatArray
-    facing: BoolArray
+    facing: BoolArray  # True where the slave segment and the master segment run against each other.
 
     @classmethod
     def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
@@ -160,28 +130,22 @@ def name_places(points: ContactPoints) -> BoolArray:
 
 @random_source("contactverif_properties.shared.exact_places.projected_cases")
 def projected_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
-    """Return a strategy for each kind of projection, and for larger random states and exact ties.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        A given interface, on which only the states are random.
-
-    Returns
-    -------
-    dict[str, SearchStrategy[Case]] | SearchStrategy[Case]
-        {kind: strategy}, the kinds of `PROJECTED_KINDS`; one strategy for a given interface.
-    """
+    """Return {kind: strategy} of `PROJECTED_KINDS`, or one strategy for states of a given interface."""
     if interface is not None:
         return st.one_of(projection_states(interface), any_cases(interface))
     return projections_by_kind() | dict(zip(LARGER_MESHES, (general_cases(), tie_cases()), strict=True))
 
 
-def refuse_without_rule(traits: Traits) -> str:
-    """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
-    return "" if traits.gap is not None else "the trait `gap` states no rule of projection"
-
-
 def largest(values: FloatArray) -> float:
     """Return the largest of some values ≥ 0; NaN if one is NaN, 0 if there are none."""
     return float(np.max(values, initial=0.0))
+
+
+define_projection = partial(
+    Property.define,
+    family="projection",
+    cases=Cases.by_kind(projected_cases),
+    kinds=PROJECTED_KINDS,
+    promise=lambda traits: True,
+    needs=frozenset({"contact_points"}),
+)
