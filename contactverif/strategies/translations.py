@@ -1,7 +1,7 @@
 """States that can be moved far away without rounding, and with too many bits for anything but their differences.
 
 Coordinates are multiples of 2^-32 below 2^5. A translation by up to 2^20 is therefore exact: the moved coordinates fill
-the 53 bits of a double. A point inside a segment has more bits, so whoever forms its coordinates far away rounds it.
+the 53 bits of a double. A point inside a segment has more bits, so code that forms its coordinates far away rounds it.
 On a coarser lattice that would be exact as well, and nothing would show.
 """
 

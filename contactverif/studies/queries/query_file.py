@@ -1,4 +1,4 @@
-"""The two files of queries: the questions for a program, and the exact answers for whoever scores it.
+"""The two files of queries: the questions for a program, and the exact answers that score it.
 
 Both are plain text, so that a few lines of C or Fortran read them. Decimal numbers are the shortest that read back as
 the same double; exact numbers are `p/q`. `docs/how-to/score-your-search.md` describes every line.
