@@ -93,7 +93,7 @@ def _write(result: Run, files: OutputFiles) -> None:
         draw_stability(sweep_panels(result), picture)
     if MARKDOWN in files.paths:
         from contactverif_reports.files import whole
-        from contactverif_reports.stability.markdown_page import stability_page
+        from contactverif_reports.stability.stability_page import stability_page
 
         page = stability_page(result, {suffix: name.name for suffix, name in files.names.items()})
         with whole(files.paths[MARKDOWN]) as part:
@@ -104,7 +104,7 @@ def _show(result: Run, files: OutputFiles) -> None:
     """Print the table, a sentence for each formulation with commands to replay its worst cases, and the files."""
     from contactverif.cli.console import show, show_as_it_is
     from contactverif.cli.run_tables import summary
-    from contactverif_reports.stability.sentences import sentence_of
+    from contactverif_reports.stability.stability_page import sentence_of
     from contactverif_reports.stability.sweep_points import sweep_panels
 
     panels = sweep_panels(result)

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper import paper_formulations as formulations
+from contactverif_paper.defect_tilt import DEPTH, TILTS, nodal_forces
 from contactverif_paper.figure_style import (
     REFERENCE_LINE,
     Series,
@@ -30,7 +31,6 @@ from contactverif_paper.figure_style import (
 from contactverif_paper.paper_columns import Column, Formulations, axis_column, values_column
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_paper.tilted_segment import DEPTH, TILTS, nodal_forces
 from contactverif_reports.html.pages import number
 
 FORMULATIONS = (formulations.VTS_PPT, formulations.BALANCED, formulations.STS)

@@ -9,22 +9,47 @@ Source: Zavarise & De Lorenzis (2009), Section 5.1.1, Boxes 1–3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.interface import Interface
 from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, axis_column, values_column
-from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_paper.tilted_segment import TILTS, nodal_forces
 from contactverif_reports.html.pages import number
 
+TILTS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])  # Radians.
+DEPTH = 1.0 / 8  # The penetration of the slave's first node over its length.
+_PENALTY = 8.0
 FORMULATIONS = (formulations.VTS_ME, formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
 _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses a node, up to θ = 0.5.
+
+
+def tilted_pair(theta: float, master: Sequence[float]) -> tuple[Interface, FloatArray]:
+    """Return the interface and its positions (n_nodes, 2) at a tilt in radians.
+
+    The slave has unit length and begins at x = 0; `master` is the ascending x of the master's nodes.
+    """
+    chain = np.column_stack([master[::-1], np.zeros(len(master))])
+    reference = np.array([[0.0, 0.0], [1.0, 0.0]])
+    slave = np.array([[0.0, -DEPTH], [np.cos(theta), -DEPTH - np.sin(theta)]])
+    return Interface.from_chains(reference, chain), np.vstack([slave, chain])
+
+
+def nodal_forces(formulation: PaperFormulation, theta: float, master: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Return positions and forces, both (n_nodes, 2), slave nodes first."""
+    interface, x = tilted_pair(theta, master)
+    plugin = subject_of(formulation).with_penalty(_PENALTY)
+    z = x.reshape(-1)
+    forces: FloatArray = -plugin.residual(interface, plugin.pair(interface, z), z).reshape(-1, 2)
+    return x, forces
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,9 +16,9 @@ from contactverif.mechanics.trace import End
 from contactverif.problems import catalogue
 from contactverif.run.workers import worker_pool
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
+from contactverif_paper.example_2 import mesh_lines, thin_out
 from contactverif_paper.figure_style import new_panels
 from contactverif_paper.items import ITEMS
-from contactverif_paper.mesh_lines import mesh_lines, thin_out
 from contactverif_paper.paper_columns import Column
 from contactverif_paper.paper_formulations import subject_of
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement

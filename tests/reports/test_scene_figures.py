@@ -16,8 +16,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.draw import case_figure as figures
 from contactverif_reports.draw.case_geometry import Gaps
-from contactverif_reports.draw.scene_curves import choose_pen
-from contactverif_reports.draw.scene_figures import draw_scene
+from contactverif_reports.draw.scene_figures import choose_pen, draw_scene
 from contactverif_reports.draw.scene_meshes import Magnification, colour_scale, draw_bodies, magnifications
 from contactverif_reports.draw.solved_scene import SolvedScene
 

@@ -25,8 +25,7 @@ from contactverif_reports.draw.stability_figure import draw_stability, make_stab
 from contactverif_reports.netcdf.read import case_ids, open_report, read_case, read_run
 from contactverif_reports.netcdf.write import write
 from contactverif_reports.stability import sweep_points
-from contactverif_reports.stability.markdown_page import stability_page
-from contactverif_reports.stability.sentences import sentence_of
+from contactverif_reports.stability.stability_page import sentence_of, stability_page
 from contactverif_reports.stability.sweep_points import FAR_AND_CLOSE, SWEEPS, SweepPanel, short_number, sweep_panels
 
 ABOVE = "unstable.stability.sweep.offset-1e6-a"

@@ -21,10 +21,11 @@ from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Row, Run
-from contactverif_reports.netcdf import property_group
+from contactverif_reports.files import check_writable
+from contactverif_reports.netcdf import report_tree
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.schema import VERDICTS, group_names
-from contactverif_reports.netcdf.write import check_writable, write
+from contactverif_reports.netcdf.write import write
 
 
 @pytest.fixture
@@ -132,7 +133,7 @@ def test_a_report_is_the_same_however_many_cases_are_in_memory(tmp_path: Path, m
     questions = load_properties(["patch.flat.transmission", "hard.deep", "newton.order", "swap"])
     result = verify(subjects, questions, examples=12, seed=3)
     for name, size in (("whole.nc", 10_000), ("pieces.nc", 5)):
-        monkeypatch.setattr(property_group, "CASES_OF_A_BLOCK", size)
+        monkeypatch.setattr(report_tree, "CASES_OF_A_BLOCK", size)
         write(result, tmp_path / name)
     assert same_data(tmp_path / "whole.nc", tmp_path / "pieces.nc") == []
 

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from handmade_report import small_run
 
-from contactverif_reports.netcdf.tree import tree_of
+from contactverif_reports.netcdf.report_tree import tree_of
 from contactverif_reports.netcdf.write_tree import write_tree
 
 

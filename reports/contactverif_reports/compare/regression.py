@@ -19,6 +19,12 @@ A row (formulation × property) has regressed if one of these holds:
   it drew before. Failures occur in both samples, so they do not bias the comparison. The test sees ranks, so that it
   takes a change of 1 % for news where all margins are alike: an old m > 1 enters as 2 m + 2 here too. Within the
   tolerance nothing is compared.
+
+Worth a look, though nothing got worse by it, is a row on the same cases where
+
+- Newton needs more than 2 n_old + 2 iterations in the median: an active set may take a few more or fewer.
+- A median or worst margin within its tolerance is more than 100 times what it was and above 1/10. Margins below that
+  may be one roundoff (0.05 where a tolerance is 20 of them), which comes and goes.
 """
 
 from __future__ import annotations
@@ -34,8 +40,7 @@ from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif_reports.compare.cells import Cell, Paired, statistics
-from contactverif_reports.compare.comparison import CONVERGED, END, Iterations
-from contactverif_reports.compare.noteworthy import noteworthy_changes, paired_iterations
+from contactverif_reports.compare.comparison import CONVERGED, END, Iterations, count_iterations
 
 ALPHA = 1e-6  # The rate of false alarms per row on different cases.
 # The share of the cases that is independent: runs of one code with other seeds lie so far apart, at 90 % and 99 % of
@@ -43,6 +48,9 @@ ALPHA = 1e-6  # The rate of false alarms per row on different cases.
 INDEPENDENT_SHARE = 0.5
 REASON_LENGTH = 100  # The number of characters of a reason that are printed.
 FACTOR = 2.0  # The factor between two margins beyond the tolerance that is no news.
+ITERATIONS_FACTOR, ITERATIONS_MORE = 2.0, 2.0  # Iterations that grow by no more than factor · n + more are no news.
+LEAP = 100.0  # The factor by which a margin within the tolerance must grow to be worth a look.
+LEAST_MARGIN = 0.1  # A margin that stays below this is roundoff.
 ROUNDOFFS = 2.0  # The number of tolerances by which two right margins may differ.
 
 
@@ -242,6 +250,28 @@ def shift(before: FloatArray, after: FloatArray) -> float:
     places = np.unique(np.concatenate([before, after]))
     counts = [np.searchsorted(np.sort(sample), places, side="right") / len(sample) for sample in (before, after)]
     return float(np.max(counts[0] - counts[1], initial=0.0))
+
+
+def noteworthy_changes(old: Cell, new: Cell) -> Sequence[str]:
+    """Return what is worth a look, in words; both cells are over the same cases."""
+    lines = [
+        f"{name} error grew within its tolerance, {m_old:.2g} → {m_new:.2g} of it"
+        for name, m_old, m_new in statistics(old, new)
+        if LEAST_MARGIN < m_new <= 1 and m_new > LEAP * m_old
+    ]
+    for before, after in paired_iterations(old, new):
+        if after.median > ITERATIONS_FACTOR * before.median + ITERATIONS_MORE:
+            solution = f" ({after.solution})" if after.solution else ""
+            lines.append(f"Newton iterations{solution}, median {before.median:g} → {after.median:g}")
+    return lines
+
+
+def paired_iterations(old: Cell, new: Cell) -> Sequence[tuple[Iterations, Iterations]]:
+    """Return the Newton iterations (before, after) of each solution that both kept."""
+    by_title: dict[str, list[Iterations]] = {}
+    for line in count_iterations([old, new]):
+        by_title.setdefault(line.title, []).append(line)
+    return [(lines[0], lines[1]) for lines in by_title.values() if len(lines) == 2]
 
 
 def _line(change: Change, words: Sequence[str]) -> str:

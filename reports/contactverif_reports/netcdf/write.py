@@ -7,12 +7,10 @@ import os
 from contactverif.contract.result import Run
 from contactverif_reports.files import check_writable, whole
 
-__all__ = ["check_writable", "write"]
-
 
 def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
     """Write the report of a run, whole or not at all, in place of a file that is there."""
-    from contactverif_reports.netcdf.tree import tree_of
+    from contactverif_reports.netcdf.report_tree import tree_of
     from contactverif_reports.netcdf.write_tree import write_tree
 
     check_writable(path)

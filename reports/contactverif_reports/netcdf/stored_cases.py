@@ -1,7 +1,12 @@
-"""The group of counterexamples: each a case that can be rebuilt to the last bit, and a mesh that others can draw."""
+"""The groups of stored cases: counterexamples with a mesh that others can draw, and named cases that fail.
+
+A case is rebuilt to the last bit. A property with a finite list of cases asks every formulation the same, so such a
+case belongs to its property, and is stored once however many formulations fail it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,14 +15,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from contactverif.contract.case import Case
-from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
-from contactverif_reports.netcdf.stored_bodies import check_bodies
 from contactverif_reports.netcdf.stored_groups import Group
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
+_FOLDER = f"/{schema.NAMED_CASES}"
+_PREFIX = "bodies_"
+_OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
+_OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (2,), "start": (2,)}
+_PENALTY = "distributed penalty: force per length of the interface, per length of penetration"
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
 _ARRAYS = {  # {array: (dimensions, long name, unit)}
     "nodes": (("node", "dim"), "reference positions, slave nodes first", schema.LENGTH),
@@ -126,3 +135,58 @@ def case_of_group(dataset: Group) -> Case:
     case = Case.from_arrays(arrays | {"seed": int(np.asarray(arrays["seed"]).item())})
     check_bodies(case.parameters)
     return case
+
+
+def named_case_groups(run: Run) -> dict[str, xr.Dataset]:
+    """Return `named_cases`, and in it a group with the arrays of each case.
+
+    The attribute `property_id` would make a group that of a property, so a case says `case_of` instead.
+    """
+    comment = (
+        "the named cases that a formulation fails; to judge one again: contactverif replay REPORT --case "
+        "FORMULATION.PROPERTY.CASE"
+    )
+    groups = {_FOLDER: xr.Dataset(attrs={"comment": comment})}
+    for example in named_failures(run).values():
+        name = f"{_FOLDER}/{typeable(f'{example.property_id}.{example.case.name}')}"
+        if name not in groups:
+            group = case_group(example.case)
+            for variable in group.variables.values():  # The filter costs 2 kB for each of these small arrays.
+                variable.encoding = {"_FillValue": None} if variable.dtype.kind != "S" else {}
+            groups[name] = group.assign_attrs(case_of=schema.text(example.property_id))
+    return groups
+
+
+def read_named_cases(groups: Mapping[str, Group]) -> dict[tuple[str, str], Case]:
+    """Return {(property id, name): case} of a report; empty where it stores none."""
+    cases = {}
+    for path, dataset in groups.items():
+        if path.startswith(f"{_FOLDER}/"):
+            case = case_of_group(dataset)
+            cases[str(dataset.attrs["case_of"]), case.name] = case
+    return cases
+
+
+def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
+    """Check shapes, finite numbers and node numbers of the bodies of a case, if it holds any."""
+    packed = {name.removeprefix(_PREFIX): values for name, values in parameters.items() if name.startswith(_PREFIX)}
+    if not packed:
+        return
+    n_nodes = len(np.atleast_1d(packed["nodes"]))
+    _check_shapes(packed, n_nodes)
+    for name, low, high in (("cells", -1, n_nodes - 1), ("contact", 0, n_nodes - 1), ("count", 1, n_nodes)):
+        numbers = packed[name]
+        if (numbers != np.round(numbers)).any() or not ((numbers >= low) & (numbers <= high)).all():
+            raise ValueError(f"{_PREFIX}{name} holds a number that no node has")
+    if packed["count"].sum() != n_nodes or (packed["cells"][:, :3] < 0).any():
+        raise ValueError(f"the nodes of {_PREFIX}count or {_PREFIX}cells are not those that are there")
+
+
+def _check_shapes(packed: Mapping[str, NDArray[Any]], n_nodes: int) -> None:
+    """Check that all arrays have their shapes, and no NaN or infinity."""
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_OF_NODES, (n_nodes, 2))
+    shapes |= {name: (packed["count"].size, *rest) for name, rest in _OF_BODIES.items()}
+    shapes |= {name: (len(np.atleast_1d(packed[name])), width) for name, width in (("cells", 4), ("contact", 2))}
+    for name, shape in shapes.items():
+        if packed[name].shape != shape or not np.isfinite(packed[name]).all():
+            raise ValueError(f"{_PREFIX}{name} has the shape {packed[name].shape} or NaN; needed {shape}")

@@ -1,4 +1,4 @@
-"""The group of one property: what every formulation made of every random case, and of its witness."""
+"""The whole report as an `xarray.DataTree`, before it is a file, and in it the group of each property."""
 
 from __future__ import annotations
 
@@ -9,12 +9,32 @@ import numpy as np
 import xarray as xr
 
 from contactverif.contract.property import Outcome, PropertyInfo
-from contactverif.contract.result import Row
+from contactverif.contract.result import Row, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates
+from contactverif_reports.netcdf.stored_cases import counterexample_groups, named_case_groups
+from contactverif_reports.netcdf.summary_group import root_attributes, summary_group, timing_group
 from contactverif_reports.netcdf.variables import join, numbers, words
 
 CASES_OF_A_BLOCK = 10_000
+
+
+def tree_of(run: Run, *, with_named_cases: bool = False) -> xr.DataTree:
+    """Return all groups of the report of a run, if wanted with each named case that a formulation fails."""
+    groups = {"/": xr.Dataset(attrs=root_attributes(run)), f"/{schema.SUMMARY}": summary_group(run)}
+    properties = run.properties
+    for id_, name in schema.group_names(properties).items():
+        *folders, _ = name.removeprefix("/").split("/")
+        for depth in range(1, len(folders) + 1):
+            comment = {"comment": f"properties whose ids begin with {'.'.join(folders[:depth])}"}
+            groups.setdefault(f"/{'/'.join(folders[:depth])}", xr.Dataset(attrs=comment))
+        rows = {row.formulation: row for row in run.rows if row.property_id == id_}
+        groups[name] = property_group(properties[id_], rows, run.formulations)
+    groups |= counterexample_groups(run)
+    if with_named_cases:
+        groups |= named_case_groups(run)
+    groups[f"/{schema.TIMING}"] = timing_group(run)
+    return xr.DataTree.from_dict(groups)
 
 
 def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Sequence[str]) -> xr.Dataset:
