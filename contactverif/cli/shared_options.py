@@ -51,6 +51,14 @@ def complete_property(incomplete: str) -> list[str]:
     return [property_id for property_id in property_ids() if property_id.startswith(incomplete)]
 
 
+FormulationNames = Annotated[
+    list[str] | None,
+    typer.Argument(
+        help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.",
+        metavar="NAME",
+        autocompletion=complete_formulation,
+    ),
+]
 PropertyGlobs = Annotated[
     list[str] | None,
     typer.Option(

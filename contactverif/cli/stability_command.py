@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from contactverif.cli.output_files import MARKDOWN, PICTURES, REPORT, OutputFiles
-from contactverif.cli.shared_options import IsolationOptions, complete_formulation
+from contactverif.cli.shared_options import FormulationNames, IsolationOptions
 from contactverif.cli.verify_command import select_names
 
 if TYPE_CHECKING:
@@ -25,14 +25,7 @@ _MOST_IDS = 3  # Cases of a formulation whose command is printed.
 
 def stability(
     *,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
-        ),
-    ] = None,
+    names: FormulationNames = None,
     all_: Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")] = False,
     out: Annotated[
         list[Path] | None,

@@ -20,12 +20,12 @@ from contactverif.cli.run_endings import (
     write_files,
 )
 from contactverif.cli.shared_options import (
+    FormulationNames,
     IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
     WorkerOptions,
-    complete_formulation,
 )
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
@@ -40,14 +40,7 @@ if TYPE_CHECKING:
 
 def verify(
     *,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
-        ),
-    ] = None,
+    names: FormulationNames = None,
     all_: Annotated[bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")] = False,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from typing import Any
@@ -18,9 +17,7 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.conductor import with_case
 from contactverif.run.draw import Sampling
-from contactverif.run.profiles import Profile
-from contactverif.run.run_journal import Journal
-from contactverif.run.runner import Progress, run
+from contactverif.run.runner import run
 from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 
@@ -41,32 +38,16 @@ def run_comparison(
     candidates: Sequence[Subject | NotLoaded],
     properties: Sequence[Property | NotLoaded],
     *,
-    profile: Profile | str = "dev",
-    examples: int | None = None,
-    seed: int | None = None,
     interface: Interface | None = None,
     scene: Case | None = None,
-    progress: Callable[[Progress], None] | None = None,
-    executor: Executor | None = None,
-    journal: Journal | None = None,
+    **options: Any,
 ) -> Study:
-    """Check every property of the reference and of the candidates, on the same cases."""
+    """Check every property of the reference and of the candidates, on the same cases; options are those of `run`."""
     if not candidates:
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
     if any(_name(candidate) == reference.name for candidate in candidates):
         raise MisuseError("--against", f"{reference.name}, which is compared too", "another formulation than those")
-    result = run(
-        [reference, *candidates],
-        properties,
-        profile=profile,
-        examples=examples,
-        seed=seed,
-        interface=interface,
-        scene=scene,
-        progress=progress,
-        executor=executor,
-        journal=journal,
-    )
+    result = run([reference, *candidates], properties, interface=interface, scene=scene, **options)
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
     differing = _with_cases(find_differing(result, comparison), properties, result, interface, scene)
