@@ -1,21 +1,4 @@
-"""Ask whether forces jump while a slave slides over the vertices of the master.
-
-**Question.** A slave slides along a bent master by the length of one of its segments, so that each of its points passes
-about one vertex. Do the forces change continuously, or with a continuous slope, as the trait `continuity` says?
-
-**Why it matters.** Where a force jumps, a load between both values has no equilibrium: Newton's method runs in circles
-between two pairings. Friction and dynamics make a noise there.
-
-**How it is judged.** The forces are computed after each of 12 steps of the way. The step that differs most from its
-neighbours is halved 20 times, always towards the larger change. A continuous force then changes by about 2^-20 of the
-step's change, and a jump is left as it is. The first number is the largest change of a force that is left, over Σ|R| of
-the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). Whoever promises C1 is
-asked the same about the derivative along the way, a central difference on the frozen pairing: the step is halved 16
-times, the tolerance is 2^-10 of the largest change plus 2^26 times that roundoff, and the unit is the largest
-derivative. The details say where the largest jump is (0 to 1), and how many were found, at most 3.
-
-**Undecided.** Never. The slave stays inside the master, far from its free ends.
-"""
+"""Whether the forces change without a jump when the slave slides."""
 
 from __future__ import annotations
 
@@ -26,6 +9,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
@@ -51,24 +35,51 @@ SLOPE = Quantity(
     "2^-10 Δ + 2^26 u(8Z/min(g, ℓ) + 4N)",
     "After 16 halvings, a continuous slope changes by 2^-16 of its change Δ over a step; differences raise roundoff.",
 )
-
 Function = Callable[[FloatArray], FloatArray]
 
 
-def measure_continuity(case: Case, subject: Subject) -> Measurement:
-    """Look for jumps of the forces on a way, and of their slope where C1 is promised.
+def promise_continuity(traits: Traits) -> bool | None:
+    """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
+    return None if traits.continuity is None else traits.continuity != "jumps"
 
-    Parameters
-    ----------
-    case : Case
-        A state with the parameter "path" (n_unknowns,), the way of each node.
-    subject : Subject
-        A formulation with springs.
 
-    Returns
-    -------
-    Measurement
-        The largest jump of a force over Σ|R| of a side, and of a slope over the largest slope; both dimensionless.
+def refuse_unstated_continuity(traits: Traits) -> str:
+    """Return why the question makes no sense for a formulation, or an empty string if it does."""
+    if traits.enforcement == "multiplier":
+        return "multipliers would change on the way, and here nothing is solved"
+    if traits.continuity is None:
+        return "the trait `continuity` is not stated"
+    return refuse_barrier(traits)
+
+
+@Property.define(
+    id="continuity",
+    family="invariants",
+    summary="Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.",
+    quantities=(FORCE, SLOPE),
+    cases=Cases.random(sliding_cases),
+    promise=promise_continuity,
+    applicable=refuse_unstated_continuity,
+)
+def continuity(case: Case, subject: Subject) -> Measurement:
+    """Ask whether forces jump while a slave slides over the vertices of the master.
+
+    **Question.** A slave slides along a bent master by the length of one of its segments, so that each of its points
+    passes about one vertex. Do the forces change continuously, or with a continuous slope, as the trait `continuity`
+    says?
+
+    **Why it matters.** Where a force jumps, a load between both values has no equilibrium: Newton's method runs in
+    circles between two pairings. Friction and dynamics make a noise there.
+
+    **How it is judged.** The forces are computed after each of 12 steps of the way. The step that differs most from its
+    neighbours is halved 20 times, always towards the larger change. A continuous force then changes by about 2^-20 of
+    the step's change, and a jump is left as it is. The first number is the largest change of a force that is left, over
+    Σ|R| of the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). Whoever
+    promises C1 is asked the same about the derivative along the way, a central difference on the frozen pairing: the
+    step is halved 16 times, the tolerance is 2^-10 of the largest change plus 2^26 times that roundoff, and the unit is
+    the largest derivative. The details say where the largest jump is (0 to 1), and how many were found, at most 3.
+
+    **Undecided.** Never. The slave stays inside the master, far from its free ends.
     """
     forces, slope = _functions(subject.for_case(case), case)
     samples = forces(_places())
@@ -230,29 +241,3 @@ def _places() -> FloatArray:
 
 def _largest_step(samples: FloatArray) -> float:
     return float(np.abs(np.diff(samples, axis=0)).max())
-
-
-def promise_continuity(traits: Traits) -> bool | None:
-    """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
-    return None if traits.continuity is None else traits.continuity != "jumps"
-
-
-def refuse_unstated_continuity(traits: Traits) -> str:
-    """Return why the question makes no sense for a formulation, or an empty string if it does."""
-    if traits.enforcement == "multiplier":
-        return "multipliers would change on the way, and here nothing is solved"
-    if traits.continuity is None:
-        return "the trait `continuity` is not stated"
-    return refuse_barrier(traits)
-
-
-CONTINUITY = Property(
-    id="continuity",
-    family="invariants",
-    summary="Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.",
-    quantities=(FORCE, SLOPE),
-    cases=sliding_cases,
-    measure=measure_continuity,
-    promise=promise_continuity,
-    applicable=refuse_unstated_continuity,
-)

@@ -1,25 +1,4 @@
-"""Ask what residual and what accuracy Newton's method attains far from the origin.
-
-**Question.** A scene is solved, moved by an exact way of 2^0 to 2^20 segments, and solved again from its own solution.
-At which residual does Newton's method come to rest, how far from the solution, and how much of that is the fault of the
-formulation?
-
-**Why it matters.** The unknowns are displacements, but a formulation gets positions, and these are stored to u times
-the distance X from the origin. So a residual cannot fall below roundoff of the stored positions, and no tolerance
-tighter than that ever ends the iterations. A formulation that rounds points at the same distance adds its own
-errors to that.
-
-**How it is judged.** First, the residual of the moved scene is compared with that of the same stored positions moved
-back, which rounds nothing unless the way is shorter than the scene. A formulation that is stable under translations
-differs by at most 16 roundings of the positions relative to one another (ω). Secondly, the residual at which three more
-steps come to rest counts over its roundoff, 8u (|K| X + |S| |q| + |g| + |R|). K is a difference quotient of the contact
-forces, S the stiffness and g the load of the bodies. Thirdly, the distance from the solution counts over what a
-residual of that size makes of it, max |J⁻¹| 8u (…), with J = S + K. The largest number of all ways is judged, and those
-of each way are kept as details.
-
-**Undecided.** Where Newton's method finds no solution, under 7/8 and 3/4 of the load neither, where the matrix has no
-inverse there, and where the solution is so near a kink that roundoff of the stored positions decides the pairing.
-"""
+"""Whether Newton's method attains the accuracy that the conditioning allows."""
 
 from __future__ import annotations
 
@@ -33,6 +12,7 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
@@ -58,7 +38,6 @@ DIGITS = 32  # Coordinates are multiples of 2^-32 segments, so that the longest 
 OFFSETS = (0, 5, 10, 15, 20)  # The ways: 2 to these powers, in segments.
 LOAD_SHARES = (1.0, 0.875, 0.75)  # If a jump of the forces leaves no solution under one load, another load has one.
 N_STEPS = 3  # From the solution near the origin, with the matrix there, a step leaves what roundoff does.
-
 ADDED = forces_quantity("roundings that the formulation adds")
 RESIDUAL = Quantity(
     "attained residual",
@@ -140,21 +119,40 @@ class Attained:
     undecided: str
 
 
-def measure_attainable(case: Case, subject: Subject) -> Measurement:
-    """Solve a scene near the origin and far from it, and compare.
+@Property.define(
+    id="newton.attainable",
+    family="newton",
+    summary="Far from the origin, residual and accuracy are limited by the stored positions alone.",
+    quantities=(ADDED, RESIDUAL, ERROR),
+    cases=Cases.random(closed_cases),
+    promise=lambda traits: traits.translation_stable,
+    applicable=refuse_dependent_multipliers,
+    bodies=True,
+    usual_undecided=0.002,
+)
+def newton_attainable(case: Case, subject: Subject) -> Measurement:
+    """Ask what residual and what accuracy Newton's method attains far from the origin.
 
-    Parameters
-    ----------
-    case : Case
-        A random scene.
-    subject : Subject
-        The formulation.
+    **Question.** A scene is solved, moved by an exact way of 2^0 to 2^20 segments, and solved again from its own
+    solution. At which residual does Newton's method come to rest, how far from the solution, and how much of that is
+    the fault of the formulation?
 
-    Returns
-    -------
-    Measurement
-        The largest of all ways: the roundings that the formulation adds, and residual and error over their roundoff.
-        Details: these numbers for each way, the error also over the shortest segment.
+    **Why it matters.** The unknowns are displacements, but a formulation gets positions, and these are stored to u
+    times the distance X from the origin. So a residual cannot fall below roundoff of the stored positions, and no
+    tolerance tighter than that ever ends the iterations. A formulation that rounds points at the same distance adds its
+    own errors to that.
+
+    **How it is judged.** First, the residual of the moved scene is compared with that of the same stored positions
+    moved back, which rounds nothing unless the way is shorter than the scene. A formulation that is stable under
+    translations differs by at most 16 roundings of the positions relative to one another (ω). Secondly, the residual at
+    which three more steps come to rest counts over its roundoff, 8u (|K| X + |S| |q| + |g| + |R|). K is a difference
+    quotient of the contact forces, S the stiffness and g the load of the bodies. Thirdly, the distance from the
+    solution counts over what a residual of that size makes of it, max |J⁻¹| 8u (…), with J = S + K. The largest number
+    of all ways is judged, and those of each way are kept as details.
+
+    **Undecided.** Where Newton's method finds no solution, under 7/8 and 3/4 of the load neither, where the matrix has
+    no inverse there, and where the solution is so near a kink that roundoff of the stored positions decides the
+    pairing.
     """
     segment = ldexp(0.5, frexp(case.shortest_segment)[1])  # The power of two below the shortest segment.
     scene = snap(scene_of(case), segment * 2.0**-DIGITS)
@@ -336,17 +334,3 @@ def _attain(solution: Solution, case: Case, place: Place) -> Attained:
 def over(sizes: FloatArray, floor: FloatArray) -> float:
     """Return the largest ratio of two arrays (n,), entry by entry; 0/0 counts as 0."""
     return max((ratio(float(size), float(least)) for size, least in zip(sizes, floor, strict=True)), default=0.0)
-
-
-NEWTON_ATTAINABLE = Property(
-    id="newton.attainable",
-    family="newton",
-    summary="Far from the origin, residual and accuracy are limited by the stored positions alone.",
-    quantities=(ADDED, RESIDUAL, ERROR),
-    cases=closed_cases,
-    measure=measure_attainable,
-    promise=lambda traits: traits.translation_stable,
-    applicable=refuse_dependent_multipliers,
-    bodies=True,
-    usual_undecided=0.002,  # None of 1480 cases: below this share with a probability of 95 %.
-)

@@ -1,20 +1,4 @@
-"""Ask whether Newton's method takes the same steps in other units.
-
-**Question.** A scene is solved. At each iterate the same step is taken with all lengths multiplied by 2^k and all
-moduli by 4^j, penalty and loads with them. Are pairing and next iterate the same?
-
-**Why it matters.** A problem in millimetres and megapascals is the one in metres and pascals. A small number that a
-tangent or a decision on contact adds, to be safe from zero, has a unit: it is small in one system of units and decides
-in another. It shows only in solving, as slow convergence or as another active set.
-
-**How it is judged.** k and j are random, up to ±60 and ±30. Powers of two scale the four operations and square roots
-exactly, so a formulation that uses nothing else gives the next iterate to the last bit. A power or an angle is rounded
-anew. Then the difference of the two next iterates counts over what roundoff does to a step Δu,
-max(1e3 u (|u| + |Δu|)/cond, 30 uX), with 30 (uX/ℓ)^(2/3) |Δu|/cond more where the tangent is a difference quotient. The
-tolerance is 1. A pairing that differs, and a matrix that has an inverse in other units alone, fail in words.
-
-**Undecided.** Where the state of the first pairing that differs lies at a kink.
-"""
+"""Whether Newton's method takes the same steps in other units."""
 
 from __future__ import annotations
 
@@ -25,6 +9,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -44,7 +29,6 @@ from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
 LARGEST_LENGTH, LARGEST_MODULUS = 60, 30  # The largest exponents of 2 and of 4.
 STEP_ROUNDINGS = 1e3  # A linear system is solved to so many roundoffs over its reciprocal condition.
 POSITION_ROUNDINGS = 30.0  # A position, and a difference quotient, are rounded to so many roundoffs.
-
 STEPS = Quantity(
     "difference of a step in other units",
     "1",
@@ -54,21 +38,38 @@ STEPS = Quantity(
 )
 
 
-def measure_units(case: Case, subject: Subject) -> Measurement:
-    """Solve a scene, and take each step again in other units.
+def refuse(traits: Traits) -> str:
+    """Return why the question makes no sense for a formulation, or an empty string."""
+    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
 
-    Parameters
-    ----------
-    case : Case
-        A random scene.
-    subject : Subject
-        A formulation whose trait `penalty` says which unit the penalty has.
 
-    Returns
-    -------
-    Measurement
-        The largest difference of two next iterates over what roundoff does. Details: how the solution ended, the
-        exponents of the units, and the number of steps that are the same to the last bit.
+@Property.define(
+    id="newton.units",
+    family="newton",
+    summary="Newton's method takes the same steps in other units of length and force.",
+    quantities=(STEPS,),
+    cases=Cases.random(solid_cases),
+    promise=lambda traits: True,
+    applicable=refuse,
+    bodies=True,
+)
+def newton_units(case: Case, subject: Subject) -> Measurement:
+    """Ask whether Newton's method takes the same steps in other units.
+
+    **Question.** A scene is solved. At each iterate the same step is taken with all lengths multiplied by 2^k and all
+    moduli by 4^j, penalty and loads with them. Are pairing and next iterate the same?
+
+    **Why it matters.** A problem in millimetres and megapascals is the one in metres and pascals. A small number that a
+    tangent or a decision on contact adds, to be safe from zero, has a unit: it is small in one system of units and
+    decides in another. It shows only in solving, as slow convergence or as another active set.
+
+    **How it is judged.** k and j are random, up to ±60 and ±30. Powers of two scale the four operations and square
+    roots exactly, so a formulation that uses nothing else gives the next iterate to the last bit. A power or an angle
+    is rounded anew. Then the difference of the two next iterates counts over what roundoff does to a step Δu, max(1e3 u
+    (|u| + |Δu|)/cond, 30 uX), with 30 (uX/ℓ)^(2/3) |Δu|/cond more where the tangent is a difference quotient. The
+    tolerance is 1. A pairing that differs, and a matrix that has an inverse in other units alone, fail in words.
+
+    **Undecided.** Where the state of the first pairing that differs lies at a kink.
     """
     # Strategies repeat seeds from case to case, so the units hang on the state too.
     scene, random = scene_of(case), np.random.default_rng([case.seed, crc32(case.z.tobytes())])
@@ -183,21 +184,3 @@ def explain_pairing(system: System, case: Case, u: FloatArray) -> str:
     reach = COORDINATE_ROUNDING * state.largest_coordinate
     (direction,) = random_directions(case.seed, 1, state.z.size)
     return find_kink(state, system.formulation, system.pair(u), reach, direction)
-
-
-def refuse(traits: Traits) -> str:
-    """Return why the question makes no sense for a formulation, or an empty string."""
-    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
-
-
-NEWTON_UNITS = Property(
-    id="newton.units",
-    family="newton",
-    summary="Newton's method takes the same steps in other units of length and force.",
-    quantities=(STEPS,),
-    cases=solid_cases,
-    measure=measure_units,
-    promise=lambda traits: True,
-    applicable=refuse,
-    bodies=True,
-)

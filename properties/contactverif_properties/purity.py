@@ -1,33 +1,4 @@
-"""Ask whether an answer depends on nothing but the question.
-
-**Question.** Calls are repeated, reordered, interleaved and batched. Is the answer to the same question always the
-same, and are the inputs left as they are?
-
-**Why it matters.** A formulation that remembers its last call works in a test and fails in a program that solves two
-load cases, restarts an increment, or runs in parallel.
-
-**How it is judged.** Two instances answer the same questions in different orders: residual, tangent and contact points
-in turn, at two states and on two interfaces in turn, and with two pairings of one state where it has two. The measured
-numbers count entries that differ; the tolerance is 0, since the same operations on the same numbers give the same bits.
-A third instance has another penalty. Its forces differ, and those of the first instance are what they were. A batch may
-round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k is the stiffness, and a segment
-turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|, and k is the larger of ε̂L and the
-change of the residual from one state to the other over the way between them. A pairing that differs, or an interface
-that was changed, fails in words. A pairing with a handle is made twice at one state, with another state in between: it
-must have the same entries and give the same answers.
-
-A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
-depend on: the seed of hashes, the number of threads, and the state that was asked first. The pairing is the same, and
-the residual is held to that of the first process as a batch is held to a loop, since threads may add in another order.
-
-Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a batch
-is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape) as if
-nodes had moved by uX. That changes an entry by uX times the slope of K, the larger of |K|/ℓ and the change of the
-tangent from one state to the other over the way between them. Summing N entries adds uN|K|. The same operations may
-round nothing at all; an exact agreement is not asked.
-
-**Undecided.** Never.
-"""
+"""Whether an answer depends on the question alone."""
 
 from __future__ import annotations
 
@@ -35,11 +6,11 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.interleaved_calls import Question, count_changes, renumber
 from contactverif_properties.shared.roundoff import ratio
 from contactverif_properties.shared.two_pairings import compare_two_pairings
@@ -47,7 +18,6 @@ from contactverif_properties.shared.two_pairings import compare_two_pairings
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
 BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.
 TANGENT_ROUNDINGS = 4 * BATCH_ROUNDINGS  # An entry of a tangent has four factors, each with roundings of its own.
-
 REASON = "The same operations on the same numbers give the same bits."
 REPEATED = Quantity("entries that change in a repeated call", "1", "0", REASON)
 REORDERED = Quantity("entries that change with the order of calls", "1", "0", REASON)
@@ -82,24 +52,45 @@ ONE_TANGENT = Quantity(
 )
 
 
-def measure_purity(case: Case, subject: Subject) -> Measurement:
-    """Repeat, reorder, interleave and batch calls, and count the entries that change.
+@Property.define(
+    id="purity",
+    family="invariants",
+    summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
+    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
+    cases=Cases.random(any_cases),
+    promise=lambda traits: True,
+)
+def purity(case: Case, subject: Subject) -> Measurement:
+    """Ask whether an answer depends on nothing but the question.
 
-    Parameters
-    ----------
-    case : Case
-        A random state.
-    subject : Subject
-        The formulation.
+    **Question.** Calls are repeated, reordered, interleaved and batched. Is the answer to the same question always the
+    same, and are the inputs left as they are?
 
-    Returns
-    -------
-    Measurement
-        The entries of the residual that change in a repeated call, the entries of residual, tangent and contact points
-        that change with the order of calls, and the difference between a batch and a loop, where the formulation takes
-        batches. The difference from a second process, where the formulation has one of its own. The batch holds the
-        state and one so near that its pairing is nearly the same. Where the formulation computes residual and tangent
-        in one call, its differences from the two calls at these two states.
+    **Why it matters.** A formulation that remembers its last call works in a test and fails in a program that solves
+    two load cases, restarts an increment, or runs in parallel.
+
+    **How it is judged.** Two instances answer the same questions in different orders: residual, tangent and contact
+    points in turn, at two states and on two interfaces in turn, and with two pairings of one state where it has two.
+    The measured numbers count entries that differ; the tolerance is 0, since the same operations on the same numbers
+    give the same bits. A third instance has another penalty. Its forces differ, and those of the first instance are
+    what they were. A batch may round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k
+    is the stiffness, and a segment turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|,
+    and k is the larger of ε̂L and the change of the residual from one state to the other over the way between them. A
+    pairing that differs, or an interface that was changed, fails in words. A pairing with a handle is made twice at one
+    state, with another state in between: it must have the same entries and give the same answers.
+
+    A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
+    depend on: the seed of hashes, the number of threads, and the state that was asked first. The pairing is the same,
+    and the residual is held to that of the first process as a batch is held to a loop, since threads may add in another
+    order.
+
+    Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a
+    batch is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape)
+    as if nodes had moved by uX. That changes an entry by uX times the slope of K, the larger of |K|/ℓ and the change of
+    the tangent from one state to the other over the way between them. Summing N entries adds uN|K|. The same operations
+    may round nothing at all; an exact agreement is not asked.
+
+    **Undecided.** Never.
     """
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
@@ -228,15 +219,3 @@ def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
     """Return all bits of an interface."""
     return interface.nodes.tobytes(), interface.slave.segments.tobytes(), interface.master.segments.tobytes()
-
-
-PURITY = Property(
-    id="purity",
-    family="invariants",
-    summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
-    quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
-    cases=any_cases,
-    measure=measure_purity,
-    promise=lambda traits: True,
-    applicable=refuse_barrier,
-)

@@ -1,31 +1,4 @@
-"""Ask whether the tangent is the derivative of the residual on a frozen pairing.
-
-**Question.** Along some directions, does the tangent give the same change as differences of the residual?
-
-**Why it matters.** A wrong term in the tangent does not change the result, so no patch test finds it. It costs
-iterations, and makes an analysis diverge where the right tangent converges.
-
-**How it is judged.** The pairing stays frozen, so the residual is smooth. Eight directions move all unknowns at random,
-and others the nodes of one chain, or the multipliers. Two more follow from what was found: the defect of the worst
-direction, and the leading singular direction of the tangent minus its difference quotient on all directions before.
-Two conditions hold together, since an error of 1e-3 in one entry still has a Taylor slope of 2, and a central
-difference has an error of its own:
-
-- The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3) at each node. That is relative to the
-  largest derivative there, or its change over ℓ, or the largest block of the tangent in the columns that the node
-  feels. No norm over the whole matrix hides a small row.
-- The Taylor remainder |R(x+hd) − R − hKd| falls with a slope of at least 1.9. A remainder at roundoff is exact.
-
-Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Where the
-residual itself bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again with λ
-in place of ℓ. Each block of the tangent by itself is the question of `tangent.sparsity`.
-
-Without a pairing, or where it has a handle, the residual decides anew at each state, and there is no complex step.
-
-**Undecided.** A failing case is undecided near a kink that the pairing does not freeze, or where the residual bends
-over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
-fails.
-"""
+"""Whether the tangent is the derivative of the residual, along some directions."""
 
 from __future__ import annotations
 
@@ -36,12 +9,12 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Finding, Measurement, Property, Quantity, Verdict, check_all, judge
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state
-from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.block_derivatives import groups_of
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
@@ -52,7 +25,6 @@ TAYLOR_STEPS = (2.0**-8, 2.0**-12)  # Steps over ℓ.
 STEP_RATIO = 8.0  # A slope is taken between two steps only if one is so many times the other.
 SHORTEST_BENDING = 2.0**-10  # Over less than this share of ℓ, differences decide nothing.
 SLOPE = 1.9
-
 CENTRAL = Quantity(
     "error against a central difference",
     "1",
@@ -74,23 +46,43 @@ COMPLEX = Quantity(
 )
 
 
-def measure_directional(case: Case, subject: Subject) -> Measurement:
-    """Compare the tangent along some directions with differences of the residual.
+@Property.define(
+    id="tangent.directional",
+    family="tangent",
+    summary="The tangent is the derivative of the residual on a frozen pairing.",
+    quantities=(CENTRAL, TAYLOR, COMPLEX),
+    cases=Cases.random(smooth_cases),
+    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    needs=frozenset({"tangent"}),
+)
+def tangent_directional(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the tangent is the derivative of the residual on a frozen pairing.
 
-    Parameters
-    ----------
-    case : Case
-        A random state that is not made to lie at a kink.
-    subject : Subject
-        A formulation with a tangent.
+    **Question.** Along some directions, does the tangent give the same change as differences of the residual?
 
-    Returns
-    -------
-    Measurement
-        The best central difference over the steps at the worst node, relative to the derivative there. The least
-        slope of the Taylor remainder; missing where all remainders are roundoff, or the residual itself has no such
-        slope, as across a kink that no pairing freezes. The complex step where the plugin takes complex positions.
-        Detail: the length that served as ℓ.
+    **Why it matters.** A wrong term in the tangent does not change the result, so no patch test finds it. It costs
+    iterations, and makes an analysis diverge where the right tangent converges.
+
+    **How it is judged.** The pairing stays frozen, so the residual is smooth. Eight directions move all unknowns at
+    random, and others the nodes of one chain, or the multipliers. Two more follow from what was found: the defect of
+    the worst direction, and the leading singular direction of the tangent minus its difference quotient on all
+    directions before. Two conditions hold together, since an error of 1e-3 in one entry still has a Taylor slope of 2,
+    and a central difference has an error of its own:
+
+    - The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3) at each node. That is relative to
+      the largest derivative there, or its change over ℓ, or the largest block of the tangent in the columns that the
+      node feels. No norm over the whole matrix hides a small row.
+    - The Taylor remainder |R(x+hd) − R − hKd| falls with a slope of at least 1.9. A remainder at roundoff is exact.
+
+    Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Where the
+    residual itself bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again
+    with λ in place of ℓ. Each block of the tangent by itself is the question of `tangent.sparsity`.
+
+    Without a pairing, or where it has a handle, the residual decides anew at each state, and there is no complex step.
+
+    **Undecided.** A failing case is undecided near a kink that the pairing does not freeze, or where the residual bends
+    over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
+    fails.
     """
     formulation, case = prepare_state(case, subject)
     shortest = case.shortest_segment
@@ -127,7 +119,7 @@ def measure_directional(case: Case, subject: Subject) -> Measurement:
         return measurement, comparison.bending
 
     first, bending = measure_over(shortest)
-    if judge(TANGENT_DIRECTIONAL, first)[0] is not Verdict.FAIL:
+    if judge(tangent_directional, first)[0] is not Verdict.FAIL:
         return replace(first, finding=None)
     if bending >= shortest / 2:
         return first
@@ -348,16 +340,3 @@ def _is_restless(formulation: CheckedFormulation, case: Case, shift: FloatArray)
     """Return whether no two of some neighbouring states, on either side, have the same pairing."""
     pairings = [formulation.pair(case.interface, case.z + times * shift) for times in range(-2, 4)]
     return all(first != second for first, second in combinations(pairings, 2))
-
-
-TANGENT_DIRECTIONAL = Property(
-    id="tangent.directional",
-    family="tangent",
-    summary="The tangent is the derivative of the residual on a frozen pairing.",
-    quantities=(CENTRAL, TAYLOR, COMPLEX),
-    cases=smooth_cases,
-    measure=measure_directional,
-    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
-    needs=frozenset({"tangent"}),
-    applicable=refuse_barrier,
-)

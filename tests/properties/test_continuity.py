@@ -22,7 +22,7 @@ from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif.strategies.sliding import sliding_cases
-from contactverif_properties.continuity import CONTINUITY, N_STEPS, find_jumps, measure_continuity
+from contactverif_properties.continuity import N_STEPS, continuity, find_jumps
 
 
 def cases(examples: int) -> tuple[Case, ...]:
@@ -51,26 +51,26 @@ class Cloud:
 
 def test_a_smooth_formulation_without_a_pairing_is_not_accused() -> None:
     for case in cases(12):
-        outcome = judge_case(CONTINUITY, case, Subject("cloud", Cloud))
+        outcome = judge_case(continuity, case, Subject("cloud", Cloud))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("make", [SlaveNormalAtGaussPoints, ClippedCells, WeightedGaps])
 def test_a_stranger_that_pushes_along_the_slave_is_continuous(make: Callable[..., Any]) -> None:
     for case in cases(4):
-        outcome = judge_case(CONTINUITY, case, with_promises(make, continuity="C0"))
+        outcome = judge_case(continuity, case, with_promises(make, continuity="C0"))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 @pytest.mark.parametrize("name", ["nts", "vts-g", "vts-ppt", "vts-ppt-balanced", "two-pass/nts-ar"])
 def test_forces_along_the_master_jump(name: str) -> None:
-    verdicts = [judge_case(CONTINUITY, case, load_subject(name)).verdict for case in cases(20)]
+    verdicts = [judge_case(continuity, case, load_subject(name)).verdict for case in cases(20)]
     assert verdicts.count(Verdict.FAIL) >= 10
 
 
 def test_the_size_and_the_place_of_a_jump_are_found() -> None:
     """The middle node of the slave passes the roof at 2.25 after 0.39 of its way: its force turns by both slopes."""
-    measurement = measure_continuity(named_case("sliding"), load_subject("nts"))
+    measurement = continuity.measure(named_case("sliding"), load_subject("nts"))
     middle, roof, depth = 1.5, 2.25, 0.375 + 0.5
     angles = np.arctan([0.5 / 1.5, -0.5 / 2.0])
     bisector = angles.mean()
@@ -101,6 +101,6 @@ def test_jumps_of_a_function_are_told_from_its_slope() -> None:
 )
 def test_a_promise_of_too_much_smoothness_is_found_out(make: Callable[..., Any], promise: str, quantity: str) -> None:
     boaster = with_promises(make, continuity=promise)
-    reasons = [outcome.reason for case in cases(25) if (outcome := judge_case(CONTINUITY, case, boaster)).reason]
+    reasons = [outcome.reason for case in cases(25) if (outcome := judge_case(continuity, case, boaster)).reason]
     assert reasons
     assert all(quantity in reason for reason in reasons)

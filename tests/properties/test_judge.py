@@ -16,8 +16,7 @@ from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif_properties.force_balance import FORCE_BALANCE
-from contactverif_properties.moment_balance import MOMENT_BALANCE
+from contactverif_properties.balance import force_balance, moment_balance
 from contactverif_properties.patch_flat import FORCE, patch_flat_transmission
 
 
@@ -112,8 +111,8 @@ class Pair(Handmade):
 
 
 def test_forces_balance_or_lack_what_they_lack() -> None:
-    assert judge_case(FORCE_BALANCE, case(), subject(Pair)).verdict is Verdict.PASS
-    outcome = judge_case(FORCE_BALANCE, case(), subject(Pair, back=0.96))
+    assert judge_case(force_balance, case(), subject(Pair)).verdict is Verdict.PASS
+    outcome = judge_case(force_balance, case(), subject(Pair, back=0.96))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     assert outcome.measurement.values["force imbalance"] == pytest.approx(0.04)
@@ -121,14 +120,14 @@ def test_forces_balance_or_lack_what_they_lack() -> None:
 
 def test_a_couple_balances_in_force_and_not_in_moment() -> None:
     """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
-    outcome = judge_case(MOMENT_BALANCE, case(), subject(Pair))
+    outcome = judge_case(moment_balance, case(), subject(Pair))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
     arm = 2 - (6 / 7 - 1 / 2)
     assert outcome.measurement.values["moment imbalance"] == pytest.approx(arm / case().diameter)
 
 
-@pytest.mark.parametrize("question", [FORCE_BALANCE, MOMENT_BALANCE], ids=lambda question: question.id)
+@pytest.mark.parametrize("question", [force_balance, moment_balance], ids=lambda question: question.id)
 def test_no_force_balances(question: Any) -> None:
     assert judge_case(question, case(), subject(Handmade)).verdict is Verdict.PASS
 
@@ -140,4 +139,4 @@ def test_a_force_on_the_master_alone_is_seen() -> None:
             forces[-1] = 1e-100
             return forces
 
-    assert judge_case(FORCE_BALANCE, case(), subject(Ghost)).verdict is Verdict.FAIL
+    assert judge_case(force_balance, case(), subject(Ghost)).verdict is Verdict.FAIL

@@ -20,11 +20,10 @@ from contactverif.run.judge import judge_case
 from contactverif_properties.newton_attainable import (
     ADDED,
     ERROR,
-    NEWTON_ATTAINABLE,
     OFFSETS,
     RESIDUAL,
     examine,
-    measure_attainable,
+    newton_attainable,
     settle,
 )
 
@@ -44,28 +43,28 @@ def make_far_rounding(*, penalty: float) -> Any:
 
 @pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-me"])
 def test_differences_first_attain_what_stored_positions_allow(name: str) -> None:
-    measurement = measure_attainable(load_scene_case(SCENE), load_subject(name))
+    measurement = newton_attainable.measure(load_scene_case(SCENE), load_subject(name))
     assert measurement.values[ADDED.name] <= 1.0
     assert 0 < measurement.values[RESIDUAL.name] <= 1.0
     assert 0 < measurement.values[ERROR.name] <= 1.0
 
 
 def test_the_error_of_the_solution_grows_with_the_way() -> None:
-    details = measure_attainable(load_scene_case(SCENE), load_subject("nts")).details
+    details = newton_attainable.measure(load_scene_case(SCENE), load_subject("nts")).details
     errors = [details[f"error over the shortest segment at 2^{power}"] for power in OFFSETS]
     assert errors[-1] > 1e3 * errors[0]
     assert errors[-1] < 1e-8
 
 
 def test_a_position_that_is_rounded_far_from_the_origin_is_told() -> None:
-    outcome = judge_case(NEWTON_ATTAINABLE, load_scene_case(SCENE), Subject("far", make_far_rounding))
+    outcome = judge_case(newton_attainable, load_scene_case(SCENE), Subject("far", make_far_rounding))
     assert outcome.verdict is Verdict.FAIL
     assert ADDED.name in outcome.reason
 
 
 def test_who_promises_nothing_breaks_nothing() -> None:
-    assert NEWTON_ATTAINABLE.promise(replace(load_subject("nts").traits, translation_stable=None)) is None
-    assert NEWTON_ATTAINABLE.promise(replace(load_subject("nts").traits, translation_stable=True)) is True
+    assert newton_attainable.promise(replace(load_subject("nts").traits, translation_stable=None)) is None
+    assert newton_attainable.promise(replace(load_subject("nts").traits, translation_stable=True)) is True
 
 
 def test_a_matrix_without_inverse_is_undecided() -> None:

@@ -23,9 +23,15 @@ from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
-from contactverif_properties.newton_attainable import NEWTON_ATTAINABLE
-from contactverif_properties.newton_history import NEWTON_HISTORY, SERIES, measure_history
-from contactverif_properties.newton_order import DISTANCES, NEWTON_ORDER, fit_order, measure_order, spectral_radius
+from contactverif_properties.newton_attainable import newton_attainable
+from contactverif_properties.newton_convergence import (
+    DISTANCES,
+    SERIES,
+    fit_order,
+    newton_history,
+    newton_order,
+    spectral_radius,
+)
 
 DISTANT = np.array(DISTANCES)
 
@@ -89,7 +95,7 @@ def test_the_exact_tangent_leaves_no_radius() -> None:
 
 def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
     case = load_scene_case("example-1bis")
-    exact, basic = (measure_order(case, load_subject(name)) for name in ("vts-ppt", "vts-ppt-basic"))
+    exact, basic = (newton_order.measure(case, load_subject(name)) for name in ("vts-ppt", "vts-ppt-basic"))
     assert exact.values["order of one Newton step"] >= 1.9
     assert basic.values["order of one Newton step"] == pytest.approx(1.0, abs=0.1)
     # in the largest norm a rate may exceed the radius, which is that of many steps
@@ -98,15 +104,15 @@ def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
 
 def test_a_solution_that_is_not_found_is_undecided() -> None:
     case = load_scene_case("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
-    outcome = judge_case(NEWTON_ORDER, case, load_subject("vts-me"))
+    outcome = judge_case(newton_order, case, load_subject("vts-me"))
     assert outcome.verdict is Verdict.UNDECIDED
     assert "2-cycle" in outcome.reason
-    assert judge_case(NEWTON_HISTORY, case, load_subject("vts-me")).verdict is Verdict.UNDECIDED
+    assert judge_case(newton_history, case, load_subject("vts-me")).verdict is Verdict.UNDECIDED
 
 
 def test_the_whole_trajectory_is_kept() -> None:
     case = load_scene_case("example-1bis:pressure=100,lowered=0")
-    measurement = measure_history(case, load_subject("vts-ppt-basic"))
+    measurement = newton_history.measure(case, load_subject("vts-ppt-basic"))
     trace = solve(scene_of(case), load_subject("vts-ppt-basic").for_case(case))
     assert measurement.series.keys() == SERIES.keys()
     assert np.array_equal(measurement.series["residual"], trace.residuals)
@@ -115,7 +121,7 @@ def test_the_whole_trajectory_is_kept() -> None:
 
 
 def test_a_piecewise_linear_problem_is_finite() -> None:
-    measurement = measure_history(load_scene_case("c-prime"), load_subject("vts-ppt"))
+    measurement = newton_history.measure(load_scene_case("c-prime"), load_subject("vts-ppt"))
     assert measurement.details["finite"] == 1
     assert measurement.values["final iterations"] <= 1
 
@@ -130,7 +136,7 @@ def test_a_body_that_nothing_presses_any_more_comes_to_rest() -> None:
         tilt=0.125,
     )
     half_passes = load_subject("mortar-two-half-pass")
-    outcome = judge_case(NEWTON_HISTORY, scene.case(), half_passes)
+    outcome = judge_case(newton_history, scene.case(), half_passes)
     assert outcome.verdict is Verdict.PASS, outcome.reason
     trace = solve(scene, half_passes.for_case(scene.case()))
     sizes = np.abs(trace.u[:, scene.slices[1]]).max(axis=1)
@@ -154,7 +160,7 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
 
         return Unpaired()
 
-    assert judge_case(NEWTON_ORDER, case, Subject("unpaired", make)).verdict is Verdict.PASS
+    assert judge_case(newton_order, case, Subject("unpaired", make)).verdict is Verdict.PASS
 
 
 def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
@@ -178,14 +184,14 @@ def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
     scene = two_blocks(
         Rectangle([0, 1, 3], [0, 2]), Rectangle([-1, 1.2, 4], [-2, 0]), penalty=10.0, approach=0.1
     ).case()
-    (row,) = run([Subject("nothing", make)], [NEWTON_HISTORY], scene=scene).rows
+    (row,) = run([Subject("nothing", make)], [newton_history], scene=scene).rows
     assert (row.verdict, row.unexpected) == (Verdict.NOT_JUDGED, "not judged"), row.reason
 
 
 @pytest.mark.parametrize(("name", "seed"), [("nts", 5), ("vts-ppt", 0), ("two-pass/nts-ar", 5)])
 def test_scenes_keep_clear_of_kinks(name: str, seed: int) -> None:
     """With seed 5, 13 of 100 cases of nts were undecided once, and the run was not judged."""
-    result = run([load_subject(name)], [NEWTON_ORDER, NEWTON_HISTORY], examples=100, seed=seed)
+    result = run([load_subject(name)], [newton_order, newton_history], examples=100, seed=seed)
     for row in result.rows:
         assert row.verdict is Verdict.PASS, row.reason
         assert row.judged >= 98
@@ -193,5 +199,5 @@ def test_scenes_keep_clear_of_kinks(name: str, seed: int) -> None:
 
 def test_where_there_is_no_solution_there_is_one_under_less_load() -> None:
     """A jump of the forces lies where this scene would balance: the last of five cases with seed 17."""
-    result = run([load_subject("vts-ppt")], [NEWTON_ATTAINABLE], examples=5, seed=17)
+    result = run([load_subject("vts-ppt")], [newton_attainable], examples=5, seed=17)
     assert result.rows[0].judged == 5

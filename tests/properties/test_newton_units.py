@@ -17,7 +17,7 @@ from contactverif.contract.traits import Traits
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif.strategies.solids import solid_cases
-from contactverif_properties.newton_units import NEWTON_UNITS, STEPS, measure_units
+from contactverif_properties.newton_units import STEPS, newton_units
 
 
 def draw(examples: int) -> tuple[Case, ...]:
@@ -29,7 +29,7 @@ def draw(examples: int) -> tuple[Case, ...]:
 @pytest.mark.parametrize("name", ["nts", "vts-ppt", "mortar", "nts-lm"])
 def test_who_uses_the_four_operations_and_square_roots_takes_the_same_steps_to_the_last_bit(name: str) -> None:
     for case in draw(8):
-        measurement = measure_units(case, load_subject(name))
+        measurement = newton_units.measure(case, load_subject(name))
         assert measurement.values == {STEPS.name: 0.0}
         assert not measurement.broken
         assert measurement.details["steps that agree to the last bit"] == measurement.details["iterations"]
@@ -53,7 +53,7 @@ def make_with_angles(*, penalty: float) -> Any:
 
 def test_a_power_and_an_angle_are_not_accused() -> None:
     subject = Subject("angles", make_with_angles)
-    outcomes = [judge_case(NEWTON_UNITS, case, subject) for case in draw(25)]
+    outcomes = [judge_case(newton_units, case, subject) for case in draw(25)]
     assert all(outcome.verdict is not Verdict.FAIL for outcome in outcomes)
     values = [outcome.measurement.values[STEPS.name] for outcome in outcomes if outcome.measurement]
     assert max(values) > 0
@@ -70,7 +70,7 @@ def test_another_pairing_in_other_units_is_told_in_words() -> None:
 
         return Changed(inner, pair=pair)
 
-    outcomes = [judge_case(NEWTON_UNITS, case, Subject("limit", make)) for case in draw(10)]
+    outcomes = [judge_case(newton_units, case, Subject("limit", make)) for case in draw(10)]
     assert any("the pairing is another one in other units" in outcome.reason for outcome in outcomes)
 
 
@@ -83,10 +83,10 @@ def test_a_stiffness_with_a_unit_is_told_by_the_steps() -> None:
 
         return Changed(inner, tangent=tangent)
 
-    outcomes = [judge_case(NEWTON_UNITS, case, Subject("guard", make)) for case in draw(10)]
+    outcomes = [judge_case(newton_units, case, Subject("guard", make)) for case in draw(10)]
     assert any(STEPS.name in outcome.reason for outcome in outcomes)
 
 
 def test_who_does_not_state_the_unit_of_its_penalty_is_not_asked() -> None:
-    assert "unit is unknown" in NEWTON_UNITS.refusal(Traits())
-    assert "not independent" in NEWTON_UNITS.refusal(load_subject("vts-ppt-lm").traits)
+    assert "unit is unknown" in newton_units.refusal(Traits())
+    assert "not independent" in newton_units.refusal(load_subject("vts-ppt-lm").traits)

@@ -13,7 +13,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.run.judge import judge_case
 from contactverif_nts import vts_ppt
-from contactverif_properties.nodal_push import NODAL_PUSH
+from contactverif_properties.pushes import nodal_push
 
 SLAVE = [[0.446875, -0.875], [1.446875, -0.375]]
 CORNER = Interface.from_chains(SLAVE, [[1.005, 0.0], [1.0025, -0.5], [0.0025, -0.5], [0.0, 0.0]])
@@ -49,7 +49,7 @@ class PulledSlave(Pulled):
 
 
 def _judge(subject: Subject, interface: Interface) -> Verdict:
-    return judge_case(NODAL_PUSH, Case(interface, interface.nodes.reshape(-1)), subject).verdict
+    return judge_case(nodal_push, Case(interface, interface.nodes.reshape(-1)), subject).verdict
 
 
 @pytest.mark.parametrize("name", ["sts", "mortar", "nts-ar", "vts-me"])

@@ -14,14 +14,14 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.run.judge import judge_case
-from contactverif_properties.objectivity import OBJECTIVITY, measure_objectivity
+from contactverif_properties.frames import objectivity
 
 SEEDS = range(1, 30)
 
 
 def test_a_force_that_turns_with_the_state_is_objective() -> None:
     for seed in SEEDS:
-        outcome = judge_case(OBJECTIVITY, case(seed=seed), subject(Springs, penalty="distributed"))
+        outcome = judge_case(objectivity, case(seed=seed), subject(Springs, penalty="distributed"))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -35,7 +35,7 @@ def test_a_force_along_an_axis_is_not() -> None:
             return self.points(c=0.0)
 
     for seed in SEEDS:
-        assert judge_case(OBJECTIVITY, case(seed=seed), subject(Pointed)).verdict is Verdict.FAIL
+        assert judge_case(objectivity, case(seed=seed), subject(Pointed)).verdict is Verdict.FAIL
 
 
 def test_a_force_along_an_axis_is_not_where_no_contact_points_are_named_either() -> None:
@@ -43,7 +43,7 @@ def test_a_force_along_an_axis_is_not_where_no_contact_points_are_named_either()
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return super().residual(interface, pairing, z) * np.resize([1.0, 1.001], z.size)
 
-    verdicts = [judge_case(OBJECTIVITY, case(seed=seed), subject(Axis)).verdict for seed in SEEDS]
+    verdicts = [judge_case(objectivity, case(seed=seed), subject(Axis)).verdict for seed in SEEDS]
     assert verdicts.count(Verdict.FAIL) == len(verdicts)
 
 
@@ -55,7 +55,7 @@ def test_a_tangent_that_does_not_turn_is_found_where_the_forces_do() -> None:
         def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
             return self.points(c=0.0)
 
-    outcome = judge_case(OBJECTIVITY, case(seed=1), subject(Axis))
+    outcome = judge_case(objectivity, case(seed=1), subject(Axis))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith("error of the tangent after a rotation")
 
@@ -74,7 +74,7 @@ def test_springs_that_act_twice_need_half_of_the_penetration() -> None:
     ]  # fmt: skip
     interface = Interface.from_chains(slave, master)
     state = Case(interface, interface.nodes.reshape(-1), penalty=512.0, seed=1882)
-    outcome = judge_case(OBJECTIVITY, state, load_subject("two-pass/mortar"))
+    outcome = judge_case(objectivity, state, load_subject("two-pass/mortar"))
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
     name = "error of the tangent after a rotation"
@@ -93,7 +93,7 @@ def test_half_passes_that_push_the_master_alone_are_objective() -> None:
         forces = half_passes.residual(interface, half_passes.pair(interface, state.z), state.z).reshape(-1, 2)
         assert not forces[:4].any()
         assert forces[4:].any()
-        outcome = judge_case(OBJECTIVITY, state, formulation)
+        outcome = judge_case(objectivity, state, formulation)
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -119,13 +119,13 @@ class Nearest(Handmade):
 @pytest.mark.parametrize("offset", [0.0, 2.0**-52])
 def test_on_an_exact_bisector_a_turn_decides_nothing(offset: float) -> None:
     """Rounding the turned nodes puts the point on one side or the other."""
-    verdicts = {judge_case(OBJECTIVITY, over_a_node_with(offset, seed), subject(Nearest)).verdict for seed in SEEDS}
+    verdicts = {judge_case(objectivity, over_a_node_with(offset, seed), subject(Nearest)).verdict for seed in SEEDS}
     assert Verdict.UNDECIDED in verdicts
     assert verdicts <= {Verdict.UNDECIDED, Verdict.PASS}
 
 
 def test_on_an_exact_bisector_it_says_why() -> None:
-    outcomes = [judge_case(OBJECTIVITY, over_a_node_with(0.0, seed), subject(Nearest)) for seed in SEEDS]
+    outcomes = [judge_case(objectivity, over_a_node_with(0.0, seed), subject(Nearest)) for seed in SEEDS]
     reasons = {outcome.reason for outcome in outcomes if outcome.verdict is Verdict.UNDECIDED}
     assert reasons
     assert all(reason.startswith("a kink") for reason in reasons)
@@ -137,8 +137,8 @@ def test_beside_a_bisector_a_wrong_turn_is_no_kink() -> None:
             return super().residual(interface, pairing, z) * np.resize([1.0, 1.001], z.size)
 
     for seed in SEEDS:
-        assert judge_case(OBJECTIVITY, over_a_node_with(1 / 7, seed), subject(Nearest)).verdict is Verdict.PASS
-        assert judge_case(OBJECTIVITY, over_a_node_with(1 / 7, seed), subject(Wrong)).verdict is Verdict.FAIL
+        assert judge_case(objectivity, over_a_node_with(1 / 7, seed), subject(Nearest)).verdict is Verdict.PASS
+        assert judge_case(objectivity, over_a_node_with(1 / 7, seed), subject(Wrong)).verdict is Verdict.FAIL
 
 
 def over_a_node_with(offset: float, seed: int) -> Any:
@@ -147,5 +147,5 @@ def over_a_node_with(offset: float, seed: int) -> Any:
 
 def test_the_same_case_is_always_turned_the_same_way() -> None:
     springs = subject(Springs)
-    assert measure_objectivity(case(seed=5), springs) == measure_objectivity(case(seed=5), springs)
-    assert measure_objectivity(case(seed=5), springs).values != measure_objectivity(case(seed=6), springs).values
+    assert objectivity.measure(case(seed=5), springs) == objectivity.measure(case(seed=5), springs)
+    assert objectivity.measure(case(seed=5), springs).values != objectivity.measure(case(seed=6), springs).values

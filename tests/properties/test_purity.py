@@ -18,11 +18,10 @@ from contactverif_properties.purity import (
     ONE_RESIDUAL,
     ONE_TANGENT,
     POINTS,
-    PURITY,
     REORDERED,
     REPEATED,
     TANGENT,
-    measure_purity,
+    purity,
 )
 from contactverif_properties.shared.interleaved_calls import renumber
 
@@ -41,7 +40,7 @@ class Pure(Handmade):
 
 
 def measure(plugin: Any, **traits: Any) -> Measurement:
-    return measure_purity(case(seed=3), subject(plugin, **traits))
+    return purity.measure(case(seed=3), subject(plugin, **traits))
 
 
 def nonzero_quantities(plugin: Any, **traits: Any) -> set[str]:
@@ -56,7 +55,7 @@ def test_a_function_is_pure(batched: bool) -> None:
     batch = {BATCHED.name: 0} if batched else {}
     assert measurement.values == dict.fromkeys(names, 0) | batch
     assert not measurement.broken
-    assert judge_case(PURITY, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
+    assert judge_case(purity, case(), subject(Pure, batched=batched)).verdict is Verdict.PASS
 
 
 class OneCall(Pure):
@@ -82,7 +81,7 @@ def test_one_call_may_round_otherwise_and_is_wrong_beyond(part: str, quantity: Q
     for factor, verdict in ((1 + 2.0**-52, Verdict.PASS), (1 + 2.0**-42, Verdict.FAIL), (-1.0, Verdict.FAIL)):
         setattr(Differs, part, factor)
         assert nonzero_quantities(Differs) == {quantity.name}
-        assert judge_case(PURITY, case(), subject(Differs)).verdict is verdict
+        assert judge_case(purity, case(), subject(Differs)).verdict is verdict
 
 
 def test_one_call_that_uses_the_state_of_the_last_residual_is_told() -> None:
@@ -175,7 +174,7 @@ def test_a_memory_of_the_last_call_is_told_by_calls_in_turn(uses: str, quantity:
         pass
 
     Forgetful.uses, Forgetful.argument = uses, argument
-    counts = [measure_purity(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
+    counts = [purity.measure(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
     assert max(counts) > 0
 
 
@@ -261,7 +260,7 @@ def test_a_penalty_that_instances_share_is_told() -> None:
         shared["penalty"] = penalty
         return Shares()
 
-    broken = measure_purity(case(seed=3), Subject("shares", make)).broken
+    broken = purity.measure(case(seed=3), Subject("shares", make)).broken
     assert broken == "the forces change when another instance is made with another penalty"
 
 
@@ -297,7 +296,7 @@ def test_a_batch_that_rounds_otherwise_passes_where_one_state_just_touches() -> 
     touching = replace(touching, z=touching.z + 100 / 3)
     differences = []
     for seed in range(200):
-        outcome = judge_case(PURITY, replace(touching, seed=seed), subject(TwoRoundings, batched=True))
+        outcome = judge_case(purity, replace(touching, seed=seed), subject(TwoRoundings, batched=True))
         assert outcome.verdict is Verdict.PASS, outcome.reason
         assert outcome.measurement is not None
         differences.append(outcome.measurement.values[BATCHED.name])
@@ -311,7 +310,7 @@ def test_a_batch_that_takes_one_state_for_both_fails_where_one_just_touches() ->
 
     touching = over_a_node(6 / 7, gap=0.0)
     for seed in range(20):
-        assert judge_case(PURITY, replace(touching, seed=seed), subject(First, batched=True)).verdict is Verdict.FAIL
+        assert judge_case(purity, replace(touching, seed=seed), subject(First, batched=True)).verdict is Verdict.FAIL
 
 
 def test_a_batch_may_sum_in_another_order() -> None:
@@ -320,7 +319,7 @@ def test_a_batch_may_sum_in_another_order() -> None:
             return self.penalty * (z if z.ndim == 1 else z * (1 + 2.0**-52))
 
     assert nonzero_quantities(Roundoff, batched=True) == {BATCHED.name}
-    assert judge_case(PURITY, case(), subject(Roundoff, batched=True)).verdict is Verdict.PASS
+    assert judge_case(purity, case(), subject(Roundoff, batched=True)).verdict is Verdict.PASS
 
 
 class Stuck(Pure):
@@ -363,11 +362,11 @@ class Moves(Pure):
 )
 def test_a_breach_that_no_number_tells_is_said_in_words(plugin: Any, message: str) -> None:
     if plugin is Stuck:  # a seed for which the two states pair differently
-        messages = [measure_purity(case(seed=seed), subject(plugin)).broken for seed in range(40)]
+        messages = [purity.measure(case(seed=seed), subject(plugin)).broken for seed in range(40)]
         assert message in messages
         return
     assert message in measure(plugin).broken
-    assert judge_case(PURITY, case(), subject(plugin)).verdict is Verdict.FAIL
+    assert judge_case(purity, case(), subject(plugin)).verdict is Verdict.FAIL
 
 
 def test_positions_cannot_be_written_on() -> None:
@@ -376,6 +375,6 @@ def test_positions_cannot_be_written_on() -> None:
             z[0] = 1.0
             return z
 
-    outcome = judge_case(PURITY, case(), subject(Writes))
+    outcome = judge_case(purity, case(), subject(Writes))
     assert outcome.verdict is Verdict.CRASHED
     assert "read-only" in outcome.reason

@@ -20,11 +20,10 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
-from contactverif_properties.remote import BEHIND, FAR, REMOTE
-from contactverif_properties.renumbering import CLOSED, RENUMBERING, renumbering_cases
+from contactverif_properties.balance import symmetric
+from contactverif_properties.invariants import BEHIND, CLOSED, FAR, remote, renumbering, renumbering_cases
 from contactverif_properties.shared.relabelled import exchange_roles, mirror_case, renumber
 from contactverif_properties.shared.same_answer import BITS
-from contactverif_properties.symmetric import SYMMETRIC
 
 PROMISED_BY_ALL = ("mirror", "renumbering", "remote")
 EXAMPLES = 10
@@ -71,7 +70,7 @@ def ring_in_ring(slave: list[tuple[float, float]], master: list[tuple[float, flo
 def test_a_point_tied_to_a_segment_that_it_penetrates_and_one_that_it_does_not_accuses_nobody(
     stranger: Any, slave: list[tuple[float, float]], master: list[tuple[float, float]]
 ) -> None:
-    outcome = judge_case(RENUMBERING, ring_in_ring(slave, master), Subject("stranger", stranger))
+    outcome = judge_case(renumbering, ring_in_ring(slave, master), Subject("stranger", stranger))
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -95,7 +94,7 @@ class NodalSprings(CentredSprings):
 
 def test_a_stranger_with_a_potential_is_not_accused() -> None:
     for state in cases_of("symmetric"):
-        outcome = judge_case(SYMMETRIC, state, Subject("nodal", NodalSprings))
+        outcome = judge_case(symmetric, state, Subject("nodal", NodalSprings))
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -113,10 +112,10 @@ def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
     # The points are at ±1/√3. Now the first one is moved over the bisector of the roof.
     nodes = np.array([*np.add(slave, [1 / np.sqrt(3), 0.0]), *master])
     state = Case(Interface.from_chains(nodes[:2], nodes[2:]), nodes.reshape(-1), seed=1)
-    outcome = judge_case(SYMMETRIC, state, Subject("decides", Decides))
+    outcome = judge_case(symmetric, state, Subject("decides", Decides))
     assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
     beside = replace(state, z=state.z + np.array([0.25, 0, 0.25, 0, 0, 0, 0, 0, 0, 0]))
-    assert judge_case(SYMMETRIC, beside, Subject("decides", Decides)).verdict is Verdict.PASS
+    assert judge_case(symmetric, beside, Subject("decides", Decides)).verdict is Verdict.PASS
 
 
 def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:
@@ -131,7 +130,7 @@ def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:
             tangent[0, 1] = tangent[1, 0] = self.penalty / 2
             return tangent
 
-    outcome = judge_case(SYMMETRIC, case(seed=1), subject(Half, symmetric=True, tangent="exact"))
+    outcome = judge_case(symmetric, case(seed=1), subject(Half, symmetric=True, tangent="exact"))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith("work in a closed loop")
 
@@ -139,7 +138,7 @@ def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:
 @pytest.mark.parametrize("name", ["nts", "nts-ar:area=reference", "nts-lm", "two-pass/nts"])
 def test_symmetric_formulations_pass_at_roundoff(name: str) -> None:
     for state in cases_of("symmetric", 25):
-        values = SYMMETRIC.measure(state, load_subject(name)).values
+        values = symmetric.measure(state, load_subject(name)).values
         assert values["asymmetry of the tangent"] < 1e-14
 
 
@@ -147,7 +146,7 @@ def test_symmetric_formulations_pass_at_roundoff(name: str) -> None:
 def test_our_own_formulations_keep_every_bit_beside_another_body(name: str) -> None:
     kinds = set()
     for state in cases_of("remote", 20):
-        assert REMOTE.measure(state, load_subject(name)).details[BITS] == 0
+        assert remote.measure(state, load_subject(name)).details[BITS] == 0
         kinds.add(state.kind)
     assert kinds == {FAR, BEHIND}
 
@@ -159,7 +158,7 @@ def test_on_an_exact_bisector_numbers_decide_nothing() -> None:
     verdicts = set()
     for seed in range(8):
         state = Case(Interface.from_chains(slave, master), nodes.reshape(-1), seed=seed)
-        for question in (RENUMBERING, load_property("mirror")):
+        for question in (renumbering, load_property("mirror")):
             verdicts.add(judge_case(question, state, load_subject("nts")).verdict)
     assert verdicts <= {Verdict.PASS, Verdict.UNDECIDED}
     assert Verdict.UNDECIDED in verdicts

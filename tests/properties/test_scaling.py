@@ -12,7 +12,7 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
-from contactverif_properties.scaling import FORCES, SCALING, TANGENT, measure_scaling
+from contactverif_properties.frames import SCALED_FORCES, SCALED_TANGENT, scaling
 
 SEEDS = range(1, 30)
 
@@ -20,8 +20,8 @@ SEEDS = range(1, 30)
 @pytest.mark.parametrize("penalty", ["nodal", "distributed"])
 def test_a_penalty_that_scales_with_its_unit_changes_no_digit(penalty: str) -> None:
     for seed in SEEDS:
-        measurement = measure_scaling(case(seed=seed), subject(Springs, penalty=penalty))
-        assert measurement.values == {FORCES.name: 0.0, TANGENT.name: 0.0}
+        measurement = scaling.measure(case(seed=seed), subject(Springs, penalty=penalty))
+        assert measurement.values == {SCALED_FORCES.name: 0.0, SCALED_TANGENT.name: 0.0}
 
 
 @pytest.mark.parametrize(("promised", "actual"), [("nodal", "distributed"), ("distributed", "nodal")])
@@ -30,16 +30,16 @@ def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
         def area(self, z: Any) -> float:
             return float(np.hypot(*self.stretch(z))) if actual == "distributed" else 1.0
 
-    verdicts = [judge_case(SCALING, case(seed=seed), subject(Boasts, penalty=promised)).verdict for seed in SEEDS]
+    verdicts = [judge_case(scaling, case(seed=seed), subject(Boasts, penalty=promised)).verdict for seed in SEEDS]
     assert verdicts.count(Verdict.FAIL) >= 20
 
 
 def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
-    assert "not stated" in SCALING.refusal(Traits())
-    assert SCALING.refusal(Traits(penalty="nodal")) == ""
-    assert SCALING.refusal(Traits(penalty="nodal", enforcement="multiplier")) == ""
-    assert "barrier" in SCALING.refusal(Traits(penalty="nodal", enforcement="barrier"))
-    result = run([subject(Springs)], [SCALING], examples=3, seed=1)
+    assert "not stated" in scaling.refusal(Traits())
+    assert scaling.refusal(Traits(penalty="nodal")) == ""
+    assert scaling.refusal(Traits(penalty="nodal", enforcement="multiplier")) == ""
+    assert "barrier" in scaling.refusal(Traits(penalty="nodal", enforcement="barrier"))
+    result = run([subject(Springs)], [scaling], examples=3, seed=1)
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
     assert result.promises_kept
 
@@ -50,5 +50,5 @@ def test_an_absolute_tolerance_is_found() -> None:
             forces = super().residual(interface, pairing, z)
             return forces if np.abs(self.stretch(z)).max() > 1e-12 else 0 * z
 
-    verdicts = [judge_case(SCALING, case(seed=seed), subject(Careful, penalty="nodal")).verdict for seed in range(60)]
+    verdicts = [judge_case(scaling, case(seed=seed), subject(Careful, penalty="nodal")).verdict for seed in range(60)]
     assert Verdict.FAIL in verdicts

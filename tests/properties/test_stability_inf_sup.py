@@ -12,7 +12,7 @@ from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
 from contactverif.run.judge import judge_case
-from contactverif_properties.stability_inf_sup import CONSTANT, SEGMENT, SLOPE, ZEROS
+from contactverif_properties.stability_solutions import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")
 COARSER, FINER, MATCHING = refinement_cases()

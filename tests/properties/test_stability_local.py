@@ -25,23 +25,23 @@ from contactverif.run.runner import run
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration
-from contactverif_properties.stability_local import (
-    FORCES,
+from contactverif_properties.stability_forces import (
+    FORCES_THERE,
     LARGEST_DENOMINATOR,
-    STABILITY_LOCAL,
-    TOTAL,
+    TOTAL_THERE,
     exact_forces,
     refuse_unknown_forces,
+    stability_local,
 )
 
 
 @cache
 def cases(count: int = 100, kind: str = "uniform penetration") -> tuple[Case, ...]:
-    return draw_cases(STABILITY_LOCAL.cases(None)[kind], seed="0/local", examples=count).cases
+    return draw_cases(stability_local.cases(None)[kind], seed="0/local", examples=count).cases
 
 
 def worst_number(case: Case, subject: Subject) -> float:
-    measurement = judge_case(STABILITY_LOCAL, case, subject).measurement
+    measurement = judge_case(stability_local, case, subject).measurement
     assert measurement is not None
     return max(measurement.values.values())
 
@@ -106,7 +106,7 @@ def test_single_precision_that_a_translation_does_not_show_is_accused_here() -> 
 
 
 def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
-    (row,) = run([springs_of(by_points_first)], [STABILITY_LOCAL], examples=20, seed=0).rows
+    (row,) = run([springs_of(by_points_first)], [stability_local], examples=20, seed=0).rows
     assert row.verdict is Verdict.FAIL
     assert not row.unexpected
 
@@ -164,7 +164,7 @@ def test_every_built_in_formulation_is_judged_where_nothing_is_compiled() -> Non
 
 def test_what_is_exact_follows_the_traits() -> None:
     springs = springs_of(by_differences, takes_longdouble=False)
-    assert list(STABILITY_LOCAL.measure(cases()[0], springs).values) == [TOTAL.name]
+    assert list(stability_local.measure(cases()[0], springs).values) == [TOTAL_THERE.name]
     assert "no exact force" in refuse_unknown_forces(Traits(penalty="nodal", area="current"))
     assert "no exact force" in refuse_unknown_forces(Traits())
     assert not refuse_unknown_forces(Traits(takes_longdouble=True))
@@ -192,6 +192,6 @@ def test_a_linear_penetration_is_exactly_linear_and_closed_everywhere() -> None:
 
 def test_what_is_exact_under_a_linear_penetration_follows_the_traits() -> None:
     (case,) = cases(1, "linear penetration")
-    assert set(STABILITY_LOCAL.measure(case, load_subject("sts")).values) == {FORCES.name, TOTAL.name}
-    assert set(STABILITY_LOCAL.measure(case, load_subject("vts-ppt")).values) == {TOTAL.name}
-    assert set(STABILITY_LOCAL.measure(case, load_subject("mortar-lm")).values) == {FORCES.name}
+    assert set(stability_local.measure(case, load_subject("sts")).values) == {FORCES_THERE.name, TOTAL_THERE.name}
+    assert set(stability_local.measure(case, load_subject("vts-ppt")).values) == {TOTAL_THERE.name}
+    assert set(stability_local.measure(case, load_subject("mortar-lm")).values) == {FORCES_THERE.name}

@@ -26,7 +26,7 @@ from contactverif.problems.wave_blocks import (
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif_properties.shared.wave_answer import answer_to_wave
-from contactverif_properties.stability_locking import DRIFT, ROUGHNESS
+from contactverif_properties.stability_solutions import DRIFT, ROUGHNESS
 
 QUESTION = load_property("stability.locking")
 CASES = {case.name: case for case in wave_cases()}

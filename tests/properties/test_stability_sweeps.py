@@ -21,8 +21,8 @@ from contactverif.run.registry import load_formulation
 from contactverif.run.runner import run
 from contactverif_properties.shared.exact_motions import ExactMotion
 from contactverif_properties.shared.sweep_measurement import CONDITION, ERROR, FORCE_ERROR
-from contactverif_properties.stability_stiffness import STABILITY_STIFFNESS
-from contactverif_properties.stability_sweep import ROUNDINGS, STABILITY_SWEEP, move_state
+from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, move_swept, stability_sweep
+from contactverif_properties.stability_solutions import stability_stiffness
 
 
 def state_named(name: str) -> Case:
@@ -68,7 +68,7 @@ def test_names_are_distinct_and_every_sweep_has_states() -> None:
 
 @pytest.mark.parametrize("case", stability_states(), ids=lambda case: case.name)
 def test_the_motion_of_a_state_rounds_nothing(case: Case) -> None:
-    there, motion = move_state(case), ExactMotion.from_case(case)
+    there, motion = move_swept(case), ExactMotion.from_case(case)
     for before, after in ((case.positions, there.positions), (case.interface.nodes, there.interface.nodes)):
         unshifted = after - motion.shift
         assert np.array_equal(unshifted + motion.shift, after)
@@ -87,7 +87,7 @@ def test_the_flat_state_at_the_origin_is_a_reference() -> None:
         assert np.abs(forces.reshape(-1, 2)[:, 1] - exact).max() <= 8 * 2.0**-53 * np.abs(exact).max(), case.name
 
 
-@pytest.mark.parametrize("question", [STABILITY_SWEEP, STABILITY_STIFFNESS], ids=lambda question: question.id)
+@pytest.mark.parametrize("question", [stability_sweep, stability_stiffness], ids=lambda question: question.id)
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formulation_in_another_way_of_writing_passes(name: str, question: Property) -> None:
     subject = springs_of(*RIGHT[name], translation_stable=True)
@@ -100,7 +100,7 @@ def test_a_right_formulation_in_another_way_of_writing_passes(name: str, questio
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_formulation_fails_and_the_case_is_named(name: str) -> None:
-    (row,) = run([springs_of(*WRONG[name], translation_stable=True)], [STABILITY_SWEEP], examples=1).rows
+    (row,) = run([springs_of(*WRONG[name], translation_stable=True)], [stability_sweep], examples=1).rows
     assert row.verdict is Verdict.FAIL
     assert row.unexpected
     assert set(row.failing_names) >= {"offset-1e6-a", "offset-1e6-gap-1e-6-b", "all-a"}
@@ -108,30 +108,30 @@ def test_a_wrong_formulation_fails_and_the_case_is_named(name: str) -> None:
 
 def test_only_the_offset_accuses_points_that_are_rounded_first() -> None:
     subject = springs_of(*WRONG["point rounded before the difference"], translation_stable=True)
-    (row,) = run([subject], [STABILITY_SWEEP], examples=1).rows
+    (row,) = run([subject], [stability_sweep], examples=1).rows
     assert not [name for name in row.failing_names if name.startswith(("gap", "ratio"))]
 
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-ppt", "mortar"])
 def test_a_formulation_that_is_a_residual_alone_is_judged(name: str) -> None:
     subject = Subject(name, partial(without_pair, load(name)._make))
-    sweep, stiffness = run([subject], [STABILITY_SWEEP, STABILITY_STIFFNESS], examples=1).rows
+    sweep, stiffness = run([subject], [stability_sweep, stability_stiffness], examples=1).rows
     assert sweep.verdict is Verdict.PASS, sweep.reason
     assert stiffness.verdict is Verdict.NOT_APPLICABLE
     assert not stiffness.unexpected
 
 
 def test_the_numbers_of_a_state_belong_together() -> None:
-    measurement = measure(STABILITY_SWEEP, state_named("gap-1e-9-a"), load("nts-ar"))
+    measurement = measure(stability_sweep, state_named("gap-1e-9-a"), load("nts-ar"))
     details = measurement.details
-    assert details[ERROR] == pytest.approx(measurement.values[ROUNDINGS.name] * 2.0**-53 * details[CONDITION])
+    assert details[ERROR] == pytest.approx(measurement.values[SWEPT_ROUNDINGS.name] * 2.0**-53 * details[CONDITION])
     assert 1e8 < details[CONDITION] < 1e10
     assert 0 < details[FORCE_ERROR] < 1e-6
 
 
 def test_a_penalty_costs_its_digits_and_no_more() -> None:
     soft, stiff = (
-        measure(STABILITY_STIFFNESS, state_named(f"stiffness-1e{n}"), load("vts-ppt")).details for n in (2, 10)
+        measure(stability_stiffness, state_named(f"stiffness-1e{n}"), load("vts-ppt")).details for n in (2, 10)
     )
     assert 1e7 < stiff[CONDITION] / soft[CONDITION] < 1e9
     assert stiff[ERROR] > 1e6 * soft[ERROR] > 0
@@ -146,6 +146,6 @@ def test_a_scene_rests_at_the_pressure_that_it_is_loaded_by() -> None:
 
 
 def test_multipliers_have_no_stiffness_to_sweep() -> None:
-    (row,) = run([load("mortar-lm")], [STABILITY_STIFFNESS], examples=1).rows
+    (row,) = run([load("mortar-lm")], [stability_stiffness], examples=1).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert row.reason == "the enforcement is by a multiplier, not by springs of a stated stiffness"

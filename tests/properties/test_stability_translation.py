@@ -20,21 +20,16 @@ from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state
-from contactverif_properties.stability_translation import (
-    FORCES,
-    SEARCH,
-    STABILITY_TRANSLATION,
-    TANGENT,
-)
+from contactverif_properties.stability_forces import FORCES, SEARCH, TANGENT, stability_translation
 
 
 @cache
 def cases(count: int = 100) -> tuple[Case, ...]:
-    return draw_cases(STABILITY_TRANSLATION.cases(None), seed="0/translation", examples=count).cases
+    return draw_cases(stability_translation.cases(None), seed="0/translation", examples=count).cases
 
 
 def measure_case(case: Case, subject: Subject) -> Measurement:
-    measurement = judge_case(STABILITY_TRANSLATION, case, subject).measurement
+    measurement = judge_case(stability_translation, case, subject).measurement
     assert measurement is not None
     return measurement
 
@@ -53,7 +48,7 @@ def test_every_case_moves_without_rounding_and_every_kind_is_drawn() -> None:
 def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None:
     way, before = RIGHT[name]
     subject = springs_of(way, before, translation_stable=True)
-    outcomes = [judge_case(STABILITY_TRANSLATION, case, subject) for case in cases()]
+    outcomes = [judge_case(stability_translation, case, subject) for case in cases()]
     assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
     assert sum(measure_case(case, subject).idle for case in cases()) <= 10
     assert max(max(measure_case(case, subject).values.values()) for case in cases()) <= 4
@@ -68,20 +63,20 @@ def test_a_wrong_formulation_is_accused_by_five_orders_of_magnitude(name: str) -
 
 def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
     silent, boastful = springs_of(by_points_first), springs_of(by_points_first, translation_stable=True)
-    result = run([silent], [STABILITY_TRANSLATION], examples=20, seed=0)
+    result = run([silent], [stability_translation], examples=20, seed=0)
     assert result.rows[0].verdict is Verdict.FAIL
     assert result.promises_kept
-    assert run([boastful], [STABILITY_TRANSLATION], examples=20, seed=0).rows[0].unexpected
+    assert run([boastful], [stability_translation], examples=20, seed=0).rows[0].unexpected
 
 
 def test_a_statement_of_not_being_stable_is_kept_by_a_named_state() -> None:
     witnesses = {"stability.translation": "moved"}
     stated = springs_of(by_points_first, translation_stable=False, witnesses=witnesses)
-    assert run([stated], [STABILITY_TRANSLATION], examples=10, seed=0).promises_kept
+    assert run([stated], [stability_translation], examples=10, seed=0).promises_kept
     way, before = RIGHT["einsum"]
     modest = springs_of(way, before, translation_stable=False, witnesses=witnesses)
     assert (
-        run([modest], [STABILITY_TRANSLATION], examples=10, seed=0).rows[0].unexpected == "stated to fail, but passes"
+        run([modest], [stability_translation], examples=10, seed=0).rows[0].unexpected == "stated to fail, but passes"
     )
 
 
@@ -105,7 +100,7 @@ def test_a_search_that_rounds_is_accused_where_forces_on_the_old_pairing_are_rig
         springs.search_before = in_single_precision
         return springs
 
-    outcomes = [judge_case(STABILITY_TRANSLATION, case, Subject("search", make)) for case in cases()]
+    outcomes = [judge_case(stability_translation, case, Subject("search", make)) for case in cases()]
     failures = [outcome.measurement for outcome in outcomes if outcome.verdict is Verdict.FAIL]
     assert len(failures) >= 10
     for measurement in failures:
@@ -129,21 +124,21 @@ def test_a_plugin_that_is_a_residual_and_nothing_else_is_judged(name: str) -> No
     way, before = (RIGHT | WRONG)[name]
     inner = springs_of(way, before, translation_stable=True)
     subject = Subject(name, lambda *, penalty: ResidualOnly(inner.with_penalty(penalty).plugin))
-    verdicts = [judge_case(STABILITY_TRANSLATION, case, subject).verdict for case in cases(60)]
+    verdicts = [judge_case(stability_translation, case, subject).verdict for case in cases(60)]
     assert (Verdict.FAIL in verdicts) is (name in WRONG)
     assert verdicts.count(Verdict.UNDECIDED) <= (10 if name in WRONG else 0)
 
 
 def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     distant = Interface.from_chains([[1e6, 5e5], [1e6 + 1, 5e5], [1e6 + 2, 5e5]], [[1e6 + 2.5, 5e5], [1e6 - 1, 5e5]])
-    states = draw_cases(STABILITY_TRANSLATION.cases(distant), seed="0", examples=20).cases
+    states = draw_cases(stability_translation.cases(distant), seed="0", examples=20).cases
     for case in states:
         assert case.largest_coordinate < 4
         far = move_state(case, case.parameters["shift"])
         assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
     way, before = RIGHT["einsum"]
     assert all(
-        judge_case(STABILITY_TRANSLATION, case, springs_of(way, before)).verdict is Verdict.PASS for case in states
+        judge_case(stability_translation, case, springs_of(way, before)).verdict is Verdict.PASS for case in states
     )
 
 

@@ -24,10 +24,8 @@ from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
 from contactverif_properties.shared.any_state import prepare_state
 from contactverif_properties.shared.block_derivatives import Groups, plan_moves, single_moves
-from contactverif_properties.shared.block_verdict import measure_blocks
 from contactverif_properties.shared.tangent_blocks import BLOCK, COMPLEX_BLOCK, LACKING, judge_of, scatter
-from contactverif_properties.tangent_long import TANGENT_LONG
-from contactverif_properties.tangent_sparsity import TANGENT_SPARSITY
+from contactverif_properties.tangent_entries import measure_blocks, tangent_long, tangent_sparsity
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
@@ -129,9 +127,9 @@ def test_long_states_are_long_and_in_contact() -> None:
 def test_a_right_tangent_passes_in_doubles_alone_and_without_a_pairing(name: str, paired: bool) -> None:
     innocent = plain(name, paired=paired)
     for each in FEW[:20]:
-        outcome = judge_case(TANGENT_SPARSITY, each, innocent)
+        outcome = judge_case(tangent_sparsity, each, innocent)
         assert outcome.verdict is Verdict.PASS, outcome.reason
-    outcome = judge_case(TANGENT_LONG, long_states()[4], innocent)
+    outcome = judge_case(tangent_long, long_states()[4], innocent)
     assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -139,7 +137,7 @@ def test_a_right_tangent_passes_in_doubles_alone_and_without_a_pairing(name: str
 def test_other_ways_of_writing_pass_in_long_double(name: str) -> None:
     innocent = gauss_springs.springs_of(*gauss_springs.RIGHT[name])
     for each in FEW[:15]:
-        outcome = judge_case(TANGENT_SPARSITY, each, innocent)
+        outcome = judge_case(tangent_sparsity, each, innocent)
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
@@ -148,7 +146,7 @@ def test_other_ways_of_writing_pass_in_long_double(name: str) -> None:
 def test_one_entry_off_by_1e_6_of_its_block_is_found_among_hundreds_of_nodes(name: str, number: int, node: int) -> None:
     """Differences of doubles are enough."""
     state = long_states()[number]
-    outcome = judge_case(TANGENT_LONG, state, plain(name, off_by(1e-6, node)))
+    outcome = judge_case(tangent_long, state, plain(name, off_by(1e-6, node)))
     assert outcome.verdict is Verdict.FAIL
     name = f"{'slave' if node < state.interface.n_slave_nodes else 'master'} node {node}"
     assert f"row {2 * node} (x of {name}), column {2 * node + 1} (y of {name})" in outcome.reason
@@ -159,7 +157,7 @@ def test_an_entry_that_the_pattern_lacks_is_named() -> None:
         matrix[0, 1] = 0.0
 
     state = long_states()[1]
-    outcome = judge_case(TANGENT_LONG, state, plain("vts-me", forget))
+    outcome = judge_case(tangent_long, state, plain("vts-me", forget))
     assert outcome.measurement is not None
     assert outcome.measurement.values[LACKING.name] == 1
     place = "row 0 (x of slave node 0), column 1 (y of slave node 0), not in the pattern"
@@ -177,7 +175,7 @@ def test_a_coupling_outside_the_pattern_is_found_where_unknowns_move_together() 
             return forces
 
     far = Subject("coupled", lambda *, penalty: Coupled(inner.with_penalty(penalty).plugin))
-    outcome = judge_case(TANGENT_LONG, long_states()[0], far)
+    outcome = judge_case(tangent_long, long_states()[0], far)
     assert outcome.verdict is Verdict.FAIL
     assert "row 5 (y of slave node 2), column 300 (x of master node 150): tangent 0 (not in the" in outcome.reason
 
@@ -209,7 +207,7 @@ def test_at_a_kink_the_derivative_to_either_side_is_right_and_another_one_undeci
 ) -> None:
     """2 is the central difference, which no judge can tell from a derivative."""
     at = case()
-    outcome = judge_case(TANGENT_SPARSITY, at, subject(Kinked, at=at.z[1], stiffness=stiffness))
+    outcome = judge_case(tangent_sparsity, at, subject(Kinked, at=at.z[1], stiffness=stiffness))
     assert outcome.verdict is verdict, outcome.reason
     if verdict is Verdict.UNDECIDED:
         assert outcome.reason.startswith("a kink")
@@ -223,7 +221,7 @@ def test_a_kink_excuses_no_other_block() -> None:
             return forces
 
     at = case()
-    outcome = judge_case(TANGENT_SPARSITY, at, subject(Twice, at=at.z[1], stiffness=0.5))
+    outcome = judge_case(tangent_sparsity, at, subject(Twice, at=at.z[1], stiffness=0.5))
     assert outcome.verdict is Verdict.FAIL
     assert "row 4 (x of master node 2), column 4 (x of master node 2)" in outcome.reason
 
@@ -253,7 +251,7 @@ class Sharp(Handmade):
 def test_a_residual_that_bends_sharply_is_judged_as_well_as_differences_can(
     length: float, wrong: float, verdict: Verdict
 ) -> None:
-    outcome = judge_case(TANGENT_SPARSITY, over_a_node(6 / 7), subject(Sharp, length=length, wrong=wrong))
+    outcome = judge_case(tangent_sparsity, over_a_node(6 / 7), subject(Sharp, length=length, wrong=wrong))
     assert outcome.verdict is verdict, outcome.reason
 
 
@@ -266,11 +264,11 @@ def test_no_contact_is_an_idle_case() -> None:
     assert measure_blocks(case(), subject(Kinked, at=0.0, stiffness=1.0)).idle is False
     open_case = over_a_node(6 / 7, gap=1 / 8)
     assert measure_blocks(open_case, load_subject("nts")).idle is True
-    assert judge(TANGENT_SPARSITY, measure_blocks(open_case, load_subject("nts")))[0] is Verdict.PASS
+    assert judge(tangent_sparsity, measure_blocks(open_case, load_subject("nts")))[0] is Verdict.PASS
 
 
 def test_a_failure_is_named_in_the_terminal_in_a_report_on_a_page_and_in_pytest(tmp_path: Path) -> None:
-    result = run([plain("vts-me", off_by(1e-2, 0))], [TANGENT_SPARSITY], examples=5, seed=1)
+    result = run([plain("vts-me", off_by(1e-2, 0))], [tangent_sparsity], examples=5, seed=1)
     (row,) = result.rows
     assert row.shrunk is not None
     assert row.shrunk.measurement is not None

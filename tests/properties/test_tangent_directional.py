@@ -18,9 +18,8 @@ from contactverif_properties.tangent_directional import (
     CENTRAL,
     COMPLEX,
     SLOPE,
-    TANGENT_DIRECTIONAL,
     TAYLOR,
-    measure_directional,
+    tangent_directional,
     taylor_slope,
 )
 
@@ -113,7 +112,7 @@ def one_entry(size: float) -> Callable[[Any], Any]:
 
 
 def test_an_exact_tangent_passes_all_three_conditions() -> None:
-    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, takes_complex=True))
+    outcome = judge_case(tangent_directional, case(), subject(Smooth, takes_complex=True))
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
     assert set(outcome.measurement.values) == {CENTRAL.name, TAYLOR.name, COMPLEX.name}
@@ -121,20 +120,20 @@ def test_an_exact_tangent_passes_all_three_conditions() -> None:
 
 
 def test_without_complex_numbers_there_is_no_complex_step() -> None:
-    assert COMPLEX.name not in measure_directional(case(), subject(Smooth)).values
+    assert COMPLEX.name not in tangent_directional.measure(case(), subject(Smooth)).values
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-8])
 def test_an_error_in_one_entry_is_found(size: float) -> None:
-    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=one_entry(size)))
+    outcome = judge_case(tangent_directional, case(), subject(Smooth, error=one_entry(size)))
     assert outcome.verdict is Verdict.FAIL
     assert CENTRAL.name in outcome.reason
 
 
 def test_a_complex_step_finds_what_a_central_difference_cannot() -> None:
     wrong = one_entry(1e-10)
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
-    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Smooth, error=wrong, takes_complex=True))
+    assert judge_case(tangent_directional, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
+    outcome = judge_case(tangent_directional, case(), subject(Smooth, error=wrong, takes_complex=True))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith(COMPLEX.name)
 
@@ -147,13 +146,13 @@ def test_a_tangent_of_nothing_is_nothing() -> None:
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return np.zeros((z.size, z.size))
 
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Nothing)).verdict is Verdict.PASS
+    assert judge_case(tangent_directional, case(), subject(Nothing)).verdict is Verdict.PASS
 
     class TangentOfNothing(Nothing):
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return 1e-12 * np.eye(z.size)
 
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(TangentOfNothing)).verdict is Verdict.FAIL
+    assert judge_case(tangent_directional, case(), subject(TangentOfNothing)).verdict is Verdict.FAIL
 
 
 class Restless(Smooth):
@@ -168,8 +167,8 @@ class Restless(Smooth):
 
 def test_a_pairing_that_changes_at_every_call_is_no_excuse() -> None:
     """A wrong tangent fails. A right one passes, and `purity` judges the pairing: differences need no pairing twice."""
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(1.0))).verdict is Verdict.FAIL
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Restless, error=one_entry(0.0))).verdict is Verdict.PASS
+    assert judge_case(tangent_directional, case(), subject(Restless, error=one_entry(1.0))).verdict is Verdict.FAIL
+    assert judge_case(tangent_directional, case(), subject(Restless, error=one_entry(0.0))).verdict is Verdict.PASS
 
 
 def test_nor_where_it_names_its_contact_points() -> None:
@@ -177,7 +176,7 @@ def test_nor_where_it_names_its_contact_points() -> None:
         def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
             return self.points(c=0.1)
 
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Pointed, error=one_entry(1.0))).verdict is Verdict.FAIL
+    assert judge_case(tangent_directional, case(), subject(Pointed, error=one_entry(1.0))).verdict is Verdict.FAIL
 
 
 @pytest.mark.parametrize(("wrong", "verdict"), [(0.0, Verdict.PASS), (1e-3, Verdict.FAIL)])
@@ -192,7 +191,7 @@ def test_where_the_residual_is_not_smooth_the_slope_tells_nothing(wrong: float, 
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return (1 + wrong) * np.eye(z.size)
 
-    assert judge_case(TANGENT_DIRECTIONAL, case(), subject(Rough)).verdict is verdict
+    assert judge_case(tangent_directional, case(), subject(Rough)).verdict is verdict
 
 
 class Nearest(Handmade):
@@ -223,20 +222,20 @@ class Nearest(Handmade):
 
 def test_a_true_kink_is_undecided_where_it_would_fail() -> None:
     at_kink, beside = over_a_node(0.0), over_a_node(1 / 7)
-    on_frozen_pairing = judge_case(TANGENT_DIRECTIONAL, at_kink, subject(Nearest))
+    on_frozen_pairing = judge_case(tangent_directional, at_kink, subject(Nearest))
     assert on_frozen_pairing.verdict is Verdict.PASS
-    outcome = judge_case(TANGENT_DIRECTIONAL, at_kink, subject(Nearest, wrong=0.1))
+    outcome = judge_case(tangent_directional, at_kink, subject(Nearest, wrong=0.1))
     assert outcome.verdict is Verdict.UNDECIDED
     assert outcome.reason.startswith("a kink: a decision hangs on ")
-    assert judge_case(TANGENT_DIRECTIONAL, beside, subject(Nearest)).verdict is Verdict.PASS
-    assert judge_case(TANGENT_DIRECTIONAL, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
+    assert judge_case(tangent_directional, beside, subject(Nearest)).verdict is Verdict.PASS
+    assert judge_case(tangent_directional, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
 
 
 def test_what_provides_no_tangent_is_not_asked() -> None:
-    assert TANGENT_DIRECTIONAL.needs == {"tangent"}
-    assert TANGENT_DIRECTIONAL.promise(Traits()) is None
-    assert TANGENT_DIRECTIONAL.promise(Traits(tangent="approximate")) is False
-    assert TANGENT_DIRECTIONAL.promise(Traits(tangent="exact")) is True
+    assert tangent_directional.needs == {"tangent"}
+    assert tangent_directional.promise(Traits()) is None
+    assert tangent_directional.promise(Traits(tangent="approximate")) is False
+    assert tangent_directional.promise(Traits(tangent="exact")) is True
 
 
 def test_each_region_moves_by_itself() -> None:
@@ -274,6 +273,6 @@ def test_a_row_counts_over_its_own_derivative() -> None:
             k[1, 1] *= 1 + 1e-6
             return k
 
-    outcome = judge_case(TANGENT_DIRECTIONAL, case(), subject(Uneven))
+    outcome = judge_case(tangent_directional, case(), subject(Uneven))
     assert outcome.verdict is Verdict.FAIL
     assert "row 1 (y of slave node 0)" in outcome.reason

@@ -22,9 +22,8 @@ from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import run
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.nodal_push import NODAL_PUSH, allowed_pushes
+from contactverif_properties.pushes import allowed_pushes, nodal_push, unilateral
 from contactverif_properties.shared.openings import lift_slave
-from contactverif_properties.unilateral import UNILATERAL
 
 
 class Springs:
@@ -44,7 +43,7 @@ class Springs:
 
 
 def verdict(case: Case, **options: Any) -> tuple[Verdict, str]:
-    outcome = judge_case(UNILATERAL, case, Subject("springs", lambda *, penalty: Springs(penalty=penalty, **options)))
+    outcome = judge_case(unilateral, case, Subject("springs", lambda *, penalty: Springs(penalty=penalty, **options)))
     return outcome.verdict, outcome.reason
 
 
@@ -64,7 +63,7 @@ def test_springs_that_push_and_never_pull() -> None:
 @pytest.mark.parametrize("case", ["a1", "b", "c"])
 def test_who_is_right_passes(name: str, case: str) -> None:
     subject = load_subject(name)
-    outcome = judge_case(UNILATERAL, named_case(case), subject)
+    outcome = judge_case(unilateral, named_case(case), subject)
     assert outcome.verdict is Verdict.PASS, outcome.reason
     assert outcome.measurement is not None
 
@@ -77,11 +76,11 @@ def test_nodes_a_rounding_beyond_free_ends_are_undecided(turn: Turn) -> None:
         flat_state("", [-excess, 1 + excess], flat_master([0, 1]), depth=0.25, turn=turn) for excess in (last_bit, 0.5)
     )
     without_tau = load_subject("nts:tau=0")
-    outcome = judge_case(UNILATERAL, over, without_tau)
+    outcome = judge_case(unilateral, over, without_tau)
     assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
     assert outcome.reason == "a kink: moved by roundoff, it begins one way and not another"
-    assert judge_case(UNILATERAL, over, load_subject("nts")).verdict is Verdict.PASS
-    assert judge_case(UNILATERAL, beyond, without_tau).verdict is Verdict.FAIL
+    assert judge_case(unilateral, over, load_subject("nts")).verdict is Verdict.PASS
+    assert judge_case(unilateral, beyond, without_tau).verdict is Verdict.FAIL
 
 
 class Augmented:
@@ -132,7 +131,7 @@ class Pulling(Springs):
 
 
 def test_a_slave_that_is_pulled_as_a_whole_is_told_so_in_words() -> None:
-    outcome = judge_case(UNILATERAL, named_case("a1"), Subject("pulling", Pulling))
+    outcome = judge_case(unilateral, named_case("a1"), Subject("pulling", Pulling))
     assert (outcome.verdict, outcome.reason) == (Verdict.FAIL, OPPOSITE_SIGN)
 
 
@@ -152,17 +151,17 @@ def test_single_nodes_are_judged_where_that_is_promised_and_told_elsewhere() -> 
     """A dual mortar method of a stranger, which says nothing, is not accused of what its shapes do."""
     case = named_case("c")
     springs = Subject("one segment", OneSegment)
-    assert judge_case(UNILATERAL, case, springs).verdict is Verdict.PASS
-    outcome = judge_case(NODAL_PUSH, case, springs)
+    assert judge_case(unilateral, case, springs).verdict is Verdict.PASS
+    outcome = judge_case(nodal_push, case, springs)
     assert outcome.verdict is Verdict.FAIL
     assert "pull of a node" in outcome.reason
-    assert NODAL_PUSH.promise(springs.traits) is None
-    assert judge_case(NODAL_PUSH, case, Subject("right", Springs)).verdict is Verdict.PASS
+    assert nodal_push.promise(springs.traits) is None
+    assert judge_case(nodal_push, case, Subject("right", Springs)).verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "two-pass/nts", "mortar:normals=averaged", "mortar-lm", "sts"])
 def test_formulations_that_push_every_node_are_not_accused(name: str) -> None:
-    [row] = run([load_subject(name)], [NODAL_PUSH], examples=60, seed=3).rows
+    [row] = run([load_subject(name)], [nodal_push], examples=60, seed=3).rows
     assert row.verdict is Verdict.PASS, row.reason
     assert row.contact_share is not None
     assert row.contact_share >= 0.9
@@ -173,7 +172,7 @@ def test_dual_shapes_pull_as_they_say(name: str) -> None:
     subject = load_subject(name)
     witness = subject.traits.witness("nodal-push")
     assert witness is not None
-    assert judge_case(NODAL_PUSH, named_case(witness), subject).verdict is Verdict.FAIL
+    assert judge_case(nodal_push, named_case(witness), subject).verdict is Verdict.FAIL
 
 
 def test_a_master_node_may_be_pulled_by_as_much_as_a_foot_lies_past_its_segment() -> None:
@@ -188,4 +187,4 @@ def test_a_master_node_may_be_pulled_by_as_much_as_a_foot_lies_past_its_segment(
     _, allowance = allowed_pushes(formulation, case)
     assert allowance[2] == pytest.approx(0.005 / 1.995 * 0.1, rel=1e-9)
     assert forces[2, 1] < 0  # The other node carries the slave's second node too.
-    assert judge_case(NODAL_PUSH, case, subject).verdict is Verdict.PASS
+    assert judge_case(nodal_push, case, subject).verdict is Verdict.PASS

@@ -24,7 +24,7 @@ from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.workers import worker_pool
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs
-from contactverif_properties.newton_order import NEWTON_ORDER
+from contactverif_properties.newton_convergence import newton_order
 from contactverif_properties.shared.newton_solution import solution_details
 from contactverif_reports.compare.cells import ORDER, Cell, Paired
 from contactverif_reports.compare.comparison import CONVERGED, END, ITERATIONS, Comparison
@@ -612,7 +612,7 @@ def test_a_page_escapes_what_a_plugin_calls_itself() -> None:
 
 def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -> None:
     """They share no code, so they must share words: else columns would be empty, and nobody would notice."""
-    assert NEWTON_ORDER.quantities[0].name == ORDER == SLOPE.name
+    assert newton_order.quantities[0].name == ORDER == SLOPE.name
     scene = load_scene("c")
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)

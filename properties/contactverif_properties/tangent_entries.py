@@ -1,4 +1,4 @@
-"""The verdict on the blocks of a tangent: the worst block by name, and what excuses one.
+"""Properties about each entry of the tangent: the worst block by name, and what excuses one.
 
 A block is excused where the residual is not smooth, and where it bends over a length too short for differences. Both
 are seen in differences of the residual; the tangent has no part in it. One excused block excuses no other.
@@ -12,8 +12,12 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Finding, Measurement
+from contactverif.contract.cases import Cases
+from contactverif.contract.property import Finding, Measurement, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.problems.long_states import long_states
+from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.block_derivatives import STEPS, single_moves
 from contactverif_properties.shared.tangent_blocks import (
     BLOCK,
@@ -27,6 +31,77 @@ from contactverif_properties.shared.tangent_blocks import (
     compare_blocks,
     judge_of,
 )
+
+
+def promise_exact_tangent(traits: Traits) -> bool | None:
+    """Return whether the traits promise an exact tangent; None if they say nothing about it."""
+    return None if traits.tangent is None else traits.tangent == "exact"
+
+
+@Property.define(
+    id="tangent.sparsity",
+    family="tangent",
+    summary="Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.",
+    quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
+    cases=Cases.random(smooth_cases),
+    promise=promise_exact_tangent,
+    needs=frozenset({"tangent"}),
+)
+def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
+    """Ask whether each block of the tangent is right on its own, and whether its pattern lacks an entry.
+
+    **Question.** Every unknown moves by itself. Is the change of each nodal force the entry of the tangent, and has the
+    tangent an entry wherever a force changes?
+
+    **Why it matters.** In a random direction, and in a norm of the whole matrix, a large entry hides a small one. A
+    code that allots its matrix from the mesh alone loses what couples a slave node with the second neighbour of a
+    master node.
+
+    **How it is judged.** A block is the rows of a node × the columns of a node; a multiplier counts as a node. Each
+    block counts over its own largest entry, so that the tolerance does not grow with the size of the problem:
+
+    - Against a complex step, where the plugin takes complex positions: 1e-11 + 1024 s uS/ℓ. Here s is the largest block
+      in the row or the column over this one, since roundoff is in proportion to that.
+    - Otherwise against the best of three central differences: (30 + 32 s) (uS/ℓ)^(2/3) + 1024 s uS/ℓ. Where the plugin
+      takes long doubles, u is that of long doubles in the first term.
+    - A derivative beyond that tolerance needs an entry in the matrix. In an array an entry that is exactly zero is
+      none.
+
+    Where the residual of a failing block bends over a length λ < ℓ, the block is judged again with λ in place of ℓ. A
+    failure names row and column of the worst entry, its value and the derivative.
+
+    **Undecided.** Only where nothing else fails: a failing block whose one-sided differences disagree, unless the
+    tangent is the derivative to one side; and a failing block whose residual bends over less than ℓ/1024.
+    """
+    return measure_blocks(case, subject)
+
+
+@Property.define(
+    id="tangent.long",
+    family="tangent",
+    summary="Each block of the tangent of a long interface is the derivative of the residual.",
+    quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
+    cases=Cases.from_list(long_states),
+    promise=promise_exact_tangent,
+    needs=frozenset({"tangent"}),
+)
+def tangent_long(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the tangent of a long interface is right in each of its blocks.
+
+    **Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments
+    on few, and few on many. Is each block of the tangent the derivative of the residual?
+
+    **Why it matters.** Some errors need size: a table that is too short, a block of rows that is forgotten behind the
+    hundredth segment, a wrong entry among a hundred thousand. A norm of the whole matrix loses that entry, and the more
+    so the longer the interface.
+
+    **How it is judged.** As in `tangent.sparsity`, with the same tolerances: each block counts over its own largest
+    entry. One entry that is wrong by 1e-6 of its block is found. Unknowns that no row feels together move at the same
+    time, so that some 30 moves are enough. What looks wrong is measured again, one unknown at a time.
+
+    **Undecided.** As in `tangent.sparsity`.
+    """
+    return measure_blocks(case, subject)
 
 
 def measure_blocks(case: Case, subject: Subject) -> Measurement:

@@ -1,0 +1,194 @@
+"""Properties about the balance of the forces on both sides, and about their potential."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies import smooth_cases
+from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.nodal_forces import forces_of_any_state
+from contactverif_properties.shared.roundoff import (
+    SEGMENT_REASON,
+    gap_tolerance,
+    mean_penetration,
+    ratio,
+    rounding_distance,
+    segment_tolerance,
+    stated_gap_quantity,
+    sum_slave_forces,
+)
+
+FORCE_IMBALANCE = stated_gap_quantity("force imbalance")
+MOMENT_IMBALANCE = stated_gap_quantity("moment imbalance")
+N_LOOPS = 3
+N_POINTS = 16  # Points on a loop: the error of the trapezoidal rule falls like (r/ℓ)^16.
+# The radius of a loop over the shortest segment. The smaller ones are for a kink within a larger loop.
+RADII = (2.0**-10, 2.0**-15, 2.0**-20)
+ASYMMETRY = Quantity("asymmetry of the tangent", "1", "u(8Z/min(g, ℓ) + 4N)", SEGMENT_REASON)
+WORK = Quantity(
+    "work in a closed loop",
+    "1",
+    "64 u Z/r",
+    "Positions are rounded to uZ, and forces change with them over the radius r.",
+)
+
+
+@Property.define(
+    id="balance.force",
+    family="balance",
+    summary="The forces on slave and master add up to zero on tilts, kinks and curves.",
+    quantities=(FORCE_IMBALANCE,),
+    cases=Cases.random(any_cases),
+    promise=lambda traits: traits.conserves_force,
+)
+def force_balance(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the forces on slave and master add up to zero.
+
+    **Question.** In a random state with tilts, kinks and curves, is the sum of all nodal forces zero?
+
+    **Why it matters.** Contact is internal to the pair of bodies: action equals reaction. A formulation that loses a
+    part of a force accelerates a free body, and the reactions at the supports do not add up to the load.
+
+    **How it is judged.** The measured number is |ΣR| over Σ|R| of the slave. The tolerance is u(8Z/|g| + 4N): a gap is
+    a difference of positions, each rounded to uZ, and N forces are summed. Z is the diameter D of the state for a
+    formulation that promises `translation_stable`, and the largest coordinate X for any other: it may form points
+    first, and measure the gap of each side anew. The printed VTS-PPT fails by 1 − cos θ of the slave's force on a tilt
+    θ.
+
+    **Undecided.** Never: a change of partner moves forces between nodes and leaves their sum as it is.
+    """
+    state, forces = forces_of_any_state(case, subject)
+    imbalance = ratio(float(np.linalg.norm(forces.sum(axis=0))), sum_slave_forces(state, forces))
+    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
+    return Measurement([FORCE_IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
+
+
+@Property.define(
+    id="balance.moment",
+    family="balance",
+    summary="The moments of the forces on slave and master add up to zero on tilts, kinks and curves.",
+    quantities=(MOMENT_IMBALANCE,),
+    cases=Cases.random(any_cases),
+    promise=lambda traits: traits.conserves_moment,
+)
+def moment_balance(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the moments of the forces on slave and master add up to zero.
+
+    **Question.** In a random state with tilts, kinks and curves, is the sum of the moments of all nodal forces zero?
+
+    **Why it matters.** Two forces that balance but do not lie on one line turn a free body without any cause.
+
+    **How it is judged.** Moments are taken about the centroid of the nodes. The measured number is |Σ x×R| over D Σ|R|
+    of the slave, with the diameter D of the state. The tolerance is u(8Z/|g| + 4N), with the distance Z of
+    `balance.force`: a gap is a difference of positions, each rounded to uZ, and N forces are summed.
+
+    **Undecided.** Never: on either side of a kink a formulation that balances moments does so.
+    """
+    state, forces = forces_of_any_state(case, subject)
+    arms = state.positions - state.positions.mean(axis=0)
+    moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
+    imbalance = ratio(moment, state.diameter * sum_slave_forces(state, forces))
+    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
+    return Measurement([MOMENT_IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
+
+
+@Property.define(
+    id="symmetric",
+    family="invariants",
+    summary="The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.",
+    quantities=(ASYMMETRY, WORK),
+    cases=Cases.random(smooth_cases),
+    promise=lambda traits: traits.symmetric,
+)
+def symmetric(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the tangent is symmetric, and the forces have a potential.
+
+    **Question.** Is K = Kᵀ in a random state? And do the forces do no work when the nodes run through a small closed
+    loop, with the pairing frozen?
+
+    **Why it matters.** With a symmetric tangent the linear solver needs half of the memory and of the time. Forces
+    without a potential do work in a closed loop: a vibrating part gains energy from contact. Who says that a tangent is
+    symmetric, and makes it so by leaving out its other half, loses the quadratic convergence.
+
+    **How it is judged.** The first number is max|K − Kᵀ| over max|K|, rows and columns of multipliers included. The
+    tolerance is u(8Z/min(g, ℓ) + 4N). The second is the work in a closed loop over the sum of the works on its parts.
+    The loops are three circles with a radius of r = 2^-10 ℓ in random planes of all unknowns, and the trapezoidal rule
+    with 16 points is exact to roundoff there. The tolerance is 64 u Z/r: positions are rounded to uZ, and forces change
+    over r. A formulation that says that its tangent is approximate is asked for the matrix alone.
+
+    Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
+    by one with 2^-20 ℓ.
+
+    **Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
+    than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
+    """
+    formulation, case = prepare_state(case, subject)
+    pairing = formulation.pair(case.interface, case.z)
+    forces = formulation.residual(case.interface, pairing, case.z)
+    distance = rounding_distance(case, subject.traits)
+    values, tolerances, undecided = {}, {}, ""
+    if "tangent" in formulation.provides:
+        tangent = dense(formulation.tangent(case.interface, pairing, case.z))
+        values[ASYMMETRY] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
+        tolerances[ASYMMETRY] = segment_tolerance(case, forces, distance)
+    if subject.traits.tangent != "approximate":
+        for share in RADII if pairing is None else RADII[:1]:
+            radius = share * case.shortest_segment
+            values[WORK] = largest_work(case, formulation, pairing, radius)
+            tolerances[WORK] = 64 * UNIT_ROUNDOFF * distance / radius
+            undecided = ""
+            if values[WORK] <= tolerances[WORK] or pairing is not None:
+                break
+            directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
+            kinks = (find_kink(case, formulation, pairing, radius, direction) for direction in directions)
+            undecided = next(filter(None, kinks), "")
+            if not undecided:
+                break
+    return Measurement(check_all(values, tolerances), undecided, idle=not forces[: case.interface.n_unknowns].any())
+
+
+def largest_work(case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float) -> float:
+    """Return the largest work in a loop over the sum of the works on its parts; the parameters of `work_in_loops`."""
+    work, throughput = work_in_loops(case, formulation, pairing, radius)
+    return max(ratio(float(w), float(t)) for w, t in zip(work, throughput, strict=True))
+
+
+def work_in_loops(
+    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the work of the forces in closed loops around a state, on a frozen pairing.
+
+    Parameters
+    ----------
+    case : Case
+        The state, with its multipliers if any.
+    formulation : CheckedFormulation
+        The formulation.
+    pairing : Pairing | None
+        The pairing of the state.
+    radius : float
+        The radius of the circles, a length.
+
+    Returns
+    -------
+    work : FloatArray, shape (N_LOOPS,)
+        The absolute value of the work of each loop.
+    throughput : FloatArray, shape (N_LOOPS,)
+        The sum of the absolute works on the parts of the loop, without that of the mean force.
+    """
+    planes = random_directions(case.seed, 2 * N_LOOPS, case.z.size).reshape(N_LOOPS, 2, 1, -1)
+    angles = 2 * np.pi * np.arange(N_POINTS)[:, None] / N_POINTS
+    moves = radius * (np.cos(angles) * planes[:, 0] + np.sin(angles) * planes[:, 1])  # (N_LOOPS, N_POINTS, n)
+    steps = radius * (np.cos(angles) * planes[:, 1] - np.sin(angles) * planes[:, 0]) * (2 * np.pi / N_POINTS)
+    forces = formulation.residual(case.interface, pairing, case.z + moves)
+    forces = forces - forces.mean(axis=1, keepdims=True)  # A constant force does no work in a loop.
+    works = forces * steps
+    return np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))

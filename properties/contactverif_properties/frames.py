@@ -1,0 +1,174 @@
+"""Properties about the frame in which a state is described: its unit of length, and its rotation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.strategies import smooth_cases
+from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.applicability import refuse_unstated_penalty
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
+from contactverif_properties.shared.kinks import explain_by_kink
+from contactverif_properties.shared.passes import split_passes
+from contactverif_properties.shared.roundoff import (
+    COORDINATE_ROUNDING,
+    SEGMENT_REASON,
+    SEGMENT_TOLERANCE,
+    ratio,
+    rounding_distance,
+    segment_tolerance,
+    select_failures,
+    sum_larger_forces,
+)
+
+POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
+SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+SCALED_FORCES = Quantity("error of the forces in another unit", "1", SCALED_TOLERANCE, POWERS_OF_TWO)
+SCALED_TANGENT = Quantity("error of the tangent in another unit", "1", SCALED_TOLERANCE, POWERS_OF_TWO)
+LARGEST_EXPONENT = 60
+TURNED_FORCES = Quantity("error of the forces after a rotation", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+TURNED_TANGENT = Quantity("error of the tangent after a rotation", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+
+
+@Property.define(
+    id="scaling",
+    family="invariants",
+    summary="Another unit of length changes nothing, so no absolute tolerance is hidden.",
+    quantities=(SCALED_FORCES, SCALED_TANGENT),
+    cases=Cases.random(any_cases),
+    promise=lambda traits: True,
+    applicable=refuse_unstated_penalty,
+)
+def scaling(case: Case, subject: Subject) -> Measurement:
+    """Ask whether another unit of length changes nothing.
+
+    **Question.** All lengths are multiplied by 2^k, for a random k from −60 to 60. Are the forces 2^k times the old
+    ones, and is the tangent the same, for a penalty that changes with its unit?
+
+    **Why it matters.** A code with an absolute tolerance hidden in it, such as 1e-6 for "touching", works in
+    millimetres and fails in metres or micrometres.
+
+    **How it is judged.** Differences of the forces count over max|R|, those of the tangent over max|K|. The tolerance
+    is u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises `translation_stable`, and the
+    largest coordinate of any other. Powers of two scale the four operations and square roots exactly, so a formulation
+    that uses nothing else gives 0; a power or an angle is rounded anew. A multiplier stays the same if it is a
+    pressure, and scales if it is a nodal force. Of a formulation with multipliers only the position rows are compared.
+
+    **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
+    changes the answer by a quarter of the error or more.
+    """
+    interface, random = case.interface, np.random.default_rng(case.seed)
+    factor, n = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1)), interface.n_unknowns
+    distributed = subject.traits.penalty == "distributed"
+    formulation, case = prepare_state(case, subject)
+    z = np.concatenate([case.z[:n] * factor, case.z[n:] * (1.0 if distributed else factor)])
+    there = replace(case, interface=interface.at(interface.nodes * factor), z=z)
+    penalty = 1.0 if case.n_multipliers else subject.penalty(case)
+    rescaled = subject.with_penalty(penalty / (factor if distributed else 1.0))
+    pairing, pairing_there = formulation.pair(interface, case.z), rescaled.pair(there.interface, there.z)
+    (forces,), tangents = ask_forces_and_tangents(formulation, (interface, pairing, case.z))
+    (forces_there,), tangents_there = ask_forces_and_tangents(rescaled, (there.interface, pairing_there, there.z))
+    forces, forces_there = forces[:n], forces_there[:n]
+    errors = {"forces": float(np.abs(forces_there / factor - forces).max())}
+    values = {SCALED_FORCES: ratio(errors["forces"], float(np.abs(forces).max()))}
+    if tangents:
+        tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
+        errors["tangent"] = float(np.abs(tangent_there - tangent).max())
+        values[SCALED_TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
+    tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
+    failures = select_failures(errors, values, tolerance)
+    rounding = COORDINATE_ROUNDING * case.largest_coordinate
+    undecided = explain_by_kink(case, formulation, pairing, rounding, failures) if failures else ""
+    return Measurement(check_all(values, tolerance), undecided, idle=not forces.any())
+
+
+def turn_state(case: Case) -> tuple[Case, FloatArray]:
+    """Turn and shift a state by a random angle and a random way, always the same for the same seed.
+
+    Parameters
+    ----------
+    case : Case
+        The state, with its multipliers if any.
+
+    Returns
+    -------
+    there : Case
+        The same case with the nodes at Qx + c.
+    rotation : FloatArray, shape (2, 2)
+        The rotation Q.
+    """
+    random = np.random.default_rng(case.seed)
+    angle = random.uniform(-np.pi, np.pi)
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    positions = case.positions @ rotation.T + random.uniform(-1, 1, 2) * case.diameter
+    return replace(case, z=np.concatenate([positions.reshape(-1), case.multipliers])), rotation
+
+
+@Property.define(
+    id="objectivity",
+    family="invariants",
+    summary="Turning and shifting the state turns the forces and the tangent with it.",
+    quantities=(TURNED_FORCES, TURNED_TANGENT),
+    cases=Cases.random(smooth_cases),
+    promise=lambda traits: True,
+    usual_undecided=0.003,
+)
+def objectivity(case: Case, subject: Subject) -> Measurement:
+    """Ask whether forces and tangent turn with the state.
+
+    **Question.** A random state is turned by a random angle and shifted. Are the forces and the tangent the old ones,
+    turned?
+
+    **Why it matters.** A formulation that prefers an axis gives another answer for the same part in another position in
+    the assembly. In large rotations it creates energy.
+
+    **How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of a side, and the tangent K(Qx + c)
+    with Q K Qᵀ over max|K|. Nothing turns multipliers; their constraint rows are compared too. The tolerance is
+    u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment turns the segment and
+    its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the turned positions to
+    uX. Where springs act twice, in two passes, half of the penetration g needs the same forces.
+
+    **Undecided.** A failing case is undecided where either state lies at a kink, or where moving the nodes by 64 u X
+    changes the answer by a quarter of the error or more.
+    """
+    formulation, case = prepare_state(case, subject)
+    interface, n = case.interface, case.interface.n_unknowns
+    there, rotation = turn_state(case)
+    pairing, pairing_there = (formulation.pair(interface, state.z) for state in (case, there))
+    turn = linalg.block_diag(np.kron(np.eye(interface.n_nodes), rotation), np.eye(case.n_multipliers))
+    states = (interface, pairing, case.z), (interface, pairing_there, there.z)
+    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
+
+    largest = max(case.largest_coordinate, there.largest_coordinate)
+    one_pass = forces / _count_passes(case, subject, formulation, pairing)
+    tolerance = segment_tolerance(case, one_pass, largest)
+    errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
+    size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
+    values = {TURNED_FORCES: ratio(errors["forces"], size)}
+    if tangents:
+        tangent, tangent_there = tangents
+        errors["tangent"] = float(np.abs(tangent_there - turn @ tangent @ turn.T).max())
+        values[TURNED_TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
+    failures = select_failures(errors, values, tolerance)
+    rounding = COORDINATE_ROUNDING * largest
+    undecided = ""
+    if failures:  # Slivers may cost more digits in one place than in the other.
+        undecided = explain_by_kink(case, formulation, pairing, rounding, failures)
+        undecided = undecided or explain_by_kink(there, formulation, pairing_there, rounding, failures)
+    return Measurement(check_all(values, tolerance), undecided, idle=not forces[:n].any())
+
+
+def _count_passes(case: Case, subject: Subject, formulation: CheckedFormulation, pairing: Pairing | None) -> int:
+    """Return 2 where springs act twice, in two passes: half of the penetration needs the same forces. Else return 1."""
+    if subject.traits.area is not None or "contact_points" not in formulation.provides:
+        return 1
+    return len(list(split_passes(case, formulation.contact_points(case.interface, pairing, case.z))))

@@ -1,0 +1,143 @@
+"""Properties about multipliers: their sign, their scale, and whether they are unique."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.system import System
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.strategies.solids import block_cases, solid_cases
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_without_multipliers
+from contactverif_properties.shared.newton_solution import (
+    find_solution,
+    is_untouched,
+    length_units,
+    solution_details,
+    solution_floor,
+)
+from contactverif_properties.shared.uniform_pressure import exact_multipliers
+
+SCALE_RATIO = 8.0  # The first scale c over the second one.
+TOLERANCE = "max(1e3 u/cond, 30 u X)/ℓ"
+TENSION = Quantity(
+    "largest tension of a multiplier",
+    "1",
+    TOLERANCE,
+    "A negative multiplier is released. It is measured as the length that changes the forces by as much. "
+    "The linear system is solved to 1e3 u/cond, and positions are rounded to 30 u X.",
+)
+CHANGE = Quantity(
+    "change with another scale c",
+    "1",
+    TOLERANCE,
+    "The scale of the decision λ − c g ≥ 0 does not change a solution. "
+    "The linear system is solved to 1e3 u/cond, and positions are rounded to 30 u X.",
+)
+REDUNDANT = Quantity(
+    "redundant multipliers",
+    "1",
+    "0",
+    "A dependent constraint leaves a zero singular value, which is below 8 n u of the largest one for n unknowns.",
+)
+
+
+def refuse_undefined_solution(traits: Traits) -> str:
+    """Return why there are no multipliers or no unique solution to look at, or an empty string."""
+    return refuse_without_multipliers(traits) or refuse_dependent_multipliers(traits)
+
+
+@Property.define(
+    id="complementarity",
+    family="multipliers",
+    summary="All multipliers of a solution press, and the scale of the contact decision does not change the solution.",
+    quantities=(TENSION, CHANGE),
+    cases=Cases.random(solid_cases),
+    promise=lambda traits: None if refuse_undefined_solution(traits) else True,
+    applicable=refuse_undefined_solution,
+    bodies=True,
+)
+def complementarity(case: Case, subject: Subject) -> Measurement:
+    """Ask whether all multipliers of a solution press, and the scale of the contact decision changes nothing.
+
+    **Question.** A tilted block is pressed on another, in many cases so that contact ends inside the interface. In the
+    solution, is every multiplier λ ≥ 0? Does the same solution follow with another scale c of the decision λ − c g ≥ 0?
+
+    **Why it matters.** A multiplier that pulls is adhesion, which frictionless contact does not have. A solution that
+    depends on c depends on a number that the user sets for the solver's sake.
+
+    **How it is judged.** The first number is the most negative multiplier, the second is how far positions and
+    multipliers move if contact is decided with c/8. Both are lengths over ℓ; a multiplier counts as the length that
+    changes the forces by as much. The tolerance is max(1e3 u/cond, 30 u X)/ℓ: what the linear system is solved to, and
+    what positions are rounded to.
+
+    **Undecided.** Where Newton's method finds no solution, or the matrix has no inverse at the solution.
+    """
+    scene = scene_of(case)
+    system = System(scene, subject.for_case(case))
+    trace = find_solution(system)
+    details = solution_details(trace)
+    if not trace.converged:
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
+    solution, n_free = trace.u[-1], scene.n_free
+    pairing = system.pair(solution)
+    condition = system.step(system.matrix(solution, pairing)[0], np.zeros(system.size)).condition
+    if condition <= 0:
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
+    units, length = length_units(system, solution, pairing), case.shortest_segment
+    floor = solution_floor(system, solution, pairing, condition) / length
+    lengths: FloatArray = solution / units / length
+    values = {TENSION: float(np.maximum(-lengths[n_free:], 0.0).max(initial=0.0))}
+    rescaled = subject.with_penalty(subject.penalty(case) / SCALE_RATIO)
+    again = solve(scene, rescaled, start=solution)
+    if again.converged:
+        values[CHANGE] = float((np.abs(again.u[-1] - solution) / units).max()) / length
+    details |= {"converged with another scale": float(again.converged)}
+    return Measurement(check_all(values, floor), details=details, idle=is_untouched(system, trace))
+
+
+@Property.define(
+    id="multipliers.rank",
+    family="multipliers",
+    summary="The constraints are independent, so that the multipliers are unique.",
+    quantities=(REDUNDANT,),
+    cases=Cases.random(block_cases),
+    promise=lambda traits: traits.independent_multipliers,
+    applicable=refuse_without_multipliers,
+    bodies=True,
+)
+def multiplier_rank(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the constraints of the multipliers are independent, so that the multipliers are unique.
+
+    **Question.** In the exact solution of two blocks under a uniform pressure, how many multipliers are redundant?
+
+    **Why it matters.** A redundant constraint makes the matrix singular. A solver then stops, or returns multipliers
+    (the contact pressures) that are arbitrary.
+
+    **How it is judged.** The measured number counts the zero singular values of the saddle-point matrix. The tolerance
+    is 0. A singular value counts as zero below 8 n u times the largest one, for n unknowns.
+
+    **Undecided.** Never.
+
+    **Source.** Section 6.3 of Zavarise & De Lorenzis (2009) leaves the question open for VTS-PPT. With eight slave
+    segments on two master segments, seven of its sixteen multipliers are redundant.
+    """
+    scene, pressure = scene_of(case), pressure_of(case, np.inf)
+    formulation = subject.for_case(case)
+    exact = exact_unknowns(scene, pressure, np.inf)
+    state = replace(case, z=scene.positions(exact))
+    system = System(scene, formulation, use_tangent=False)
+    u = np.concatenate([exact, exact_multipliers(state, subject, formulation, pressure)])
+    matrix, floor = system.matrix(u, system.pair(u))
+    step = system.step(matrix, np.zeros(system.size), floor)
+    details = {"multipliers": float(system.n_multipliers)}
+    return Measurement([REDUNDANT.check(float(step.deficiency), 0.0)], details=details)

@@ -1,0 +1,330 @@
+"""Properties about contact that pushes, where the surfaces penetrate, and never pulls."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import nnls
+
+from contactverif.contract.arrays import Array, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Surface
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.result import OPPOSITE_SIGN
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.directions import random_moves
+from contactverif_properties.shared.openings import (
+    ANY_SHAPE,
+    FLAT,
+    lift_slave,
+    nodes_far_from_contact,
+    open_all_but_one_end,
+    pushing_cases,
+)
+from contactverif_properties.shared.passes import Pass, split_passes
+from contactverif_properties.shared.roundoff import (
+    COORDINATE_ROUNDING,
+    SEGMENT_REASON,
+    SEGMENT_TOLERANCE,
+    segment_tolerance,
+    sum_larger_forces,
+)
+from contactverif_properties.shared.uniform_pressure import unit_forces
+
+N_MOVES = 64  # So many moves that a slave of two nodes that hang at free ends is moved off them in one of them.
+REASON = "An open contact is left out, not rounded away."
+OPEN = Quantity("force across an open gap", "1", "0", REASON)
+DISTANT = Quantity("force far from the contact zone", "1", "0", REASON)
+PULL_OF_POINT = Quantity("pull of a contact point", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
+CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
+PULL_OF_NODE = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+
+
+@Property.define(
+    id="unilateral",
+    family="invariants",
+    summary="Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.",
+    quantities=(OPEN, DISTANT, PULL_OF_POINT),
+    cases=Cases.by_kind(pushing_cases),
+    kinds=(FLAT, ANY_SHAPE),
+    promise=lambda traits: True,
+)
+def unilateral(case: Case, subject: Subject) -> Measurement:
+    """Ask whether contact pushes, is where the surfaces penetrate, and nowhere else.
+
+    **Question.** A flat interface is lifted until all gaps are open, and until all but one end is open. Is there no
+    force across an open gap, none far from the contact zone, and some where the surfaces penetrate? Does that force
+    push the slave, and does no contact point pull, there and on interfaces of any shape?
+
+    **Why it matters.** A force across an open gap is adhesion, or a force from nowhere. A contact that never begins
+    lets bodies pass through each other. A point that pulls where its gap has opened beside others that are closed is
+    adhesion too; it hides in nodal forces that push as a whole.
+
+    **How it is judged.** The first number is the largest nodal force across the open gap over ε̂ |g| L, with all
+    multipliers 0. The second is, with springs alone, the largest force of a slave node two or more segments from the
+    closed end over the largest force of a node. Both must be exactly 0: an open contact is left out, not rounded away.
+    The third is the largest negative pressure of a contact point over the largest of all points, where points are
+    reported; it may be as large as rounding the positions makes a gap. Where the surfaces penetrate and nothing begins,
+    or the slave is pulled as a whole, the case fails in words. What single nodes may do is asked by `nodal-push`.
+
+    **Undecided.** A case in which nothing begins is undecided if moving the nodes by 64 u X makes contact begin one way
+    and not another: a node that faces a free end exactly is over the master or not, as roundoff decides. Where contact
+    begins whichever way the nodes move, the case fails.
+    """
+    if "penetration" in case.parameters:
+        return measure_flat_contact(case, subject)
+    formulation, state = prepare_state(case, subject)
+    forces = _forces(formulation, state)[: case.interface.n_unknowns]
+    values, tolerances = _pull_of_points(formulation, state)
+    return Measurement(check_all(values, tolerances), idle=not forces.any())
+
+
+def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
+    """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
+
+    Parameters
+    ----------
+    case : Case
+        A flat case with the parameter `penetration`, a length.
+    subject : Subject
+        The formulation.
+
+    Returns
+    -------
+    Measurement
+        The largest force across the open gap over ε̂ |g| L. The largest force far from the contact zone over the largest
+        force; missing where no node is that far, and with multipliers, since `complementarity` judges those that pull.
+        The pull of a contact point, in the flat state and where one end alone is closed. Broken: nothing begins where
+        the surfaces penetrate, or the slave is pulled.
+    """
+    formulation, interface = subject.for_case(case), case.interface
+    depth, n = case.parameter("penetration"), interface.n_unknowns
+    count = formulation.n_multipliers(interface)
+    size = case.penalty * depth * case.slave_length
+    raised = lift_slave(case, 2 * depth).with_multipliers(np.zeros(count))
+    values = {OPEN: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
+    distant, one_end = nodes_far_from_contact(case), open_all_but_one_end(case)
+    if not count and distant.any():
+        forces = np.linalg.norm(_forces(formulation, one_end).reshape(-1, 2)[: len(distant)], axis=1)
+        values[DISTANT] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
+    tolerances = dict.fromkeys(values, 0.0)
+    pulls = [_pull_of_points(formulation, prepare_state(state, subject)[1]) for state in (case, one_end)]
+    pull, tolerance = max(pulls, key=lambda each: each[0].get(PULL_OF_POINT, 0.0) / each[1].get(PULL_OF_POINT, 1.0))
+    pushes = _contact_forces(formulation, case)
+    broken = "" if pushes.any() else "nothing begins where the surfaces penetrate"
+    undecided = ""
+    if broken:
+        begins = {bool(_contact_forces(formulation, moved).any()) for moved in _move_by_roundoff(case)}
+        undecided = "a kink: moved by roundoff, it begins one way and not another" if len(begins) == 2 else ""
+    elif _push_of_slave(pushes, case) < 0:
+        broken = OPPOSITE_SIGN
+    return Measurement(check_all(values | pull, tolerances | tolerance), undecided, broken, idle=bool(undecided))
+
+
+def _contact_forces(formulation: CheckedFormulation, case: Case) -> Array:
+    """Return the residual of the nodes (n_unknowns,): of springs, or of multipliers that are all 1."""
+    count = formulation.n_multipliers(case.interface)
+    if not count:
+        return _forces(formulation, case)
+    state = case.with_multipliers(np.zeros(count))
+    columns = unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    total: FloatArray = columns.sum(axis=1)
+    return total
+
+
+def _push_of_slave(residual: Array, case: Case) -> float:
+    """Return the total force on the slave along the master's outward normal."""
+    x, y = case.parameters["direction"]
+    return -float((residual.reshape(-1, 2)[: case.interface.n_slave_nodes] @ np.array([-y, x])).sum())
+
+
+def _pull_of_points(
+    formulation: CheckedFormulation, state: Case
+) -> tuple[dict[Quantity, float], dict[Quantity, float]]:
+    """Return the largest negative pressure over the largest of all, and its tolerance; nothing without points."""
+    if "contact_points" not in formulation.provides:
+        return {}, {}
+    pairing = formulation.pair(state.interface, state.z)
+    points = formulation.contact_points(state.interface, pairing, state.z)
+    pressure = points.pressure[np.isfinite(points.pressure)]
+    largest, pull = (float(np.max(sign * pressure, initial=0.0)) for sign in (1, -1))
+    forces = formulation.residual(state.interface, pairing, state.z)
+    value = pull / max(largest, pull) if pull else 0.0
+    return {PULL_OF_POINT: value}, {PULL_OF_POINT: segment_tolerance(state, forces, state.largest_coordinate)}
+
+
+def _move_by_roundoff(case: Case) -> Iterator[Case]:
+    """Yield the case with its nodes moved at random by what roundoff may do."""
+    reach = COORDINATE_ROUNDING * case.largest_coordinate
+    for direction in random_moves(case.seed, N_MOVES, case.z.size):
+        yield replace(case, z=case.z + reach * direction)
+
+
+def _forces(formulation: CheckedFormulation, case: Case) -> Array:
+    return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+
+
+@Property.define(
+    id="nodal-push",
+    family="invariants",
+    summary="Every node is pushed, none is pulled.",
+    quantities=(PULL_OF_NODE,),
+    cases=Cases.by_kind(pushing_cases),
+    kinds=(FLAT, ANY_SHAPE),
+    promise=lambda traits: traits.nodes_push,
+    usual_undecided=0.002,
+)
+def nodal_push(case: Case, subject: Subject) -> Measurement:
+    """Ask whether contact pushes every single node.
+
+    **Question.** Is the force on each slave node one that pushes it out of the master, and the force on each master
+    node one that pushes it out of the slave?
+
+    **Why it matters.** A node that is pulled is adhesion at that node. It opens gaps that should close, makes pressures
+    wavy, and lets an algorithm that releases nodes in tension go round in circles. The forces of all nodes together may
+    push all the same.
+
+    **How it is judged.** A force pushes if it is a sum of pushes along allowed normals. For a slave node these are the
+    normals of the contact points on its segments, and the normals into its own body; for a master node those of all
+    points, turned round. The number is the distance of the force from that cone over Σ|R|. A master node may also be
+    pulled by Σ max(−ξ, ξ − 1, 0) |F| of the points on its segments: Eq. 6 leaves ξ unclipped where a foot is past the
+    end. So may the nodes that a second pass takes for its master's. Where no points are reported, all normals of both
+    surfaces are allowed. Multipliers press or are 0, at random. Half of the cases are flat, closed on one half and open
+    on the other: there all normals are nearly one. The tolerance is u(8X/min(g, ℓ) + 4N).
+
+    Dual shape functions are negative in places and may pull. A formulation says so by the trait `nodes_push`: False
+    needs a witness, and None promises nothing, so that a right dual mortar method of a stranger is not accused. The
+    pressures of contact points are judged for all formulations, by `unilateral`.
+
+    **Undecided.** A failing case is undecided where every node that is pulled belongs to a segment of the master round
+    a corner: the neighbour of the one that a point faces, turned by more than 60°. Where an area of competence reaches
+    round such a corner, a part of its force has its foot far past the ends of the neighbour, and Eq. 6 leaves that ξ
+    unclipped, too. Points do not report their parts.
+
+    **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
+    """
+    opened = open_all_but_one_end(case, CLOSED) if "penetration" in case.parameters else case
+    formulation, state = prepare_state(opened, subject)
+    if state.n_multipliers:
+        state = state.with_multipliers(release_some(state))
+    pairing = formulation.pair(state.interface, state.z)
+    residual = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
+    size = sum_larger_forces(state, residual)
+    if not size:
+        return Measurement([PULL_OF_NODE.check(0.0, 0.0)], idle=True)
+    forces = -residual.reshape(-1, 2)
+    normals, allowance = allowed_pushes(formulation, state)
+    pulls = np.array([_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(forces)])
+    tolerance = segment_tolerance(state, residual, state.largest_coordinate)
+    pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
+    undecided = ""
+    if pulled and pulled <= _nodes_round_corners(formulation, state):
+        undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
+    return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
+
+
+def _nodes_round_corners(formulation: CheckedFormulation, state: Case) -> set[int]:
+    """Return the nodes of all master segments that a point faces beside a corner of more than 60°."""
+    if "contact_points" not in formulation.provides:
+        return set()
+    pairing = formulation.pair(state.interface, state.z)
+    nodes: set[int] = set()
+    for each in split_passes(state, formulation.contact_points(state.interface, pairing, state.z)):
+        master = each.interface.master
+        for segment, normal in zip(each.points.master_segment, each.points.normal, strict=True):
+            for neighbour in master.neighbours[segment] if segment >= 0 else ():
+                along = np.diff(each.positions[master.segments[neighbour]], axis=0)[0]
+                outward = np.array([along[1], -along[0]]) / np.hypot(*along)  # The body is on the left.
+                if neighbour >= 0 and normal @ outward < CORNER:
+                    nodes.update(each.numbers[master.segments[neighbour]].tolist())
+    return nodes
+
+
+def release_some(state: Case) -> FloatArray:
+    """Return the multipliers (n_multipliers,) of a state, about half of them 0: any that are not negative may occur."""
+    random = np.random.default_rng([state.seed, 2])
+    pressing = random.integers(0, 2, state.n_multipliers)
+    return state.multipliers * (pressing if pressing.any() else 1)
+
+
+def allowed_pushes(formulation: CheckedFormulation, state: Case) -> tuple[dict[int, list[FloatArray]], FloatArray]:
+    """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled.
+
+    Parameters
+    ----------
+    formulation : CheckedFormulation
+        The formulation; its contact points are used if it reports them.
+    state : Case
+        A complete state.
+    """
+    interface, positions = state.interface, state.positions
+    normals: dict[int, list[FloatArray]] = defaultdict(list)
+    allowance = np.zeros(interface.n_nodes)
+    for side in (interface.slave, interface.master):
+        for node, normal in _inward_normals(side, positions):
+            normals[node].append(normal)
+    if "contact_points" not in formulation.provides:
+        _allow_everything(state, normals)
+        return normals, allowance
+    pairing = formulation.pair(interface, state.z)
+    for each in split_passes(state, formulation.contact_points(interface, pairing, state.z)):
+        _allow_points(each, normals, allowance)
+    return normals, allowance
+
+
+def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, FloatArray]]:
+    """Return (node, unit normal into its own body, which is on the left) of both ends of every segment."""
+    along = positions[side.segments[:, 1]] - positions[side.segments[:, 0]]
+    inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    return [(node, normal) for ends, normal in zip(side.segments.tolist(), inward, strict=True) for node in ends]
+
+
+def _allow_everything(state: Case, normals: dict[int, list[FloatArray]]) -> None:
+    """Allow each node all normals of both surfaces that push it out of the other one."""
+    interface = state.interface
+    on_slave = [normal for _, normal in _inward_normals(interface.slave, state.positions)]
+    on_master = [normal for _, normal in _inward_normals(interface.master, state.positions)]
+    for node in range(interface.n_nodes):
+        sign = 1 if node < interface.n_slave_nodes else -1
+        normals[node] += [sign * normal for normal in on_slave] + [-sign * normal for normal in on_master]
+
+
+def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: FloatArray) -> None:
+    """Add what the points of a pass allow to the nodes that carry them and to the nodes opposite."""
+    directed: BoolArray = np.asarray(np.isfinite(each.points.normal).all(axis=1))
+    points = each.points.select(directed)
+    slave, master = each.interface.slave.segments, each.interface.master.segments
+    for segment, c, normal in zip(points.slave_segment.tolist(), points.c.tolist(), points.normal, strict=True):
+        if segment < 0:
+            continue
+        segments = {segment}
+        if abs(c) == 1:  # The point is a node, and so on both of its segments.
+            segments |= {int(each.interface.slave.neighbours[segment, int(c > 0)])} - {-1}
+        for node in np.unique(slave[list(segments)]):
+            normals[int(each.numbers[node])].append(normal)
+    carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
+    pushing = [normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)]]
+    for node in np.unique(each.numbers[master]):
+        normals[int(node)] += [-normal for normal in pushing]
+    for segment, pull in zip(points.master_segment.tolist(), _pull_past_ends(points), strict=True):
+        if segment >= 0:
+            allowance[each.numbers[master[segment]]] += pull
+
+
+def _pull_past_ends(points: ContactPoints) -> FloatArray:
+    """Return max(−ξ, ξ − 1, 0) |F| of each point (n_points,); 0 for weighted nodes, which have no foot."""
+    past = np.maximum(0.0, np.maximum(-points.xi, points.xi - 1.0))
+    pulls: FloatArray = np.where(points.weighted | np.isnan(past), 0.0, past * np.abs(points.pressure * points.weight))
+    return pulls
+
+
+def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:
+    """Return the distance of a force from the sums of non-negative multiples of the normals."""
+    return float(nnls(np.unique(np.array(normals), axis=0).T, force)[1]) if normals else float(np.hypot(*force))

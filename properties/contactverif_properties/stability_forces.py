@@ -1,0 +1,308 @@
+"""Properties about roundoff in the forces of a given state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
+from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.problems.stability_states import stability_states
+from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
+from contactverif.strategies.translations import translated_cases
+from contactverif_properties.shared.any_state import move_state, prepare_state
+from contactverif_properties.shared.applicability import refuse_barrier
+from contactverif_properties.shared.conditioning import (
+    MOST_ROUNDINGS,
+    Conditioning,
+    count_tangent_roundings,
+    forces_quantity,
+    measure_conditioning,
+    measure_tangent_slope,
+    tangent_quantity,
+)
+from contactverif_properties.shared.exact_motions import ExactMotion
+from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
+from contactverif_properties.shared.kinks import explain_by_rounded_decision
+from contactverif_properties.shared.linear_gaps import exact_slave_forces, knows_linear_total, uniform_multiplier
+from contactverif_properties.shared.roundoff import ratio
+from contactverif_properties.shared.sweep_measurement import make_sweep_measurement
+
+FORCES = forces_quantity("change of the forces in roundings")
+TANGENT = tangent_quantity("change of the tangent in roundings")
+SEARCH = forces_quantity("change of the forces with a new pairing in roundings")
+FORCES_THERE = forces_quantity("error of the forces in roundings")
+TOTAL_THERE = forces_quantity("error of the total force in roundings")
+KINDS = ("uniform penetration", "linear penetration")
+LARGEST_DENOMINATOR = 13  # The hypotenuses of the triples are 5 and 13.
+SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
+
+
+@Property.define(
+    id="stability.translation",
+    family="stability",
+    summary="A part far from the origin gets the same forces as the same part at the origin.",
+    quantities=(FORCES, TANGENT, SEARCH),
+    cases=Cases.random(translated_cases),
+    promise=lambda traits: traits.translation_stable,
+)
+def stability_translation(case: Case, subject: Subject) -> Measurement:
+    """Ask whether a part far from the origin gets the same forces as the same part at the origin.
+
+    **Question.** State and reference are moved by up to 2^20, while segments have lengths of 1 to 4. The move is exact:
+    no coordinate is rounded. Do forces and tangent stay what they were?
+
+    **Why it matters.** Assemblies, bridges and maps have coordinates of 10⁵ to 10⁷ and penetrations of 10⁻⁶. A
+    formulation that forms a point of a segment there rounds it at its distance from the origin. What it subtracts
+    afterwards is lost: forces are wrong by 10⁻⁴, and Newton's method stops at that.
+
+    **How it is judged.** The forces are compared on the pairing of the state at the origin. The difference is counted
+    in roundings (ω): how many times more it is than rounding all positions relative to their centroid, to 53 bits,
+    would make it. A kernel that takes differences of nodes first gives 0, or a few where it centres its coordinates.
+    The tolerance is 16, at any distance and any gap. A kernel that rounds points far away has 10⁵ and more at 2^20. The
+    tangent may differ by 16 u D max(max|K|/ℓ, max|dK/dx|): a rounding turns a segment by u D/ℓ, and changes the
+    stiffness of a law that is not linear. The state's own pairing at the far place must give these forces too. Without
+    a promise (trait `translation_stable`), a failure is shown and breaks nothing: kernels that form points first are
+    common, and right near the origin.
+
+    **Undecided.** Never, if the plugin has a pairing. Without one, or with the far state's own pairing, a case is
+    undecided where a decision hangs on less than 64 u D: there a right search may decide otherwise.
+    """
+    formulation, near = prepare_state(case, subject)
+    far = move_state(near, case.parameters["shift"])
+    pairing = formulation.pair(near.interface, near.z)
+    states = (near.interface, pairing, near.z), (far.interface, pairing, far.z)
+    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
+    change = forces_there - forces
+    conditioning = measure_conditioning(near, formulation, pairing, forces)
+    values = {FORCES: conditioning.count_roundings(change)}
+    if tangents:
+        here, there = tangents
+        slope = measure_tangent_slope(near, formulation, pairing, here)
+        values[TANGENT] = count_tangent_roundings(near, here, there, slope)
+    excusable = pairing is None  # A plugin without a pairing decides anew in each residual.
+    if pairing is not None:
+        excusable = max(values.values()) <= MOST_ROUNDINGS  # The frozen pairing decides the same in both places.
+        change = formulation.residual(far.interface, formulation.pair(far.interface, far.z), far.z) - forces
+        values[SEARCH] = conditioning.count_roundings(change)
+    undecided = ""
+    if excusable and max(values.values()) > MOST_ROUNDINGS:
+        undecided = explain_by_rounded_decision(near, formulation, pairing)
+    idle = not forces[: near.interface.n_unknowns].any()
+    return Measurement(check_all(values, MOST_ROUNDINGS), undecided, idle=idle)
+
+
+def refuse_unknown_forces(traits: Traits) -> str:
+    """Return why no exact force is known, or an empty string if one is."""
+    if knows_forces(traits) or knows_total(traits) or traits.takes_longdouble:
+        return refuse_barrier(traits)
+    return "no exact force is known: the traits promise no patch test, no area and no long double"
+
+
+@random_source("contactverif_properties.stability_local.local_cases")
+def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return a strategy for each kind of penetration; None where an interface is given."""
+    uniform, linear = exact_flat_cases(interface), linear_flat_cases(interface)
+    return None if uniform is None or linear is None else dict(zip(KINDS, (uniform, linear), strict=True))
+
+
+@Property.define(
+    id="stability.local",
+    family="stability",
+    summary="Forces are as exact as the positions allow, whatever the gap and the distance from the origin.",
+    quantities=(FORCES_THERE, TOTAL_THERE),
+    cases=Cases.by_kind(local_cases),
+    kinds=KINDS,
+    promise=lambda traits: True if traits.translation_stable else None,
+    applicable=refuse_unknown_forces,
+)
+def stability_local(case: Case, subject: Subject) -> Measurement:
+    """Ask whether forces are as exact as the positions allow, on flat states whose exact forces are rationals.
+
+    **Question.** A turned flat interface penetrates by 10⁻² to 10⁻⁸ of a segment, near the origin or far from it. The
+    penetration is uniform, or linear along a straight slave. Are the forces as near to the exact ones as rounding the
+    positions relative to one another lets them be?
+
+    **Why it matters.** A small gap is a difference of large numbers, so an error of 10⁻⁷ at a gap of 10⁻⁹ is no fault:
+    the positions do not contain more digits. The same error at a gap of 10⁻² is one. A tolerance that grows with the
+    coordinates cannot tell them apart. And a formulation may be wrong by the same amount everywhere, as one in single
+    precision, so that a translation does not show it.
+
+    **How it is judged.** The error is counted in roundings (ω), as in `stability.translation`, with the same tolerance
+    of 16 at any gap, distance and penalty. What is exact depends on the traits. Where the flat patch test is promised,
+    it is the force on every node, in rationals on the stored positions. Else it is the answer in long double, if the
+    plugin says that it can (`takes_longdouble`), and the total force ε̂ |g| A, if `area` and `penalty` say that springs
+    are distributed. Multipliers that are pressures are all ε̂ |g|, and only the distribution of their forces counts.
+
+    Under a linear penetration, the force on each slave node is exact where `integrates_linear_gap` is promised. The
+    total on the slave is exact where `gap`, `force_along`, `penalty` and `area` state it. Where nothing is stated, and
+    with multipliers, the forces are compared with those near the origin.
+
+    A formulation promises this if it promises `translation_stable` and one of the above. Ratios of lengths stay below
+    5: a kernel that moves the origin to a node rounds at the diameter, which is right, but costs digits on much shorter
+    segments.
+
+    **Undecided.** A failing case is undecided where a slave point faces a master node to within 64 u D. Both partners
+    give the same gap there, but a search that asks for 0 ≤ ξ ≤ 1 may lose the point between them.
+    """
+    formulation, linear = subject.for_case(case), "slope" in case.parameters
+    pressure = uniform_multiplier(case) if linear else case.penalty * case.parameter("penetration")
+    near = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), pressure))
+    far = move_state(near, case.parameters["shift"])
+    pairing = formulation.pair(far.interface, far.z)
+    forces = formulation.residual(far.interface, pairing, far.z)
+    near_forces = formulation.residual(near.interface, pairing, near.z)
+    conditioning = measure_conditioning(near, formulation, pairing, near_forces)
+    errors = (
+        _errors_of_linear(near, subject.traits, forces) if linear else _errors_of_uniform(near, subject.traits, forces)
+    )
+    if FORCES_THERE not in errors and subject.traits.takes_longdouble:
+        errors[FORCES_THERE] = forces - _in_long_double(far, formulation, pairing)
+    if not errors:
+        errors[FORCES_THERE] = forces - near_forces
+    values: dict[Quantity, float] = {}
+    if FORCES_THERE in errors:
+        values[FORCES_THERE] = conditioning.count_roundings(errors[FORCES_THERE])
+    if TOTAL_THERE in errors:
+        values[TOTAL_THERE] = _count_total(near, errors[TOTAL_THERE], conditioning)
+    failed = max(values.values()) > MOST_ROUNDINGS
+    undecided = explain_by_rounded_decision(near, formulation, pairing) if failed else ""
+    return Measurement(check_all(values, MOST_ROUNDINGS), undecided)
+
+
+def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
+    """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
+    if knows_forces(traits):
+        return {FORCES_THERE: _error_of_patch(case, forces)}
+    if not knows_total(traits):
+        return {}
+    n_slave, exact = 2 * case.interface.n_slave_nodes, exact_forces(case)
+    totals = [
+        float(sum(map(Fraction, forces[axis:n_slave:2].tolist())) - sum(exact[axis:n_slave:2])) for axis in (0, 1)
+    ]
+    return {TOTAL_THERE: np.array(totals)}
+
+
+def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
+    """Return the same under a linear penetration, of the rows of slave nodes."""
+    if traits.enforcement != "penalty" or not knows_linear_total(traits):
+        return {}
+    n_slave = case.interface.n_slave_nodes
+    error = forces[: 2 * n_slave].reshape(-1, 2) + exact_slave_forces(case, traits)
+    errors = {TOTAL_THERE: error.sum(axis=0)}
+    if traits.integrates_linear_gap:
+        errors[FORCES_THERE] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
+    return errors
+
+
+def exact_forces(case: Case) -> list[Fraction]:
+    """Return the exact residual of a uniform pressure ε̂ |g| (n_unknowns entries), which pulls nodes back."""
+    weights = uniform_pressure_weights_exact(case.interface, case.parameters["along"])
+    x, y = (Fraction(entry).limit_denominator(LARGEST_DENOMINATOR) for entry in case.parameters["direction"].tolist())
+    pressure = Fraction(case.penalty) * Fraction(case.parameter("penetration"))
+    forces = []
+    for node, weight in enumerate(weights):
+        size = -pressure * weight if node < case.interface.n_slave_nodes else pressure * weight
+        forces += [-y * size, x * size]  # The normal points to the left of the way the slave runs.
+    return forces
+
+
+def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
+    """Return the error of the position rows; constraint rows, which are not judged here, get 0."""
+    exact, n = exact_forces(case), case.interface.n_unknowns
+    scale = Fraction(1)
+    if case.n_multipliers:
+        n_slave = 2 * case.interface.n_slave_nodes
+        pulls = list(map(Fraction, forces[:n_slave].tolist()))
+        totals, exact_totals = ([sum(part[axis:n_slave:2], Fraction()) for axis in (0, 1)] for part in (pulls, exact))
+        projection = totals[0] * exact_totals[0] + totals[1] * exact_totals[1]
+        if projection > 0:
+            scale = (exact_totals[0] * exact_totals[0] + exact_totals[1] * exact_totals[1]) / projection
+    errors = [float(Fraction(force) * scale - right) for force, right in zip(forces[:n].tolist(), exact, strict=True)]
+    return np.array([*errors, *([0.0] * case.n_multipliers)])
+
+
+def _in_long_double(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> Array:
+    return formulation.residual(case.interface, pairing, case.z.astype(np.longdouble))
+
+
+def _count_total(case: Case, error: FloatArray, conditioning: Conditioning) -> float:
+    """Return the error (2,) of the slave's total force over what roundings of all its nodes allow."""
+    reach = float(conditioning.reach[: case.interface.n_slave_nodes].sum())
+    return ratio(float(np.hypot(*error)), UNIT_ROUNDOFF * reach)
+
+
+def knows_forces(traits: Traits) -> bool:
+    """Return whether the traits say what the force on each node is: that of springs, or of uniform pressures."""
+    if traits.enforcement == "multiplier" and traits.penalty != "distributed":
+        return False
+    return traits.passes_flat_patch is True
+
+
+def knows_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of springs is."""
+    return traits.enforcement == "penalty" and traits.penalty == "distributed" and traits.area is not None
+
+
+def move_swept(case: Case) -> Case:
+    """Return the state after its exact motion, multipliers included.
+
+    Parameters
+    ----------
+    case : Case
+        A state with the parameters "turn" and "shift", as it lies flat at the origin.
+    """
+    motion = ExactMotion.from_case(case)
+    positions = motion.move(case.positions)
+    z = np.concatenate([positions.reshape(-1), case.multipliers])
+    return replace(case, interface=case.interface.at(motion.move(case.interface.nodes)), z=z)
+
+
+@Property.define(
+    id="stability.sweep",
+    family="stability",
+    summary="Small gaps, short segments and a place far away cost no more digits than the condition number says.",
+    quantities=(SWEPT_ROUNDINGS,),
+    cases=Cases.from_list(stability_states),
+    promise=lambda traits: traits.translation_stable,
+)
+def stability_sweep(case: Case, subject: Subject) -> Measurement:
+    """Ask whether the error of the forces stays in proportion to the condition number, on named states that get harder.
+
+    **Question.** A flat interface lies turned and far from the origin, with gaps down to 1e-12, segments down to 1e-9
+    and offsets up to 1e9. Is the error of each nodal force at most sixteen times what rounding the positions relative
+    to one another would change?
+
+    **Why it matters.** A small gap is a difference of nearly equal coordinates. Then digits are lost in any
+    formulation, and the condition number says how many. A kernel that rounds a point at its distance from the origin
+    loses more. No test near the origin shows that, and in a model in global coordinates it looks like bad contact.
+
+    **How it is judged.** The same state, flat and at the origin, is the reference: there every product is nearly exact.
+    It is turned by a rational rotation and shifted, and neither rounds anything. Both residuals are evaluated on the
+    pairing of the flat state. The error is counted in roundings, ω (see the shared measure of conditioning). The
+    tolerance is 16. The states are a finite list, and `contactverif stability` draws them. Besides ω, the error and the
+    condition number of the worst force are kept.
+
+    **Undecided.** Never, since no decision is made anew. A formulation without `pair` decides anew inside its residual.
+    One that prefers an axis fails in every state: look at `objectivity` first.
+    """
+    formulation, case = prepare_state(case, subject)
+    n = case.interface.n_unknowns
+    pairing = formulation.pair(case.interface, case.z)
+    forces = formulation.residual(case.interface, pairing, case.z)
+    there = move_swept(case)
+    forces_there = formulation.residual(there.interface, pairing, there.z)
+    expected: FloatArray = np.array(forces)
+    expected[:n] = ExactMotion.from_case(case).turn(forces[:n].reshape(-1, 2)).reshape(-1)
+    conditioning = measure_conditioning(case, formulation, pairing, forces)
+    return make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, forces_there - expected, idle=not forces.any())
