@@ -90,16 +90,8 @@ def solve_for_accuracy(
 ) -> Solution:
     """Solve a scene at its own penalty, with the formulation's tangent, or with differences where that does not help.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene. Its penalty ε̂ counts; a nodal formulation gets ε̂ × the mean slave segment.
-    subject : Subject
-        The formulation.
-    start : FloatArray | None, shape (n_free,)
-        The first iterate; by default the first guess of the scene.
-    step : float | None
-        The step of differences where the formulation has no tangent, a length that is small against the penetration.
+    A nodal formulation gets ε̂ × the mean slave segment. The start (n_free,) is the first guess of the scene by
+    default. The step of differences is a length that is small against the penetration.
     """
     interface = scene.interface
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
@@ -118,18 +110,8 @@ def solve_in_tries(
 ) -> tuple[Trace, ...]:
     """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    formulation : CheckedFormulation
-        The formulation with its penalty.
-    start : FloatArray | None, shape (n_free,)
-        The first iterate; by default the first guess of the scene.
-    step : float | None
-        The step of differences, as in `solve_for_accuracy`.
-    keep_matrix : bool
-        True saves matrices, for whoever asks for the solution and not for Newton's method, see `solve`.
+    The arguments are those of `solve_for_accuracy`. With `keep_matrix` the matrix of Newton's method is kept, see
+    `solve`.
     """
     ways = (True, False) if "tangent" in formulation.provides else (True,)
     traces = []
@@ -160,37 +142,15 @@ def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -
 
 
 def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:
-    """Return m_i = ∫N_i ds (n_nodes,), half the length of each segment at either end; 0 at nodes of the other surface.
-
-    Parameters
-    ----------
-    surface : Surface
-        The slave or the master.
-    positions : FloatArray, shape (n_nodes, 2)
-        The positions of all nodes of the interface.
-    """
+    """Return m_i = ∫N_i ds (n_nodes,), half the length of each segment at either end; 0 at other nodes."""
     halves = np.repeat(surface.lengths(positions) / 2, 2)
     return np.bincount(surface.segments.reshape(-1), weights=halves, minlength=len(positions)).astype(np.float64)
 
 
 def traction_forces(surface: Surface, positions: FloatArray, traction: Field, parts: int = 1) -> FloatArray:
-    """Return the nodal forces ∫N_i t ds of a traction t on a surface, by Gauss points.
+    """Return the nodal forces ∫N_i t ds (n_nodes, 2) of a traction t on a surface, by Gauss points; 0 at other nodes.
 
-    Parameters
-    ----------
-    surface : Surface
-        The slave or the master.
-    positions : FloatArray, shape (n_nodes, 2)
-        The positions of all nodes of the interface.
-    traction : Field
-        The traction (n, 2) at places (n, 2), force per length, that acts on the body of this surface.
-    parts : int
-        The number of equal parts that each segment is divided into.
-
-    Returns
-    -------
-    FloatArray, shape (n_nodes, 2)
-        The forces; 0 at nodes of the other surface.
+    The traction, force per length, acts on the body of this surface. Each segment is divided into equal parts.
     """
     share, places, weights = _quadrature(surface, positions, parts)
     loads = traction(places.reshape(-1, 2)).reshape(places.shape) * weights[..., None]  # (n_segments, n_points, 2)
@@ -201,14 +161,10 @@ def traction_forces(surface: Surface, positions: FloatArray, traction: Field, pa
 
 
 def force_error(forces: FloatArray, exact: FloatArray, integrals: FloatArray) -> float:
-    """Return E_F, the error of nodal forces over the exact ones, dimensionless.
+    """Return E_F, the error of nodal forces (n_nodes, 2) over the exact ones, dimensionless.
 
-    Parameters
-    ----------
-    forces, exact : FloatArray, shape (n_nodes, 2)
-        The forces and the exact ones.
-    integrals : FloatArray, shape (n_nodes,)
-        The integrals m_i = ∫N_i ds. Nodes where it is 0 do not count, so that those of one surface select it.
+    The integrals are m_i = ∫N_i ds (n_nodes,). Nodes where it is 0 do not count, so that those of one surface select
+    it.
     """
     counted = integrals > 0
     weights = 1 / integrals[counted, None]
@@ -216,25 +172,14 @@ def force_error(forces: FloatArray, exact: FloatArray, integrals: FloatArray) ->
 
 
 def pressure_error(solution: Solution, exact: Field, scale: float) -> float | None:
-    """Return the root mean square of p − p^exact at the contact points over `scale`.
+    """Return the root mean square of p − p^exact at the contact points over a pressure `scale`.
 
     A point counts with the weight that the plugin gives it, a weighted node with ∫ of its shape. A nodal force counts
-    as a pressure F_i/m_i with the weight m_i, the current ∫N_i ds. An idle point has the pressure 0.
+    as a pressure F_i/m_i with the weight m_i, the current ∫N_i ds. An idle point has the pressure 0. The exact pressure
+    is that at current places of the slave.
 
-    Parameters
-    ----------
-    solution : Solution
-        The solved scene.
-    exact : Field
-        The exact pressure (n,) at current places (n, 2) of the slave.
-    scale : float
-        The pressure that the error is divided by.
-
-    Returns
-    -------
-    float | None
-        The error, dimensionless; infinite if no point has a weight. None if nothing is reported, or if two passes share
-        the pressure, since nobody says how.
+    The error is infinite if no point has a weight. It is None if nothing is reported, or if two passes share the
+    pressure, since no rule says how.
     """
     points = solution.points
     if points is None or points.on_master.any():
@@ -256,18 +201,8 @@ def displacement_error(
 ) -> float:
     """Return the L2 error of the displacements of a surface over the L2 norm of the exact ones.
 
-    Parameters
-    ----------
-    surface : Surface
-        The slave or the master.
-    positions : FloatArray, shape (n_nodes, 2)
-        The reference positions of all nodes of the interface.
-    displacements : FloatArray, shape (n_nodes, 2)
-        Their displacements, which are interpolated linearly.
-    exact : Field
-        The exact displacement (n, 2) at reference places (n, 2) of this surface.
-    parts : int
-        The number of equal parts that each segment is divided into.
+    Positions (n_nodes, 2) and the places of the exact field are those of the reference. Displacements (n_nodes, 2) are
+    interpolated linearly. Each segment is divided into equal parts.
     """
     share, places, weights = _quadrature(surface, positions, parts)
     ends = displacements[surface.segments]  # (n_segments, 2, 2)
@@ -280,19 +215,8 @@ def displacement_error(
 def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | FloatArray, floor: float = 0.0) -> float:
     """Return the slope of log error over log h, fitted by least squares.
 
-    Parameters
-    ----------
-    sizes : Sequence[float] or FloatArray, shape (n_meshes,)
-        The sizes h of the meshes, in any unit.
-    errors : Sequence[float] or FloatArray, shape (n_meshes,)
-        The errors on these meshes.
-    floor : float
-        Errors up to this value are roundoff, and do not count.
-
-    Returns
-    -------
-    float
-        The rate; infinite if fewer than two errors are above the floor, NaN if an error is.
+    Errors up to the floor are roundoff, and do not count. The rate is infinite if fewer than two errors are above the
+    floor, NaN if an error is.
     """
     values = np.asarray(errors, dtype=np.float64)
     if np.isnan(values).any():

@@ -164,10 +164,7 @@ def pressure_of(case: Case, penalty: float) -> float:
 def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:
     """Return the unknowns q (n_free,) of the exact solution of a uniform scene.
 
-    Returns
-    -------
-    FloatArray, shape (n_free,)
-        Both surfaces move along the normal alone: the master by p H2/M2, the slave by p/ε̂ more.
+    Both surfaces move along the normal alone: the master by p H2/M2, the slave by p/ε̂ more.
     """
     _, master = scene.facts["compliance"]
     down = {True: -pressure * (master + 1 / penalty), False: -pressure * master}

@@ -231,26 +231,7 @@ def make_disk(
     force: float = 1e6,
     lowered: float | None = None,
 ) -> Scene:
-    """Return the disk on its foundation of Example 2, in the paper's units.
-
-    Parameters
-    ----------
-    refine : int
-        The number of parts that each side of each cell is divided into.
-    penalty : float
-        The distributed stiffness ε̂.
-    young : float
-        Young's modulus E of the disk.
-    ratio : float
-        E of the foundation over E of the disk.
-    poisson : float
-        Poisson's ratio of both bodies.
-    force : float
-        The force on top of the disk, per unit of thickness.
-    lowered : float | None
-        The depth to which the disk is pushed in the first guess. By default the contact is then about as wide as in the
-        solution.
-    """
+    """Return the disk (slave) on its foundation (master) of Example 2, in the paper's units."""
     problem = DiskProblem(young=(young, ratio * young), poisson=poisson, force=force, penalty=penalty)
     return disk_on_foundation(problem, refine=refine, lowered=lowered, name="example-2")
 
@@ -270,28 +251,8 @@ def make_blocks(
 ) -> Scene:
     """Return a scene of two blocks by its name.
 
-    Parameters
-    ----------
-    name : str
-        A key of `BLOCKS`.
-    refine : int
-        The number of parts that each segment and each layer is divided into.
-    penalty : float | None
-        The distributed stiffness ε̂; by default 10 E/h with the mean slave segment h.
-    young : float
-        Young's modulus E of the slave.
-    ratio : float
-        E of the master over E of the slave.
-    poisson : float
-        Poisson's ratio of both blocks.
-    pressure : float | None
-        The pressure on top; by default that of the description.
-    degrees : float
-        The angle by which the whole scene is rotated, counter-clockwise.
-    sides : Literal['rollers', 'free']
-        The support of the vertical sides. Free sides strain, so that the contact area changes.
-    lowered : float | None
-        The depth to which the slave is pushed in the first guess: 0 begins where the blocks touch. By default p/ε̂.
+    `ratio` is E of the master over E of the slave, `degrees` turns the scene counter-clockwise. Free sides strain, so
+    that the contact area changes. By default the penalty is 10 E/h with the mean slave segment h.
     """
     drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure

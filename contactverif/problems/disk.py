@@ -89,17 +89,9 @@ def disk_on_foundation(
 ) -> Scene:
     """Return the scene of the disk (slave) on the foundation (master); they touch in the origin.
 
-    Parameters
-    ----------
-    problem : DiskProblem
-        The radius, the force, the materials and the penalty.
-    refine : int
-        The number of parts that each side of each cell is divided into.
-    lowered : float | None
-        The depth to which the disk is pushed in the first guess; by default a²/2R with the half-width a that Hertz on a
-        Winkler layer has, so that what is in contact hardly changes afterwards.
-    name : str
-        The name of the scene.
+    `refine` is the number of parts that each side of each cell is divided into. `lowered` is the depth of the first
+    guess; by default a²/2R with the half-width a that Hertz on a Winkler layer has, so that what is in contact hardly
+    changes.
     """
     a = problem.half_width
     low, high = SLOPES[0] * problem.radius, SLOPES[1] * problem.radius
@@ -166,16 +158,7 @@ def disk_mesh(radius: float, fine: float, refine: int = 1) -> tuple[FloatArray, 
 
     A square in the middle of the unit disk and four blocks around it, pulled towards the lowest point by the conformal
     map z → (z − iα) / (1 + iαz). That keeps angles, so that cells are as well shaped as where the mesh is even, and as
-    large as they are far from the contact.
-
-    Parameters
-    ----------
-    radius : float
-        The radius of the disk.
-    fine : float
-        Segments within |x| ≤ fine are equally long, and are the contact edges; so are those of the block above.
-    refine : int
-        The number of parts that each side of each cell is divided into.
+    large as they are far from the contact. Segments within |x| ≤ fine are equally long, and are the contact edges.
     """
     columns, rows, _ = (count * refine for count in SEGMENTS)
     arc = asin(fine / radius)

@@ -52,28 +52,9 @@ def flat_state(
 ) -> Case:
     """Return a straight slave that penetrates the flat part of a master by the same depth everywhere.
 
-    Parameters
-    ----------
-    name : str
-        The name of the case.
-    slave : Sequence[float]
-        The ascending places of the slave nodes in the frame.
-    master : Master
-        The master.
-    depth : float
-        The penetration in the frame; lengths of the frame become r times as long.
-    turn : Turn
-        The triple that turns and stretches the frame.
-    offset : tuple[float, float]
-        The place of the frame's origin, a length each.
-    penalty : float
-        The distributed stiffness ε̂.
-
-    Returns
-    -------
-    Case
-        A case with the parameters `penetration`, `along` (n_nodes,), `direction` (2,) and `weights` (n_nodes,). A
-        weight is the length that a uniform pressure on the node acts on; it is 0 off the flat part.
+    Places of the slave's nodes ascend in the frame, whose origin lies at the offset; its lengths become r times as long
+    by the turn. The parameters of the case are `penetration`, `along` (n_nodes,), `direction` (2,) and `weights`
+    (n_nodes,). A weight is the length that a uniform pressure on the node acts on; it is 0 off the flat part.
     """
     slave_nodes = _place([(place, -depth) for place in slave], turn, offset)
     master_nodes = _place(master.points, turn, offset)

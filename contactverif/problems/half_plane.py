@@ -13,6 +13,8 @@ surface) and 4.49 (McEwan's stresses under Hertz' pressure).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -20,41 +22,20 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.problems.line_pressure import LinePressure
 
+_POINTS = 8  # Number of Gauss points on each edge of a loaded side.
 _CHUNK = 512  # Number of points that are superposed at once, so that tables stay in the cache.
 
 
 def line_load_stresses(x: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the stresses of a line load of 1 per thickness at x = 0 that presses into the body (Johnson, 2.14).
-
-    Parameters
-    ----------
-    x, depth : FloatArray, shape (...,)
-        The place, a length each; not the load's own.
-
-    Returns
-    -------
-    FloatArray, shape (..., 3)
-        The stresses σ_xx, σ_ηη and σ_xη, per length.
-    """
+    """Return the stresses σ_xx, σ_ηη and σ_xη (..., 3) of a line load of 1 that presses at x = 0 (Johnson, 2.14)."""
     factor = -2 * depth / (pi * (x**2 + depth**2) ** 2)
     return np.stack([factor * x**2, factor * depth**2, factor * x * depth], axis=-1)
 
 
 def line_load_displacements(x: FloatArray, depth: FloatArray, poisson: float) -> FloatArray:
-    """Return E/(1 − ν²) times the displacements of a line load of 1 per thickness at x = 0 (Johnson, 2.19).
+    """Return E/(1 − ν²) times the displacements (..., 2) of a line load of 1 per thickness at x = 0 (Johnson, 2.19).
 
-    Parameters
-    ----------
-    x, depth : FloatArray, shape (...,)
-        The place, a length each; not the load's own.
-    poisson : float
-        Poisson's ratio ν.
-
-    Returns
-    -------
-    FloatArray, shape (..., 2)
-        The displacements along x and into the body, without unit: a displacement times E/(1 − ν²) over a force per
-        thickness.
+    They are along x and into the body, without unit.
     """
     contraction, square = poisson / (1 - poisson), x**2 + depth**2
     along = -(1 - contraction) * np.arctan2(x, depth) + (1 + contraction) * x * depth / square
@@ -63,19 +44,10 @@ def line_load_displacements(x: FloatArray, depth: FloatArray, poisson: float) ->
 
 
 def stresses(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the stresses under a pressure on the surface, by superposing Flamant's solution.
+    """Return the stresses σ_xx, σ_ηη and σ_xη (n, 3) under a pressure, by superposing Flamant's solution.
 
-    Parameters
-    ----------
-    pressure : LinePressure
-        The pressure.
-    x, depth : FloatArray, shape (n,)
-        The places, some way from the loaded strip: the error is 1e-11 of the peak at a distance a, 1e-8 at a/4.
-
-    Returns
-    -------
-    FloatArray, shape (n, 3)
-        The stresses σ_xx, σ_ηη and σ_xη, force per length squared.
+    Places x and depth (n,) are some way from the loaded strip: the error is 1e-11 of the peak at a distance a, 1e-8 at
+    a/4.
     """
     places, forces = pressure.line_loads()
     parts = [
@@ -86,21 +58,9 @@ def stresses(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatA
 
 
 def displacements(pressure: LinePressure, x: FloatArray, depth: FloatArray, young: float, poisson: float) -> FloatArray:
-    """Return the displacements under a pressure on the surface, by superposing Flamant's solution.
+    """Return the displacements (n, 2) along x and into the body under a pressure, by superposing Flamant's solution.
 
-    Parameters
-    ----------
-    pressure : LinePressure
-        The pressure.
-    x, depth : FloatArray, shape (n,)
-        The places, some way from the loaded strip.
-    young, poisson : float
-        Young's modulus E, force per length squared, and Poisson's ratio ν.
-
-    Returns
-    -------
-    FloatArray, shape (n, 2)
-        The displacements along x and into the body, a length each. Lengths in the logarithm are over the half-width.
+    Places x and depth (n,) are some way from the loaded strip. Lengths in the logarithm are over the half-width.
     """
     places, forces = pressure.line_loads()
     unit = pressure.half_width
@@ -128,20 +88,7 @@ def surface_displacements(pressure: LinePressure, x: FloatArray, young: float, p
 
 
 def mcewan_stresses(x: FloatArray, depth: FloatArray, half_width: float, peak: float) -> FloatArray:
-    """Return the stresses (..., 3) under Hertz' pressure in closed form (McEwan; Johnson, 4.49).
-
-    Parameters
-    ----------
-    x, depth : FloatArray, shape (...,)
-        The place, a length each; anywhere in the body.
-    half_width, peak : float
-        The half-width a of the contact and the pressure p0 in its middle.
-
-    Returns
-    -------
-    FloatArray, shape (..., 3)
-        The stresses σ_xx, σ_ηη and σ_xη, force per length squared.
-    """
+    """Return the stresses σ_xx, σ_ηη and σ_xη (..., 3) under Hertz' pressure in closed form (McEwan; Johnson, 4.49)."""
     inside = half_width**2 - x**2 + depth**2
     root = np.hypot(inside, 2 * x * depth)
     m = np.sqrt((root + inside) / 2)
@@ -151,6 +98,37 @@ def mcewan_stresses(x: FloatArray, depth: FloatArray, half_width: float, peak: f
     normal = [m * (1 + share) - 2 * depth, m * (1 - share)]
     shear = n * (m**2 - depth**2) / square
     return -peak / half_width * np.stack([*normal, shear], axis=-1)
+
+
+def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
+    """Return the nodal forces (m, n, 2) of the half-plane's stresses on both sides and on the far edge of a box.
+
+    They are along x and into the body, at columns x (n,) and rows (m,).
+    """
+    forces = np.zeros((len(depth), len(x), 2))
+
+    def traction_on_side(place: float, depths: FloatArray) -> FloatArray:
+        return stresses(pressure, np.full(len(depths), place), depths)[:, [0, 2]]
+
+    def traction_below(places: FloatArray) -> FloatArray:
+        return stresses(pressure, places, np.full(len(places), float(depth[-1])))[:, [2, 1]]
+
+    for column, sign in ((0, -1), (-1, 1)):
+        forces[:, column] += sign * _edge_forces(depth, partial(traction_on_side, float(x[column])))
+    forces[-1] += _edge_forces(x, traction_below)
+    return forces
+
+
+def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return ∫ N_i t ds (n, 2) along a side with nodes at `lines` (n,)."""
+    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+    share, lengths = (points + 1) / 2, np.diff(lines)
+    places = lines[:-1, None] + share * lengths[:, None]
+    values = traction(places.reshape(-1)).reshape(*places.shape, 2) * (weights / 2 * lengths[:, None])[..., None]
+    forces = np.zeros((len(lines), 2))
+    forces[:-1] += np.einsum("p,epk->ek", 1 - share, values)
+    forces[1:] += np.einsum("p,epk->ek", share, values)
+    return forces
 
 
 def _chunks(x: FloatArray, depth: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

@@ -77,19 +77,9 @@ def solve_winkler_contact(
 ) -> WinklerContact:
     """Solve Hertz on a Winkler layer.
 
-    The equation is p/ε̂ − (2/πE*) ∫ p(s) ln|x − s| ds = δ − x²/2R in contact, and p = 0 at its edge.
-
-    There the layer is not pressed any more: p falls to 0 with a finite slope. Collocation at Gauss points with
-    even Legendre polynomials, whose integrals with the logarithm are known; the half-width is the one that gives F.
-
-    Parameters
-    ----------
-    force : float
-        The force F > 0, per unit of thickness.
-    radius, stiffness, penalty : float
-        The radius R, the stiffness E* and the penalty ε̂.
-    terms : int
-        The number of polynomials.
+    The equation is p/ε̂ − (2/πE*) ∫ p(s) ln|x − s| ds = δ − x²/2R in contact, and p = 0 at its edge. There the layer is
+    not pressed any more: p falls to 0 with a finite slope. Collocation at Gauss points with even Legendre polynomials,
+    whose integrals with the logarithm are known; the half-width is the one that gives the force F > 0 per thickness.
     """
     widest = _WIDEST * max(half_width(force, radius, stiffness), layer_half_width(force, radius, penalty))
 

@@ -23,7 +23,6 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache, partial
 from itertools import product
@@ -40,7 +39,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import grade
-from contactverif.problems.half_plane import displacements, stresses, surface_displacements
+from contactverif.problems.half_plane import displacements, side_forces, surface_displacements
 from contactverif.problems.line_pressure import LinePressure, hertz_contact, layer_contact
 from contactverif.problems.problem import (
     FORCES,
@@ -61,7 +60,6 @@ COARSEST = 16  # Number of the parabola's segments across the contact on the coa
 RATIO = 8 / 7  # The flat has at least so many segments for each of the parabola's.
 GROWTH = 0.3  # Cells grow by this share of their distance from the zone on the coarsest mesh, by √h/h₀ of it on others.
 CACHE_SIZE = 256  # The number of exact fields that are remembered: those of all meshes, penalties and bodies are 144.
-_POINTS = 8  # Number of Gauss points on each edge of a loaded side.
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,20 +102,8 @@ def hertz_box(
 ) -> Scene:
     """Return the scene. Its first guess lowers the parabola as it is by a²/2R, so that it penetrates for |x| < a.
 
-    Parameters
-    ----------
-    box : HertzBox
-        Lengths and materials.
-    penalty : float
-        The penalty ε̂ of the scene.
-    rigid_layer : bool
-        True takes the exact solution of multipliers, 1/ε̂ = 0, and uses the penalty for nothing else.
-    across : int
-        The number of the parabola's segments across the contact, 2a/h − 1/3.
-    parabola_is_slave : bool
-        False makes the flat the slave.
-    name : str
-        The name of the scene.
+    A rigid layer is the exact solution of multipliers, 1/ε̂ = 0. `across` is the number of the parabola's segments
+    across the contact, 2a/h − 1/3.
     """
     if across < COARSEST:
         raise MisuseError("across", f"{across}", f"at least {COARSEST} segments across the contact")
@@ -130,16 +116,7 @@ def hertz_box(
 def hertz_body(box: HertzBox, number: int, *, penalty: float | None, across: int = COARSEST) -> Body:
     """Return parabola (0) or flat (1) with its tractions and supports; the parabola lies above, y = x²/2R + η.
 
-    Parameters
-    ----------
-    box : HertzBox
-        Lengths and materials.
-    number : int
-        0 is the parabola, 1 the flat.
-    penalty : float | None
-        The distributed penalty ε̂ of the exact solution; None is that of multipliers.
-    across : int
-        The number of the parabola's segments across the contact, 2a/h − 1/3.
+    The penalty is that of the exact solution; None is that of multipliers.
     """
     pressure, a = box.pressure(penalty), box.half_width
     x, depth, zone = (a * lines for lines in mesh_lines(number, across))
@@ -206,80 +183,11 @@ def segments_across(number: int, across: int) -> int:
     return count
 
 
-def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the nodal forces of the half-plane's stresses on both sides and on the far edge of a box.
-
-    Parameters
-    ----------
-    pressure : LinePressure
-        The pressure on the surface η = 0.
-    x, depth : FloatArray, shapes (n,) and (m,)
-        The columns and the rows of the box, ascending lengths.
-
-    Returns
-    -------
-    FloatArray, shape (m, n, 2)
-        The forces along x and into the body, per thickness.
-    """
-    forces = np.zeros((len(depth), len(x), 2))
-    for column, sign in ((0, -1), (-1, 1)):
-        forces[:, column] += sign * _edge_forces(depth, partial(_traction_on_side, pressure, float(x[column])))
-    forces[-1] += _edge_forces(x, partial(_traction_below, pressure, float(depth[-1])))
-    return forces
-
-
-def _traction_on_side(pressure: LinePressure, x: float, depth: FloatArray) -> FloatArray:
-    """Return σ_xx and σ_xη (n, 2) at depths (n,) on the side at x."""
-    return stresses(pressure, np.full(len(depth), x), depth)[:, [0, 2]]
-
-
-def _traction_below(pressure: LinePressure, depth: float, x: FloatArray) -> FloatArray:
-    """Return σ_xη and σ_ηη (n, 2) at x (n,) on the far edge."""
-    return stresses(pressure, x, np.full(len(x), depth))[:, [2, 1]]
-
-
-def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return ∫ N_i t ds (n, 2) along a side with nodes at `lines` (n,)."""
-    points, weights = np.polynomial.legendre.leggauss(_POINTS)
-    share, lengths = (points + 1) / 2, np.diff(lines)
-    places = lines[:-1, None] + share * lengths[:, None]
-    values = traction(places.reshape(-1)).reshape(*places.shape, 2) * (weights / 2 * lengths[:, None])[..., None]
-    forces = np.zeros((len(lines), 2))
-    forces[:-1] += np.einsum("p,epk->ek", 1 - share, values)
-    forces[1:] += np.einsum("p,epk->ek", share, values)
-    return forces
-
-
-def nodal_forces(pressure: LinePressure, x: FloatArray) -> FloatArray:
-    """Return ∫ N_i p ds (n,) at ascending nodes x (n,), exact."""
-    force, moment = np.diff(pressure.force_up_to(x)), np.diff(pressure.moment_up_to(x))
-    towards_second = (moment - x[:-1] * force) / np.diff(x)
-    forces = np.zeros(len(x))
-    forces[1:] += towards_second
-    forces[:-1] += force - towards_second
-    return forces
-
-
 def exact_displacements(box: HertzBox, penalty: float | None, number: int, x: FloatArray, across: int) -> FloatArray:
-    """Return the exact displacements of the surface of a body, along x and upwards.
+    """Return the exact displacements (n, 2) of the surface of a body at x (n,), along x and upwards.
 
-    Parameters
-    ----------
-    box : HertzBox
-        Lengths and materials.
-    penalty : float | None
-        The distributed penalty ε̂ of the exact solution; None is that of multipliers.
-    number : int
-        0 is the parabola, 1 the flat.
-    x : FloatArray, shape (n,)
-        The places, a length each.
-    across : int
-        The number of the parabola's segments across the contact, which says where the named point of the flat is.
-
-    Returns
-    -------
-    FloatArray, shape (n, 2)
-        The flat's displacements are those relative to its named point; the parabola's are such that both surfaces fit.
+    The flat's displacements are those relative to its named point, which the mesh (`across`) chooses; the parabola's
+    are such that both surfaces fit. The penalty None is that of multipliers.
     """
     return _exact_displacements(box, penalty, number, _Places(x.tobytes(), x), across)
 
@@ -323,7 +231,7 @@ def exact_forces(
     for side, nodes in _sides(interface):
         order = nodes[np.argsort(positions[nodes, 0])]
         up = 1.0 if _number(side, parabola_is_slave) == 0 else -1.0
-        forces[order, 1] = up * nodal_forces(pressure, positions[order, 0])
+        forces[order, 1] = up * pressure.nodal_forces(positions[order, 0])
     return forces
 
 

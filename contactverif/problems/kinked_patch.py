@@ -79,17 +79,7 @@ class KinkedPatch:
         return answer
 
     def displacement(self, places: FloatArray, penetration: float, *, upper: bool) -> FloatArray:
-        """Return the displacement (n, 2) of one block at places (n, 2): both contract, and the upper one moves down.
-
-        Parameters
-        ----------
-        places : FloatArray, shape (n, 2)
-            Places in the reference configuration.
-        penetration : float
-            The penetration p/ε̂, a length; 0 for multipliers.
-        upper : bool
-            The block.
-        """
+        """Return the displacement (n, 2) of one block at places (n, 2): both contract, and the upper one moves down."""
         hinge = np.array([self.line[0][0], -self.height])
         displacement: FloatArray = -self.contraction * (places - hinge)
         return displacement + self.translation(penetration) if upper else displacement
@@ -123,14 +113,7 @@ def patch_of(case: Case) -> tuple[KinkedPatch, bool]:
 def exact_unknowns(problem: KinkedPatch, scene: Scene, penetration: float) -> FloatArray:
     """Return the unknowns q (n_free,) of the uniform state, which solves the scene if there are two normals.
 
-    Parameters
-    ----------
-    problem : KinkedPatch
-        The problem.
-    scene : Scene
-        Its scene.
-    penetration : float
-        The penetration p/ε̂, a length; 0 for multipliers.
+    The penetration is p/ε̂, a length; 0 for multipliers.
     """
     parts = []
     for index, unknowns in zip(scene.bodies_in_reach, scene.unknowns, strict=True):

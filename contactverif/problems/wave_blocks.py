@@ -38,22 +38,10 @@ _GAUSS = np.polynomial.legendre.leggauss(8)  # Exact to roundoff for an eighth o
 
 @cache
 def wave_blocks(n_slave: int, n_master: int, penalty: float, *, wave: float) -> Scene:
-    """Return two blocks under the mean pressure and a wave.
+    """Return two blocks under the mean pressure and a wave of an amplitude, force per length; 0 leaves it out.
 
-    Parameters
-    ----------
-    n_slave, n_master : int
-        The numbers of segments. Those of the master shorten from left to right, unless both numbers agree.
-    penalty : float
-        The distributed stiffness ε̂ times h/E, with the slave segment h.
-    wave : float
-        The amplitude of the wave, force per length; 0 leaves it out.
-
-    Returns
-    -------
-    Scene
-        The blocks. Its facts are those of a uniform pressure without the wave, and "columns" (2,) and "stiffness" (),
-        the arguments.
+    The segments of the master shorten from left to right, unless both numbers agree. The penalty is ε̂ h/E, with the
+    slave segment h. The facts are those of a uniform pressure without the wave, and "columns" (2,) and "stiffness" ().
     """
     distributed = penalty * n_slave / LENGTH
     uniform = _uniform_blocks(n_slave, n_master)
@@ -108,15 +96,7 @@ def matching_answer(n_columns: int, distributed: float) -> WaveAnswer:
 
 
 def wave_work(scene: Scene, wavy: Scene, before: FloatArray, after: FloatArray) -> float:
-    """Return the work of the wave's load on the displacements between two solutions.
-
-    Parameters
-    ----------
-    scene, wavy : Scene
-        The blocks without the wave and with it.
-    before, after : FloatArray, shape (n_free,)
-        The unknowns of their solutions.
-    """
+    """Return the work of the wave's load on the displacements between two solutions (n_free,)."""
     load = wavy.bodies[0].load - scene.bodies[0].load
     return float((load * (wavy.displacements(after)[0] - scene.displacements(before)[0])).sum())
 

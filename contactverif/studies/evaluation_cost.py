@@ -31,13 +31,7 @@ SEGMENTS = (16, 256)  # Slave segments: few show what a call costs, many show wh
 def measure_costs(
     subjects: Sequence[Subject], cases: Sequence[Case] | None = None, turns: int = TURNS
 ) -> tuple[Cost, ...]:
-    """Time each formulation on each state, in turns.
-
-    Returns
-    -------
-    tuple[Cost, ...]
-        The fastest times, in seconds, for each state and formulation.
-    """
+    """Time each formulation on each state, in turns, and return the fastest times."""
     costs: list[Cost] = []
     for case in cases if cases is not None else [make_state(n) for n in SEGMENTS]:
         timers = [_Timer(subject, case) for subject in subjects]

@@ -314,29 +314,12 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
 def _solve(
     scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
 ) -> tuple[Trace, FloatArray]:
-    """Solve a scene and return Newton's trace and the solution that is judged.
+    """Return Newton's trace, and the solution (n_free + n_multipliers,) that is judged.
 
     Newton's method may end elsewhere than at the exact solution, since large motions have other solutions too. Then it
     starts again at the exact solution, where a formulation that passes is in balance and does not move. A formulation
-    that is not in balance there is judged where it comes nearest to balance afterwards.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene to solve.
-    formulation : CheckedFormulation
-        The formulation, with its penalty.
-    exact : FloatArray, shape (n_free + n_multipliers,)
-        The exact solution.
-    penetration : float
-        The exact penetration p/ε̂, a length; distances from the exact solution are measured by it.
-
-    Returns
-    -------
-    trace : Trace
-        The first solution.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns that are judged.
+    that is not in balance there is judged where it comes nearest to balance afterwards. Distances from the exact
+    solution are measured by its penetration p/ε̂.
     """
     trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     if is_solved(trace, exact, penetration):

@@ -15,7 +15,6 @@ from contactverif.problems.hertz_box import (
     hertz_body,
     hertz_box,
     mesh_lines,
-    nodal_forces,
 )
 from contactverif.run.registry import load_formulation
 
@@ -70,7 +69,7 @@ def test_the_exact_surfaces_fit(penalty: float | None) -> None:
 
 def test_nodal_forces_are_consistent() -> None:
     pressure, x = BOX.pressure(8.0), np.linspace(-1.3, 1.3, 14)
-    forces = nodal_forces(pressure, x)
+    forces = pressure.nodal_forces(x)
     assert forces.sum() == pytest.approx(pressure.force, rel=1e-12)
     assert forces @ x == pytest.approx(0, abs=1e-12 * pressure.force)
     points, weights = np.polynomial.legendre.leggauss(30)

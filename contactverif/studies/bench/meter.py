@@ -27,17 +27,7 @@ PART_OF_VERB = {"pair": "pair", "residual": "residual", "tangent": "tangent", "r
 
 
 class Meter:
-    """Seconds and counts of one solution.
-
-    Attributes
-    ----------
-    seconds : dict[str, float]
-        The time of "pair", "residual", "tangent" and "differences".
-    states : dict[str, int]
-        The numbers of states at which they were computed.
-    differencing : bool
-        True while Newton's method differentiates forces by differences.
-    """
+    """Seconds and counts of one solution."""
 
     def __init__(self) -> None:
         parts = ("pair", "residual", "tangent", "differences")

@@ -28,13 +28,7 @@ ACCURATE = 1e-2  # A random scene is solved if the error of the forces is at mos
 
 
 def pareto_front(times: FloatArray, errors: FloatArray) -> BoolArray:
-    """Return which runs (n,) no other run beats in time and error at once.
-
-    Parameters
-    ----------
-    times, errors : FloatArray, shape (n,)
-        Times and errors. A run whose time or error is not finite is not on the front.
-    """
+    """Return which runs (n,) no other run beats in time and error at once; both are finite on the front."""
     finite = np.isfinite(times) & np.isfinite(errors)
     front = np.zeros(len(times), dtype=np.bool_)
     least = inf
@@ -55,10 +49,7 @@ def time_to_reach(
 def cost_ratio(results: BenchResults, formulation: str, scene: str, reference: str = REFERENCE) -> float:
     """Return the time to an error of 1 % in the forces over that of the reference.
 
-    Returns
-    -------
-    float
-        The ratio; infinite if the formulation never reaches the error, NaN if the reference does not.
+    It is infinite if the formulation never reaches the error, NaN if the reference does not.
     """
     time, other = (time_to_reach(results, name, scene, SENTENCE_TARGET) for name in (formulation, reference))
     return time / other if isfinite(other) else np.nan
@@ -133,13 +124,7 @@ def cost_sentence(results: BenchResults, scene: str, names: Sequence[str] | None
 
 
 def harness_share(results: BenchResults, formulation: str) -> float:
-    """Return the share of the time of all solutions in which neither the plugin nor a linear solver works.
-
-    Returns
-    -------
-    float
-        The share, 0 to 1; NaN without a solution.
-    """
+    """Return the share of the time of all solutions in which neither plugin nor linear solver works; NaN for none."""
     row = results.formulations.index(formulation)
     *parts, total = results.fastest[row, results.outcomes[row] == Outcome.SOLVED].sum(axis=0)  # As in PARTS.
     return float(1 - sum(parts) / total) if total > 0 else np.nan

@@ -64,15 +64,7 @@ def make_multiples_figure(
 
 
 def hide_empty_panels(panels: Any, n_used: int, n_columns: int) -> None:
-    """Hide the panels behind the last used one, and write the ticks of a column below its last panel.
-
-    Parameters
-    ----------
-    panels : sequence of Axes
-        The panels, row by row.
-    n_used, n_columns : int
-        The number of panels that are used, and of columns.
-    """
+    """Hide the panels behind the last used one, and write the ticks of a column below its last panel."""
     for axes in panels[n_used:]:
         axes.set_visible(False)
     for axes in panels[max(0, n_used - n_columns) : n_used]:
