@@ -44,6 +44,16 @@ class Changed:
         return getattr(self.inner, name)
 
 
+def reporting(change: Callable[[Any], Any], make: Callable[..., Any]) -> Subject:
+    """Return a formulation that computes the right thing, and reports `change(points)` in place of its points."""
+
+    def make_reporter(*, penalty: float) -> Changed:
+        inner = make(penalty=penalty)
+        return Changed(inner, contact_points=lambda *state: change(inner.contact_points(*state)))
+
+    return Subject("reporter", make_reporter)
+
+
 def with_promises(make: Callable[..., Any], **promises: Any) -> Subject:
     """Return a formulation that promises something else: `make` is its factory, `promises` are traits."""
 

@@ -35,17 +35,9 @@ def _leaves_out(drop: Keep, make: Any = contactverif_nts.vts_ppt_balanced) -> An
     return mutant
 
 
-def _is_on_a_node(interface: Any, x: Any, points: Any) -> Any:
-    return (points.xi == 0) | (points.xi == 1)
-
-
 def _is_a_rounding_beside_a_node(interface: Any, x: Any, points: Any) -> Any:
     distance = np.minimum(np.abs(points.xi), np.abs(1 - points.xi))
     return (distance > 0) & (distance < 1e-14)
-
-
-def _is_deep(interface: Any, x: Any, points: Any) -> Any:
-    return points.gap < -0.4 * interface.master.lengths(x).max()
 
 
 def _is_off_the_nearest_node(interface: Any, x: Any, points: Any) -> Any:
@@ -73,18 +65,6 @@ def _is_between_two_segments(interface: Any, x: Any, points: Any) -> Any:
     first, second = tangents[order[:, 0]], tangents[order[:, 1]]
     turned = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3
     return near & turned
-
-
-def _is_off_its_segment(interface: Any, x: Any, points: Any) -> Any:
-    return (points.xi < 0) | (points.xi > 1)
-
-
-def _has_a_short_area(interface: Any, x: Any, points: Any) -> Any:
-    return points.weight < 5e-3 * interface.slave.lengths(x).min()
-
-
-def _is_on_a_short_segment(interface: Any, x: Any, points: Any) -> Any:
-    return interface.slave.lengths(x)[points.slave_segment] < 1e-4 * interface.slave.lengths(x).max()
 
 
 def _rounds_positions(bits: int, scale: Callable[[Any], float]) -> Any:
@@ -174,11 +154,6 @@ def _divides_by_the_cosine(*, penalty: float) -> Any:
     return Wrapped(penalty, contactverif_nts.nts_ar, residual=residual)
 
 
-def _covers_many_segments(interface: Any, x: Any, points: Any) -> Any:
-    """Say which areas of competence are longer than two master segments are on average."""
-    return points.weight > 2.2 * interface.master.lengths(x).mean()
-
-
 def _counts_twice(make: Any, double: Keep) -> Any:
     """Double all forces where `double(interface, x, points)` says so of a point."""
 
@@ -197,22 +172,28 @@ def _counts_twice(make: Any, double: Keep) -> Any:
 
 
 MUTANTS = (
-    Mutant("point exactly over a master node left out", "hard.c", _leaves_out(_is_on_a_node)),
+    Mutant("point exactly over a master node left out", "hard.c",
+           _leaves_out(lambda interface, x, points: (points.xi == 0) | (points.xi == 1))),
     Mutant("point a rounding beside a master node counted twice", "hard.node-hit",
            _counts_twice(contactverif_nts.vts_me, _is_a_rounding_beside_a_node)),
-    Mutant("point on a tiny segment left out", "hard.short-segment", _leaves_out(_is_on_a_short_segment)),
+    Mutant("point on a tiny segment left out", "hard.short-segment",
+           _leaves_out(lambda interface, x, points: (lengths := interface.slave.lengths(x))[points.slave_segment]
+                       < 1e-4 * lengths.max())),
     Mutant("positions kept to 44 bits", "hard.offset", _rounds_positions(44, lambda z: float(np.abs(z).max()))),
-    Mutant("deep point left out", "hard.deep", _leaves_out(_is_deep)),
+    Mutant("deep point left out", "hard.deep",
+           _leaves_out(lambda interface, x, points: points.gap < -0.4 * interface.master.lengths(x).max())),
     Mutant("segments of the nearest node alone", "hard.search", _leaves_out(_is_off_the_nearest_node)),
     Mutant("positions rounded to 1e-12", "hard.stiff", _rounds_positions(40, lambda z: 1.0)),
-    Mutant("area of competence over many segments left out", "hard.contrast", _leaves_out(_covers_many_segments)),
-    Mutant("short area of competence left out", "hard.dead-zone", _leaves_out(_has_a_short_area)),
+    Mutant("area of competence over many segments left out", "hard.contrast",
+           _leaves_out(lambda interface, x, points: points.weight > 2.2 * interface.master.lengths(x).mean())),
+    Mutant("short area of competence left out", "hard.dead-zone",
+           _leaves_out(lambda interface, x, points: points.weight < 5e-3 * interface.slave.lengths(x).min())),
     Mutant("slave thicker by a millionth of a segment", "hard.zero-load", _moves_nodes(_thickens_the_slave)),
     Mutant("normal from foot to point", "hard.touch", _divides_by_the_distance),
     Mutant("point between two segments left out", "hard.convex-kink",
            _leaves_out(_is_between_two_segments, contactverif_nts.nts_ar)),
     Mutant("point with its foot on no segment left out", "hard.concave-corner",
-           _leaves_out(_is_off_its_segment, contactverif_nts.nts_ar)),
+           _leaves_out(lambda interface, x, points: (points.xi < 0) | (points.xi > 1), contactverif_nts.nts_ar)),
     Mutant("force over the cosine of the tilt", "hard.steep-slave", _divides_by_the_cosine),
     Mutant("master continued past its free end", "hard.free-end",
            _moves_nodes(_stretches_the_ends, contactverif_nts.nts_ar)),

@@ -47,18 +47,6 @@ def line(name: str, caught_by: str, module: str, old: str, new: str, *, factory:
     return Mutant(name, caught_by, changed_line(module, old, new, factory=factory))
 
 
-def _previous_slave_segment(points: Any, interface: Any, x: Any) -> Any:
-    return {"slave_segment": (points.slave_segment - 1) % len(interface.slave)}
-
-
-def _other_master_segment(points: Any, interface: Any, x: Any) -> Any:
-    return {"master_segment": (points.master_segment + 1) % len(interface.master)}
-
-
-def _foot_as_position(points: Any, interface: Any, x: Any) -> Any:
-    return {"position": points.position - points.gap[:, None] * points.normal}
-
-
 def _normal_of_reference(points: Any, interface: Any, x: Any) -> Any:
     ends = interface.nodes[interface.master.segments[points.master_segment]]
     along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
@@ -69,18 +57,6 @@ def _gap_from_coordinates(points: Any, interface: Any, x: Any) -> Any:
     """Return the gap as n·x_s − n·x_m, which loses digits far from the origin."""
     first = x[interface.master.segments[points.master_segment, 0]]
     return {"gap": (points.normal * points.position).sum(axis=1) - (points.normal * first).sum(axis=1)}
-
-
-def _weight_of_whole_segment(points: Any, interface: Any, x: Any) -> Any:
-    return {"weight": interface.slave.lengths(x)[points.slave_segment]}
-
-
-def _area_from_first_node(points: Any, interface: Any, x: Any) -> Any:
-    return {"area_from": np.full_like(points.c, -1.0)}
-
-
-def _area_of_two_thirds(points: Any, interface: Any, x: Any) -> Any:
-    return {"area_to": points.area_to - (points.area_to - points.area_from) / 3}
 
 
 def _neighbour_decides(penalty: float) -> Any:
@@ -108,24 +84,21 @@ def _beside_no_master(points: Any, interface: Any, x: Any) -> Any:
     return {"position": place, "master_segment": np.full_like(points.master_segment, -1)}
 
 
-def _two_for_half(points: Any, interface: Any, x: Any) -> Any:
-    return {"pressure": 2 * points.pressure, "weight": points.weight / 2}
-
-
-def _points_as_weighted_nodes(points: Any, interface: Any, x: Any) -> Any:
-    return {"weighted": ~points.weighted}
-
-
 MUTANTS = (
     reports("position of the foot, of nodes without a master segment", PLACE, _beside_no_master, MORTAR),
-    reports("nodal forces doubled over half of a weight", FORCES, _two_for_half, contactverif_nts.nts),
-    reports("points called weighted nodes", FORCES, _points_as_weighted_nodes, STS),
-    reports("slave segment of the neighbour reported", PLACE, _previous_slave_segment),
+    reports("nodal forces doubled over half of a weight", FORCES,
+            lambda points, *_: {"pressure": 2 * points.pressure, "weight": points.weight / 2}, contactverif_nts.nts),
+    reports("points called weighted nodes", FORCES,
+            lambda points, *_: {"weighted": ~points.weighted}, STS),
+    reports("slave segment of the neighbour reported", PLACE,
+            lambda points, interface, x: {"slave_segment": (points.slave_segment - 1) % len(interface.slave)}),
     reports("place on the slave reported from its other end", PLACE, lambda points, *_: {"c": -points.c}),
-    reports("another master segment reported", SEGMENT, _other_master_segment),
+    reports("another master segment reported", SEGMENT,
+            lambda points, interface, x: {"master_segment": (points.master_segment + 1) % len(interface.master)}),
     reports("ξ reported from the other end", PLACE, lambda points, *_: {"xi": 1 - points.xi}),
     reports("ξ clipped in the report", PLACE, lambda points, *_: {"xi": np.clip(points.xi, 0, 1)}),
-    reports("foot reported as position", PLACE, _foot_as_position),
+    reports("foot reported as position", PLACE,
+            lambda points, *_: {"position": points.position - points.gap[:, None] * points.normal}),
     reports("normal into the master reported", PLACE, lambda points, *_: {"normal": -points.normal}),
     reports("normal of the reference configuration reported", PLACE, _normal_of_reference),
     reports("gap reported half as large", PLACE, lambda points, *_: {"gap": points.gap / 2}, STS),
@@ -134,10 +107,14 @@ MUTANTS = (
             lambda points, *_: {"pressure": points.pressure * (1 + 1e-6)}),
     reports("idle points report a pressure", FORCES, lambda points, *_: {"pressure": np.abs(points.gap)}),
     reports("weight reported half as large", FORCES, lambda points, *_: {"weight": points.weight / 2}),
-    reports("weight of the whole segment", AREA, _weight_of_whole_segment),
+    reports("weight of the whole segment", AREA,
+            lambda points, interface, x: {"weight": interface.slave.lengths(x)[points.slave_segment]}),
     reports("weight of what is not covered", AREA, lambda points, *_: {"weight": points.weight * 1.25}, STS),
-    reports("area reported from the first node", AREA, _area_from_first_node, contactverif_nts.vts_ppt),
-    reports("two thirds of the area reported", AREA, _area_of_two_thirds, contactverif_nts.vts_ppt),
+    reports("area reported from the first node", AREA,
+            lambda points, *_: {"area_from": np.full_like(points.c, -1.0)}, contactverif_nts.vts_ppt),
+    reports("two thirds of the area reported", AREA,
+            lambda points, *_: {"area_to": points.area_to - (points.area_to - points.area_from) / 3},
+            contactverif_nts.vts_ppt),
     reports("activity of the neighbour reported", ACTIVITY, lambda points, *_: {"active": np.roll(points.active, 1)}),
     Mutant("activity of the neighbour", ACTIVITY, lambda *, penalty: _neighbour_decides(penalty)),
     line("penetrations below 1e-9 left open", ACTIVITY, "eq6",

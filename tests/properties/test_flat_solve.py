@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, load_subject
+from subjects import Changed, load_subject, reporting
 
 import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import pressure_of, two_blocks
 from contactverif.problems.catalogue import load_scene_case
+from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif.run.runner import run
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
@@ -28,13 +29,17 @@ from contactverif_properties.shared.solved_patch import measure_at_penalty
 
 def textbook() -> Case:
     """Return two blocks whose exact pressure, 0.017369727047, was computed by hand."""
-    scene = two_blocks(
-        Rectangle([0, 1, 3, 4], [0, 2, 6], young=1, poisson=0.3),
-        Rectangle([0, 1.5, 2, 4], [-4, -1, 0], young=3, poisson=0.2),
-        penalty=10,
-        approach=0.1,
+    return in_units(1.0, 1.0).case()
+
+
+def in_units(length: float, modulus: float) -> Scene:
+    """Return the textbook's blocks with all lengths and all moduli multiplied."""
+    return two_blocks(
+        Rectangle(np.array([0, 1, 3, 4]) * length, np.array([0, 2, 6]) * length, young=modulus, poisson=0.3),
+        Rectangle(np.array([0, 1.5, 2, 4]) * length, np.array([-4, -1, 0]) * length, young=3 * modulus, poisson=0.2),
+        penalty=10 * modulus / length,
+        approach=0.1 * length,
     )
-    return scene.case()
 
 
 def test_the_pressure_is_that_of_springs_in_series() -> None:
@@ -92,16 +97,8 @@ def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
 
 @pytest.mark.parametrize("scene", ["a2-graded", "b:degrees=45", "example-1bis", "c-prime:ratio=1e-3", "c:ratio=1e6"])
 def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.vts_ppt(penalty=penalty)
-
-        def contact_points(*state: Any) -> Any:
-            points = inner.contact_points(*state)
-            return replace(points, pressure=points.pressure * (1 + 1e-3))
-
-        return Changed(inner, contact_points=contact_points)
-
-    measurement = measure_two_penalties(load_scene_case(scene), Subject("boaster", make))
+    boaster = reporting(lambda points: replace(points, pressure=points.pressure * (1 + 1e-3)), contactverif_nts.vts_ppt)
+    measurement = measure_two_penalties(load_scene_case(scene), boaster)
     wrong = {name for name, value in measurement.values.items() if value > measurement.tolerances[name]}
     assert wrong == {"pressure error", "pressure error, high penalty"}
 
@@ -113,8 +110,6 @@ def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
 
 
 def test_every_variant_is_drawn() -> None:
-    from contactverif.run.draw import draw_cases
-
     strategy = variant_cases()
     assert strategy is not None
     cases = draw_cases(strategy, seed="1", examples=60).cases
@@ -135,14 +130,7 @@ def test_a_scaled_scene_is_judged_the_same() -> None:
     """Lengths × 2^40, stiffness × 2^-30: every number without dimension keeps its bits but for roundoff."""
     values = []
     for length, modulus in ((1.0, 1.0), (2.0**40, 2.0**-30)):
-        scene = two_blocks(
-            Rectangle(np.array([0, 1, 3, 4]) * length, np.array([0, 2, 6]) * length, young=modulus, poisson=0.3),
-            Rectangle(
-                np.array([0, 1.5, 2, 4]) * length, np.array([-4, -1, 0]) * length, young=3 * modulus, poisson=0.2
-            ),
-            penalty=10 * modulus / length,
-            approach=0.1 * length,
-        )
+        scene = in_units(length, modulus)
         measurement = measure_at_penalty(scene.case(), load_subject("nts-ar"), scene.penalty)
         values.append([*measurement.values.values(), *measurement.tolerances.values()])
     assert values[0] == pytest.approx(values[1], rel=1e-9)

@@ -7,6 +7,7 @@ from math import hypot
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.case import Case
 from contactverif.oracle import project_point
@@ -66,11 +67,6 @@ def test_near_1e8_the_stored_gap_is_one_step_of_the_doubles() -> None:
     assert case.parameter("penetration") == float(np.spacing(1e8))
 
 
-def test_names_are_different_in_all_lists() -> None:
-    names = [case.name for case in FLAT_STATES]
-    assert len(set(names)) == len(names)
-
-
 def test_surfaces_touch_exactly_at_1000_angles() -> None:
     angles = set()
     for case in touching_states():
@@ -127,7 +123,5 @@ def test_the_nearest_segments_give_a_total_within_the_bounds(case: Case) -> None
 
 
 def test_a_total_is_known_of_distributed_springs_alone() -> None:
-    from subjects import load_subject
-
     known = {name: knows_total(load_subject(name).traits) for name in ("nts", "nts-ar", "two-pass/nts-ar", "sts")}
     assert known == {"nts": False, "nts-ar": True, "two-pass/nts-ar": False, "sts": True}

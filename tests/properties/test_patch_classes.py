@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from strangers import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
-from subjects import Changed, load_property, load_subject
+from subjects import load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
@@ -32,14 +32,6 @@ from contactverif_properties.patch_flat import LOST_END
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 EXAMPLES = 30
-
-
-def with_traits(make: Any, **traits: Any) -> Subject:
-    def make_changed(*, penalty: float) -> Any:
-        inner = make(penalty=penalty)
-        return Changed(inner, traits=replace(inner.traits, **traits))
-
-    return Subject("stranger", make_changed)
 
 
 class LoopOfNodes:
@@ -77,22 +69,22 @@ class LoopOfAllNodes(LoopOfNodes):
 
 
 RIGHT_ONES: dict[str, tuple[Subject, tuple[str, ...]]] = {
-    "the trapezoidal rule, points first": (with_traits(PointsFirst, passes_normal_patch=True), (NORMAL,)),
+    "the trapezoidal rule, points first": (with_promises(PointsFirst, passes_normal_patch=True), (NORMAL,)),
     "Gauss points along the slave's normal": (
-        with_traits(SlaveNormalAtGaussPoints, passes_normal_patch=True),
+        with_promises(SlaveNormalAtGaussPoints, passes_normal_patch=True),
         (NORMAL,),
     ),
-    "Gauss points about the mean of all nodes": (with_traits(CentredSprings, passes_normal_patch=True), (NORMAL,)),
-    "quarter points in a turned frame": (with_traits(TurnedFrame, passes_single_patch=True), (NORMAL, SINGLE)),
-    "four points that look around": (with_traits(NearbyOnly, passes_single_patch=True), (NORMAL, SINGLE)),
-    "textbook cells": (with_traits(ClippedCells), (NORMAL, SINGLE)),
-    "textbook mortar": (with_traits(WeightedGaps), (NORMAL, SINGLE)),
-    "a loop of nodes": (with_traits(LoopOfNodes), (NODAL,)),
-    "a loop of the nodes of both sides": (with_traits(LoopOfAllNodes), (NODAL,)),
+    "Gauss points about the mean of all nodes": (with_promises(CentredSprings, passes_normal_patch=True), (NORMAL,)),
+    "quarter points in a turned frame": (with_promises(TurnedFrame, passes_single_patch=True), (NORMAL, SINGLE)),
+    "four points that look around": (with_promises(NearbyOnly, passes_single_patch=True), (NORMAL, SINGLE)),
+    "textbook cells": (with_promises(ClippedCells), (NORMAL, SINGLE)),
+    "textbook mortar": (with_promises(WeightedGaps), (NORMAL, SINGLE)),
+    "a loop of nodes": (with_promises(LoopOfNodes), (NODAL,)),
+    "a loop of the nodes of both sides": (with_promises(LoopOfAllNodes), (NODAL,)),
     "two passes of two passes": (load_subject("two-pass/two-pass/nts"), (NODAL, PUBLISHED)),
     **{
         f"Gauss springs, {name}": (
-            with_traits(partial(GaussSprings, way=way, before=before), passes_normal_patch=True),
+            with_promises(partial(GaussSprings, way=way, before=before), passes_normal_patch=True),
             (NORMAL,),
         )
         for name, (way, before) in RIGHT.items()
@@ -146,7 +138,7 @@ def test_a_force_lost_elsewhere_is_a_failure_though_an_end_is_lost_too() -> None
             off = np.minimum(np.abs(points.xi), np.abs(1 - points.xi)) > 1e-6
             return replace(points, active=points.active & off, pressure=np.where(off, points.pressure, 0.0))
 
-    question, subject = load_property(NORMAL), with_traits(Forgetful, passes_normal_patch=True)
+    question, subject = load_property(NORMAL), with_promises(Forgetful, passes_normal_patch=True)
     masters = ((case, case.interface.master.segments) for case in draw(NORMAL))
     cases = [case for case, segments in masters if np.intersect1d(*segments.T).size]
     assert len(cases) > 5
@@ -165,7 +157,7 @@ def test_what_is_reported_may_not_be_off_by_little(quantity: str, exponent: int)
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return TurnedFrame(penalty=self.penalty).residual(interface, pairing, z)
 
-    question, subject = load_property(SINGLE), with_traits(Boaster, passes_single_patch=True)
+    question, subject = load_property(SINGLE), with_promises(Boaster, passes_single_patch=True)
     verdicts = [judge_case(question, case, subject).verdict for case in draw(SINGLE)]
     assert Verdict.FAIL in verdicts
 
@@ -273,14 +265,14 @@ def test_nested_passes_act_four_times() -> None:
     ],
 )
 def test_a_table_of_another_mesh_breaks_the_contract(forces: dict[str, str], message: str) -> None:
-    subject = with_traits(PointsFirst, published_forces=forces)
+    subject = with_promises(PointsFirst, published_forces=forces)
     outcome = judge_case(load_property(PUBLISHED), named_case("a1"), subject)
     assert outcome.breach
     assert message in outcome.reason
 
 
 def test_nothing_is_asked_where_nothing_is_known() -> None:
-    subject = with_traits(PointsFirst, published_forces={"a1": "1 2 1; 2 2"})
+    subject = with_promises(PointsFirst, published_forces={"a1": "1 2 1; 2 2"})
     question = load_property(PUBLISHED)
     outcomes = {name: judge_case(question, named_case(name), subject) for name in ("a1", "b")}
     assert all(outcome.verdict is Verdict.PASS for outcome in outcomes.values())

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from strangers import STRANGERS, PointsFirst, TurnedFrame
-from subjects import Changed, load_property, load_subject
+from subjects import load_property, load_subject, reporting
 
 import contactverif_mortar
 from contactverif.contract.case import Case
@@ -64,19 +64,9 @@ def over_a_vertex(gap: float, place: float = 0.0) -> Case:
     return Case(interface, interface.nodes.reshape(-1), 4.0)
 
 
-def reporting(change: Callable[[ContactPoints], dict[str, Any]], make: Any = PointsFirst) -> Subject:
+def with_arrays(change: Callable[[ContactPoints], dict[str, Any]], make: Any = PointsFirst) -> Subject:
     """Return a formulation that computes the right thing, and reports other arrays."""
-
-    def make_reporter(*, penalty: float) -> Changed:
-        inner = make(penalty=penalty)
-
-        def contact_points(*state: Any) -> ContactPoints:
-            points = inner.contact_points(*state)
-            return replace(points, **change(points))
-
-        return Changed(inner, contact_points=contact_points)
-
-    return Subject("reporter", make_reporter)
+    return reporting(lambda points: replace(points, **change(points)), make)
 
 
 def beside_a_wall(weight: float) -> tuple[Case, Subject]:
@@ -87,7 +77,7 @@ def beside_a_wall(weight: float) -> tuple[Case, Subject]:
     def weigh(points: ContactPoints) -> dict[str, Any]:
         return {"weight": np.where(points.master_segment == 0, weight, points.weight)}
 
-    return Case(interface, positions.ravel(), 1.0), reporting(weigh, contactverif_mortar.sts)
+    return Case(interface, positions.ravel(), 1.0), with_arrays(weigh, contactverif_mortar.sts)
 
 
 def test_an_overlap_that_rounding_leaves_of_an_edge_on_segment_is_no_wrong_segment() -> None:
@@ -107,7 +97,7 @@ def test_at_a_tie_either_segment_is_right() -> None:
         def choose(points: ContactPoints, segment: int = segment) -> dict[str, Any]:
             return {"master_segment": np.where(points.c < 0, segment, points.master_segment)}
 
-        outcome = outcome_of("projection.segment", case, reporting(choose))
+        outcome = outcome_of("projection.segment", case, with_arrays(choose))
         assert outcome.verdict is Verdict.PASS
         assert outcome.measurement is not None
         assert outcome.measurement.details["tied points"] == 1
@@ -115,7 +105,7 @@ def test_at_a_tie_either_segment_is_right() -> None:
 
 def test_beside_a_tie_the_farther_segment_is_wrong_by_how_much_farther_it_is() -> None:
     case = over_a_vertex(-0.25, place=0.125)
-    subject = reporting(lambda points: {"master_segment": np.ones_like(points.master_segment)})
+    subject = with_arrays(lambda points: {"master_segment": np.ones_like(points.master_segment)})
     (value,) = measurement_of("projection.segment", case, subject).values.values()
     # The second node is 2.125 beyond the vertex; the lengths are 2 and 4, and X is 4.
     farther, lengths = np.hypot(2.125, 0.25) - 0.25, 2 + 4 + np.hypot(2.125, 0.25) + 4
@@ -126,23 +116,23 @@ def test_beside_a_tie_the_farther_segment_is_wrong_by_how_much_farther_it_is() -
 def test_a_gap_of_roundoff_may_have_either_sign_and_either_decision() -> None:
     case = over_a_vertex(0.0, place=0.5)
     for active in (True, False):
-        subject = reporting(lambda points, active=active: {"active": np.full_like(points.active, active)})  # type: ignore[misc]
+        subject = with_arrays(lambda points, active=active: {"active": np.full_like(points.active, active)})  # type: ignore[misc]
         assert measurement_of("projection.activity", case, subject).details["decided points"] == 0
     for gap in (1e-17, -1e-17):
-        subject = reporting(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})  # type: ignore[misc]
+        subject = with_arrays(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})  # type: ignore[misc]
         assert outcome_of("projection.place", case, subject).verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize(("place", "wrong"), [(4 + 1e-3, 0), (4 + 0.5, 0), (4 + 5.0, 2)])
 def test_past_a_free_end_a_formulation_decides_up_to_one_segment_for_itself(place: float, wrong: int) -> None:
     case = over_a_vertex(-0.25, place=place)
-    subject = reporting(lambda points: {"active": np.ones_like(points.active)})
+    subject = with_arrays(lambda points: {"active": np.ones_like(points.active)})
     (value,) = measurement_of("projection.activity", case, subject).values.values()
     assert value == 2 * wrong  # The state is asked about in two units.
 
 
 def test_a_foot_on_a_node_of_the_surface_is_decided() -> None:
-    subject = reporting(lambda points: {"active": points.active & (points.xi > 0) & (points.xi < 1)})
+    subject = with_arrays(lambda points: {"active": points.active & (points.xi > 0) & (points.xi < 1)})
     assert outcome_of("projection.activity", over_a_vertex(-0.25), subject).verdict is Verdict.FAIL
 
 
@@ -226,7 +216,7 @@ def test_points_of_a_second_pass_are_judged_with_roles_exchanged() -> None:
 )
 def test_a_pressure_that_breaks_the_contract_is_named(change: Any, reason: str) -> None:
     case = over_a_vertex(-0.25, place=3.0)  # The second node lies past the free end.
-    assert reason in outcome_of("projection.forces", case, reporting(change)).reason
+    assert reason in outcome_of("projection.forces", case, with_arrays(change)).reason
 
 
 @pytest.mark.parametrize(
@@ -243,4 +233,4 @@ def test_a_pressure_that_breaks_the_contract_is_named(change: Any, reason: str) 
     ],
 )
 def test_what_an_active_point_leaves_out_is_named(property_id: str, change: Any, reason: str) -> None:
-    assert reason in outcome_of(property_id, over_a_vertex(-0.25, place=0.5), reporting(change)).reason
+    assert reason in outcome_of(property_id, over_a_vertex(-0.25, place=0.5), with_arrays(change)).reason

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from strangers import STRANGERS
-from subjects import Changed, load_property, load_subject
+from subjects import load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
@@ -27,23 +24,15 @@ IDS = ("patch.tilted.resultant", "patch.tilted.nodal", "locality.bend")
 EXAMPLES = 15
 
 
-def with_traits(make: Any, **traits: Any) -> Subject:
-    def make_changed(*, penalty: float) -> Any:
-        inner = make(penalty=penalty)
-        return Changed(inner, traits=replace(inner.traits, **traits))
-
-    return Subject("stranger", make_changed)
-
-
 MASTER = {"force_along": "master normal", "local": True}
 SLAVE = {"force_along": "slave normal", "local": True}
 RIGHT_ONES = {
     **{
-        name: with_traits(make, **(SLAVE if make.traits.gap == "slave normal" else MASTER))
+        name: with_promises(make, **(SLAVE if make.traits.gap == "slave normal" else MASTER))
         for name, make in STRANGERS.items()
     },
     **{
-        f"Gauss springs, {name}": with_traits(
+        f"Gauss springs, {name}": with_promises(
             partial(GaussSprings, way=way, before=before),
             gap="closest point",
             integrates_linear_gap=True,
@@ -52,9 +41,9 @@ RIGHT_ONES = {
         )
         for name, (way, before) in RIGHT.items()
     },
-    "textbook springs about the mean of all nodes": with_traits(CentredSprings, integrates_linear_gap=True, **MASTER),
-    "textbook cells": with_traits(ClippedCells, integrates_linear_gap=True, **SLAVE),
-    "textbook mortar": with_traits(WeightedGaps, **SLAVE),
+    "textbook springs about the mean of all nodes": with_promises(CentredSprings, integrates_linear_gap=True, **MASTER),
+    "textbook cells": with_promises(ClippedCells, integrates_linear_gap=True, **SLAVE),
+    "textbook mortar": with_promises(WeightedGaps, **SLAVE),
 }
 
 
@@ -104,7 +93,7 @@ def test_the_exact_forces_are_those_of_a_hand_calculation() -> None:
 
 def test_a_force_along_the_other_normal_is_told_by_its_direction() -> None:
     question = load_property("patch.tilted.resultant")
-    outcome = judge_case(question, tilted_segment(), with_traits(ClippedCells, force_along="master normal"))
+    outcome = judge_case(question, tilted_segment(), with_promises(ClippedCells, force_along="master normal"))
     assert outcome.verdict is Verdict.FAIL
     assert outcome.reason.startswith("part of the force off the normal 0.6")
 
