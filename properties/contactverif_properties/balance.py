@@ -11,10 +11,8 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.any_state import any_cases, forces_of_any_state, prepare_state, random_directions
 from contactverif_properties.shared.kinks import find_kink
-from contactverif_properties.shared.nodal_forces import forces_of_any_state
 from contactverif_properties.shared.roundoff import (
     SEGMENT_REASON,
     gap_tolerance,

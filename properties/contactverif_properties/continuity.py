@@ -113,11 +113,6 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
         The number of times that a step is halved.
     allowed : float
         Less than this share of the step's change counts as no jump, and ends the search.
-
-    Returns
-    -------
-    list[tuple[float, float]]
-        At least one pair of a place and the change that is left there, and at most `MOST_JUMPS`.
     """
     changes = np.diff(samples, axis=0)
     padded = np.vstack([changes[1], changes, changes[-2]])
@@ -148,23 +143,13 @@ def _select_worst(steps: list[Bracket]) -> list[Bracket]:
 
 @dataclass(frozen=True, slots=True)
 class Bracket:
-    """A part of the way.
+    """A part of the way."""
 
-    Attributes
-    ----------
-    left, right : float
-        Its ends, from 0 to 1.
-    before, behind : FloatArray, shape (n,)
-        The values of the function there.
-    trend : FloatArray, shape (n,)
-        The change that the neighbours suggest.
-    """
-
-    left: float
+    left: float  # Its ends, from 0 to 1.
     right: float
-    before: FloatArray
+    before: FloatArray  # (n,) The values of the function there.
     behind: FloatArray
-    trend: FloatArray
+    trend: FloatArray  # (n,) The change that the neighbours suggest.
 
     @property
     def change(self) -> float:

@@ -14,9 +14,8 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, prepare_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
-from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
@@ -93,11 +92,6 @@ def scaling(case: Case, subject: Subject) -> Measurement:
 
 def turn_state(case: Case) -> tuple[Case, FloatArray]:
     """Turn and shift a state by a random angle and a random way, always the same for the same seed.
-
-    Parameters
-    ----------
-    case : Case
-        The state, with its multipliers if any.
 
     Returns
     -------

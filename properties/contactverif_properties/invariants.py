@@ -16,9 +16,9 @@ from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
 from contactverif.strategies.straight import cases_over_a_body
-from contactverif_properties.shared.relabelled import exchange_roles, mirror_case, renumber
 from contactverif_properties.shared.same_answer import TIE, Carry, answer_alike, compare, same_answer_quantities
 
+MIRROR = np.diag([-1.0, 1.0])
 IN_MIRROR = same_answer_quantities("in the mirror image")
 WITH_ROLES_EXCHANGED = same_answer_quantities("with roles exchanged")
 IN_OTHER_NUMBERS = same_answer_quantities("in other numbers")
@@ -26,6 +26,53 @@ ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
 BESIDE_OTHERS = same_answer_quantities("beside another body")
+
+
+def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
+    """Return a case with other numbers.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    nodes : IntArray, shape (n_nodes,)
+        The new number of each node; slave nodes stay before those of the master.
+    slave, master : IntArray, shape (n_segments,)
+        The old numbers of the segments in their new order.
+    """
+    interface, old = case.interface, np.argsort(nodes)
+    sides = (
+        Surface(nodes[side.segments[order]]) for side, order in ((interface.slave, slave), (interface.master, master))
+    )
+    renumbered = Interface(interface.nodes[old], *sides)
+    return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes)
+
+
+def mirror_case(case: Case) -> tuple[Case, Carry]:
+    """Return the mirror image in the y-axis; segments run the other way, so that the body stays on the left."""
+    interface = case.interface
+    sides = (Surface(side.segments[:, ::-1]) for side in (interface.slave, interface.master))
+    image = Interface(reflect(interface.nodes), *sides)
+    return replace(case, interface=image, z=reflect(case.positions).reshape(-1)), Carry(
+        np.arange(len(image.nodes)), MIRROR
+    )
+
+
+def exchange_roles(case: Case) -> tuple[Case, Carry]:
+    """Return the case in which the slave is the master, and the other way round."""
+    interface = case.interface
+    n_slave, n_master = interface.n_slave_nodes, interface.n_nodes - interface.n_slave_nodes
+    nodes = np.concatenate([n_master + np.arange(n_slave), np.arange(n_master)])
+    sides = (Surface(nodes[side.segments]) for side in (interface.master, interface.slave))
+    old = np.argsort(nodes)
+    exchanged = Interface(interface.nodes[old], *sides)
+    return replace(case, interface=exchanged, z=case.positions[old].reshape(-1)), Carry(nodes)
+
+
+def reflect(points: FloatArray) -> FloatArray:
+    """Return the points (n, 2), mirrored; no zero becomes −0."""
+    mirrored: FloatArray = points * [-1.0, 1.0] + 0.0
+    return mirrored
 
 
 @Property.define(

@@ -21,6 +21,7 @@ from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
@@ -29,7 +30,6 @@ from contactverif_properties.shared.conditioning import (
     difference_quotient,
     forces_quantity,
 )
-from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
@@ -55,38 +55,21 @@ ERROR = Quantity(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """The solution of the scene near the origin, and what roundoff may do to it.
+    """The solution of the scene near the origin, and what roundoff may do to it."""
 
-    Attributes
-    ----------
-    system : System
-        The scene with its formulation.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns.
-    pairing : Pairing | None
-        The pairing.
-    matrix : FloatArray, shape (n_free + n_multipliers, n_free + n_multipliers)
-        The derivative J of the residual there, by differences.
-    units : FloatArray, shape (n_free + n_multipliers,)
-        The unit of each unknown that corresponds to a unit of length.
-    inverse : FloatArray, shape (n_free + n_multipliers, n_free + n_multipliers)
-        |J⁻¹|, entry by entry.
-    contact : FloatArray, shape (n_free + n_multipliers,)
-        The change of the residual by a move of all nodes by a unit of length, Σ |K|.
-    terms : FloatArray, shape (n_free + n_multipliers,)
-        The sizes of the other terms of the residual, |S| |q| + |g| + |R| and those of multipliers.
-    conditioning : Conditioning
-        What roundings of the positions relative to one another may change in the contact forces.
-    """
-
-    system: System
-    u: FloatArray
-    pairing: Pairing | None
+    system: System  # The scene with its formulation.
+    u: FloatArray  # (n_free + n_multipliers,) The unknowns.
+    pairing: Pairing | None  # The pairing.
+    # (n_free + n_multipliers, n_free + n_multipliers) The derivative J of the residual there, by differences.
     matrix: FloatArray
-    units: FloatArray
-    inverse: FloatArray
+    units: FloatArray  # (n_free + n_multipliers,) The unit of each unknown that corresponds to a unit of length.
+    inverse: FloatArray  # (n_free + n_multipliers, n_free + n_multipliers) |J⁻¹|, entry by entry.
+    # (n_free + n_multipliers,) The change of the residual by a move of all nodes by a unit of length, Σ |K|.
     contact: FloatArray
+    # (n_free + n_multipliers,) The sizes of the other terms of the residual, |S| |q| + |g| + |R| and those of
+    # multipliers.
     terms: FloatArray
+    # What roundings of the positions relative to one another may change in the contact forces.
     conditioning: Conditioning
 
     def roundoff(self, largest: float) -> FloatArray:
@@ -96,27 +79,13 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Attained:
-    """The residual and the accuracy that Newton's method attains in one place.
+    """The residual and the accuracy that Newton's method attains in one place."""
 
-    Attributes
-    ----------
-    added : float
-        ω, the roundings that the formulation adds.
-    residual : float
-        The attained residual over its roundoff.
-    error : float
-        The distance from the solution over what that roundoff makes of it.
-    length : float
-        That distance, a length.
-    undecided : str
-        The reason why residual and error decide nothing; empty if they do.
-    """
-
-    added: float
-    residual: float
-    error: float
-    length: float
-    undecided: str
+    added: float  # ω, the roundings that the formulation adds.
+    residual: float  # The attained residual over its roundoff.
+    error: float  # The distance from the solution over what that roundoff makes of it.
+    length: float  # That distance, a length.
+    undecided: str  # The reason why residual and error decide nothing; empty if they do.
 
 
 @Property.define(
@@ -237,30 +206,14 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
 
 @dataclass(slots=True, eq=False)
 class Place:
-    """The scene in another place, and how far Newton's method has come there.
+    """The scene in another place, and how far Newton's method has come there."""
 
-    Attributes
-    ----------
-    system : System
-        The moved scene.
-    way : float
-        The move along both axes, a length.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns.
-    residual : FloatArray, shape (n_free + n_multipliers,)
-        The residual there.
-    added : float
-        The largest ω of all steps.
-    rests : list[Rest]
-        The state after each step.
-    """
-
-    system: System
-    way: float
-    u: FloatArray
-    residual: FloatArray = field(init=False)
-    added: float = 0.0
-    rests: list[Rest] = field(default_factory=list)
+    system: System  # The moved scene.
+    way: float  # The move along both axes, a length.
+    u: FloatArray  # (n_free + n_multipliers,) The unknowns.
+    residual: FloatArray = field(init=False)  # (n_free + n_multipliers,) The residual there.
+    added: float = 0.0  # The largest ω of all steps.
+    rests: list[Rest] = field(default_factory=list)  # The state after each step.
 
 
 class Rest(NamedTuple):
@@ -273,17 +226,7 @@ class Rest(NamedTuple):
 
 
 def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attained]:
-    """Let Newton's method come to rest in other places, from the solution near the origin.
-
-    Parameters
-    ----------
-    solution : Solution
-        The solution near the origin.
-    case : Case
-        The case of the scene, for its seed.
-    ways : Sequence[float]
-        The moves along both axes, lengths.
-    """
+    """Let Newton's method come to rest in other places, from the solution near the origin."""
     near = solution.system
     places = [Place(replace(near, scene=move(near.scene, way, way)), way, solution.u) for way in ways]
     take_forces(solution, places)

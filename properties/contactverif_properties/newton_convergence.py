@@ -20,8 +20,8 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
-from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import (
     LOAD_STEPS,
@@ -225,21 +225,11 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The order and rate of single Newton steps from around a solution.
+    """The order and rate of single Newton steps from around a solution."""
 
-    Attributes
-    ----------
-    order : float
-        The lower order of the directions; NaN if none decides.
-    rate : float
-        The higher rate of the directions.
-    count : int
-        The number of steps that started with the pairing of the solution.
-    """
-
-    order: float
-    rate: float
-    count: int
+    order: float  # The lower order of the directions; NaN if none decides.
+    rate: float  # The higher rate of the directions.
+    count: int  # The number of steps that started with the pairing of the solution.
 
 
 def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float) -> Steps:

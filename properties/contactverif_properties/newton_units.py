@@ -20,8 +20,8 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
-from contactverif_properties.shared.directions import random_directions
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import is_untouched, length_units, solution_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
@@ -105,19 +105,11 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """A scene in two systems of units.
+    """A scene in two systems of units."""
 
-    Attributes
-    ----------
-    system, other : System
-        The scene in its own units and in others, with the formulation.
-    factors : FloatArray, shape (n_free + n_multipliers,)
-        The unit of each unknown in the other units.
-    """
-
-    system: System
+    system: System  # The scene in its own units and in others, with the formulation.
     other: System
-    factors: FloatArray
+    factors: FloatArray  # (n_free + n_multipliers,) The unit of each unknown in the other units.
 
     def step(self, u: FloatArray) -> linear.Step:
         """Return the Newton step in the other units from the unknowns u (n,) in those of the scene."""

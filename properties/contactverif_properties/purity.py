@@ -11,9 +11,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.interleaved_calls import Question, count_changes, renumber
+from contactverif_properties.shared.interleaved_calls import Question, compare_two_pairings, count_changes, renumber
 from contactverif_properties.shared.roundoff import ratio
-from contactverif_properties.shared.two_pairings import compare_two_pairings
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
 BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.

@@ -7,26 +7,19 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from hypothesis.strategies import SearchStrategy
 from scipy.optimize import nnls
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Surface
+from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif_properties.shared.any_state import prepare_state
-from contactverif_properties.shared.directions import random_moves
-from contactverif_properties.shared.openings import (
-    ANY_SHAPE,
-    FLAT,
-    lift_slave,
-    nodes_far_from_contact,
-    open_all_but_one_end,
-    pushing_cases,
-)
+from contactverif.strategies import flat_cases, general_cases
+from contactverif_properties.shared.any_state import prepare_state, random_moves
 from contactverif_properties.shared.passes import Pass, split_passes
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
@@ -37,6 +30,10 @@ from contactverif_properties.shared.roundoff import (
 )
 from contactverif_properties.shared.uniform_pressure import unit_forces
 
+CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.
+SHALLOW = 2.0**-6  # The deepest penetration there over the slave's length, so that the slave hardly tilts.
+FAR = 2.0  # A distance in longest segments: the shapes of a mortar method reach over one, on either side.
+FLAT, ANY_SHAPE = "flat", "any shape"
 N_MOVES = 64  # So many moves that a slave of two nodes that hang at free ends is moved off them in one of them.
 REASON = "An open contact is left out, not rounded away."
 OPEN = Quantity("force across an open gap", "1", "0", REASON)
@@ -45,6 +42,57 @@ PULL_OF_POINT = Quantity("pull of a contact point", "1", SEGMENT_TOLERANCE, SEGM
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL_OF_NODE = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+
+
+@random_source("contactverif_properties.shared.openings.pushing_cases")
+def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]]:
+    """Return flat cases with a uniform penetration, and states of any shape, each half of all cases."""
+    flat = flat_cases(interface)
+    return ({} if flat is None else {FLAT: flat}) | {ANY_SHAPE: general_cases(interface)}
+
+
+def lift_slave(case: Case, height: float) -> Case:
+    """Return the case with its slave moved away from the master, across the interface, by a height (a length)."""
+    along = case.parameters["direction"]
+    positions = case.positions.copy()
+    positions[: case.interface.n_slave_nodes] += height * np.array([-along[1], along[0]])
+    return replace(case, z=positions.reshape(-1))
+
+
+def open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
+    """Return the case with its slave lifted so that the gap grows along it, and only its first part is closed.
+
+    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight.
+
+    Parameters
+    ----------
+    case : Case
+        A flat case with a uniform penetration.
+    closed : float
+        The share of the slave's length that is closed.
+    """
+    interface, positions = case.interface, case.positions.copy()
+    depth, places = case.parameter("penetration"), _slave_places(case)
+    shallow = min(depth, SHALLOW * case.slave_length)
+    x, y = case.parameters["direction"]
+    positions[: interface.n_slave_nodes] += (depth + shallow * (places / closed - 1))[:, None] * np.array([-y, x])
+    return replace(case, z=positions.reshape(-1))
+
+
+def nodes_far_from_contact(case: Case) -> BoolArray:
+    """Return which slave nodes (n_slave_nodes,) are then FAR or more segments from the closed end."""
+    interface, along = case.interface, case.parameters["along"]
+    slave = along[: interface.n_slave_nodes]
+    longest = max(float(np.abs(np.diff(along[side.segments])).max()) for side in (interface.slave, interface.master))
+    distant: BoolArray = (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
+    return distant
+
+
+def _slave_places(case: Case) -> FloatArray:
+    """Return where the slave's nodes lie along the interface (n_slave_nodes,), from 0 to 1."""
+    slave = case.parameters["along"][: case.interface.n_slave_nodes]
+    places: FloatArray = (slave - slave.min()) / np.ptp(slave)
+    return places
 
 
 @Property.define(
@@ -255,15 +303,7 @@ def release_some(state: Case) -> FloatArray:
 
 
 def allowed_pushes(formulation: CheckedFormulation, state: Case) -> tuple[dict[int, list[FloatArray]], FloatArray]:
-    """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled.
-
-    Parameters
-    ----------
-    formulation : CheckedFormulation
-        The formulation; its contact points are used if it reports them.
-    state : Case
-        A complete state.
-    """
+    """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled."""
     interface, positions = state.interface, state.positions
     normals: dict[int, list[FloatArray]] = defaultdict(list)
     allowance = np.zeros(interface.n_nodes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -20,23 +20,21 @@ from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.stability_states import stability_states
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.translations import translated_cases
-from contactverif_properties.shared.any_state import move_state, prepare_state
+from contactverif_properties.shared.any_state import ask_forces_and_tangents, move_state, prepare_state
 from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
     Conditioning,
     count_tangent_roundings,
     forces_quantity,
+    make_sweep_measurement,
     measure_conditioning,
     measure_tangent_slope,
     tangent_quantity,
 )
-from contactverif_properties.shared.exact_motions import ExactMotion
-from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_rounded_decision
 from contactverif_properties.shared.linear_gaps import exact_slave_forces, knows_linear_total, uniform_multiplier
 from contactverif_properties.shared.roundoff import ratio
-from contactverif_properties.shared.sweep_measurement import make_sweep_measurement
 
 FORCES = forces_quantity("change of the forces in roundings")
 TANGENT = tangent_quantity("change of the tangent in roundings")
@@ -255,13 +253,7 @@ def knows_total(traits: Traits) -> bool:
 
 
 def move_swept(case: Case) -> Case:
-    """Return the state after its exact motion, multipliers included.
-
-    Parameters
-    ----------
-    case : Case
-        A state with the parameters "turn" and "shift", as it lies flat at the origin.
-    """
+    """Return the state after its exact motion, multipliers included."""
     motion = ExactMotion.from_case(case)
     positions = motion.move(case.positions)
     z = np.concatenate([positions.reshape(-1), case.multipliers])
@@ -306,3 +298,39 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
     expected[:n] = ExactMotion.from_case(case).turn(forces[:n].reshape(-1, 2)).reshape(-1)
     conditioning = measure_conditioning(case, formulation, pairing, forces)
     return make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, forces_there - expected, idle=not forces.any())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExactMotion:
+    """A rotation by a Pythagorean triple, and a translation behind it."""
+
+    legs: FloatArray  # (2,) The legs (a, b) of the triple: the rotation has cos = a/c and sin = b/c.
+    shift: FloatArray  # (2,) The translation, a length each.
+
+    @classmethod
+    def from_case(cls, case: Case) -> ExactMotion:
+        """Return the motion that the parameters "turn" and "shift" of a case describe."""
+        return cls(case.parameters["turn"], case.parameters["shift"])
+
+    @property
+    def _hypotenuse(self) -> float:
+        return float(np.hypot(*self.legs))
+
+    @property
+    def _matrix(self) -> FloatArray:
+        a, b = self.legs
+        return np.array([[a, -b], [b, a]])
+
+    def move(self, positions: FloatArray) -> FloatArray:
+        """Return the positions (n, 2) after the motion, exact for multiples of the triple's hypotenuse."""
+        return (positions / self._hypotenuse) @ self._matrix.T + self.shift
+
+    def turn(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (n, 2) after the rotation, each component rounded like a sum of two products."""
+        turned: FloatArray = (vectors @ self._matrix.T) / self._hypotenuse
+        return turned
+
+    def turn_back(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (n, 2) before the rotation."""
+        turned: FloatArray = (vectors @ self._matrix) / self._hypotenuse
+        return turned

@@ -27,10 +27,14 @@ from contactverif_properties.shared.applicability import (
     refuse_unstated_penalty,
     refuse_without_multipliers,
 )
-from contactverif_properties.shared.conditioning import Conditioning, forces_quantity, measure_conditioning
-from contactverif_properties.shared.exact_motions import ExactMotion
-from contactverif_properties.shared.sweep_measurement import make_sweep_measurement
+from contactverif_properties.shared.conditioning import (
+    Conditioning,
+    forces_quantity,
+    make_sweep_measurement,
+    measure_conditioning,
+)
 from contactverif_properties.shared.wave_answer import answer_to_wave
+from contactverif_properties.stability_forces import ExactMotion
 
 ROUNDINGS = forces_quantity("error of a solved force in roundings")
 MOST_STEPS = 30  # Newton's steps at each penalty. Linear springs take about four.

@@ -6,19 +6,24 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
+from scipy.sparse import csgraph, csr_array
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Surface
 from contactverif.contract.property import Finding, Measurement, Property, Quantity, Verdict, check_all, judge
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.any_state import prepare_state, random_directions
 from contactverif_properties.shared.block_derivatives import groups_of
 from contactverif_properties.shared.kinks import find_kink
-from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
 
+# Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
+# exact to u^(2/3), and its noise grows by 1/s as the combination is made as long as the others. Both are equal at
+# s = u^(1/3): what is left out is no larger than the noise of what stays.
+_SMALLEST_SHARE = UNIT_ROUNDOFF ** (1 / 3)
 N_DIRECTIONS = 8
 CENTRAL_STEPS = (8.0, 1.0, 0.125)  # Steps over the one at which truncation and roundoff are equal.
 TAYLOR_STEPS = (2.0**-8, 2.0**-12)  # Steps over ℓ.
@@ -131,29 +136,15 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """The results of differences along some directions.
+    """The results of differences along some directions."""
 
-    Attributes
-    ----------
-    error : float
-        The largest error against the best central difference, over the size of the derivative at its node.
-    slope : float
-        The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
-    bending : float
-        The length over which the residual is seen to bend, see `Differences.compare`.
-    defects : FloatArray, shape (n_directions, n_unknowns)
-        The tangent times each direction, minus the central difference.
-    finding : Finding | None
-        The row of the largest error.
-    turns : FloatArray, shape (n_unknowns,)
-        The change of the derivative in each row over a length ℓ, from the third derivative.
-    """
-
-    error: float
+    error: float  # The largest error against the best central difference, over the size of the derivative at its node.
+    # The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
     slope: float
-    bending: float
-    defects: FloatArray
-    finding: Finding | None
+    bending: float  # The length over which the residual is seen to bend, see `Differences.compare`.
+    defects: FloatArray  # (n_directions, n_unknowns) The tangent times each direction, minus the central difference.
+    finding: Finding | None  # The row of the largest error.
+    # (n_unknowns,) The change of the derivative in each row over a length ℓ, from the third derivative.
     turns: FloatArray
 
     def join(self, other: Comparison) -> Comparison:
@@ -166,24 +157,12 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Differences:
-    """The residual around a state, and the tangent that it is compared with.
+    """The residual around a state, and the tangent that it is compared with."""
 
-    Attributes
-    ----------
-    formulation : CheckedFormulation
-        The formulation that is judged.
-    case : Case
-        The state x.
-    pairing : Pairing | None
-        The frozen pairing.
-    tangent : FloatArray, shape (n_unknowns, n_unknowns)
-        The tangent K.
-    """
-
-    formulation: CheckedFormulation
-    case: Case
-    pairing: Pairing | None
-    tangent: FloatArray
+    formulation: CheckedFormulation  # The formulation that is judged.
+    case: Case  # The state x.
+    pairing: Pairing | None  # The frozen pairing.
+    tangent: FloatArray  # (n_unknowns, n_unknowns) The tangent K.
 
     def compare(self, directions: FloatArray, length: float) -> Comparison:
         """Compare derivatives along directions with central differences and Taylor remainders, all in one batch.
@@ -284,11 +263,6 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
         Their steps h, in any order.
     floor : float
         A remainder below it is roundoff. A direction that has no slope because of that is exact.
-
-    Returns
-    -------
-    float
-        The slope, infinite where all directions are exact.
     """
     best = np.full(remainders.shape[1], -np.inf)
     decided = np.zeros(remainders.shape[1], dtype=bool)
@@ -340,3 +314,66 @@ def _is_restless(formulation: CheckedFormulation, case: Case, shift: FloatArray)
     """Return whether no two of some neighbouring states, on either side, have the same pairing."""
     pairings = [formulation.pair(case.interface, case.z + times * shift) for times in range(-2, 4)]
     return all(first != second for first, second in combinations(pairings, 2))
+
+
+def first_directions(case: Case, n_random: int) -> FloatArray:
+    """Return random directions that move all unknowns, then one for each chain and one for the multipliers.
+
+    Returns
+    -------
+    FloatArray, shape (n_directions, n_unknowns + n_multipliers)
+        Entries in [−1, 1]; the largest of each direction is ±1.
+    """
+    regions = _regions(case)
+    moves = random_directions(case.seed, n_random + len(regions), case.z.size)
+    local = np.zeros((len(regions), case.z.size))
+    for number, unknowns in enumerate(regions):
+        part = moves[n_random + number, unknowns]
+        local[number, unknowns] = part / np.abs(part).max()
+    return np.vstack([moves[:n_random], local])
+
+
+def defect_directions(directions: FloatArray, defects: FloatArray) -> FloatArray:
+    """Return the largest defect as a direction, and the leading singular direction of what maps one to the other.
+
+    Parameters
+    ----------
+    directions : FloatArray, shape (n_directions, n)
+        Directions d.
+    defects : FloatArray, shape (n_directions, n)
+        The tangent times d, minus the difference quotient along d.
+
+    Returns
+    -------
+    FloatArray, shape (2, n) or (0, n)
+        Two directions whose largest entry is ±1; none where there is no defect. The singular direction is the one in
+        the span of `directions` with the largest defect for its length.
+    """
+    worst = defects[np.abs(defects).max(axis=1).argmax()]
+    if not worst.any():
+        return np.empty((0, directions.shape[1]))
+    basis, sizes, weights = np.linalg.svd(directions.T, full_matrices=False)
+    spanned = sizes > _SMALLEST_SHARE * sizes[0]  # There may be more directions than unknowns.
+    on_basis = defects.T @ (weights[spanned].T / sizes[spanned])  # The map on the basis, (n, n_spanned).
+    singular = basis[:, spanned] @ np.linalg.svd(on_basis, full_matrices=False)[2][0]
+    both = np.array([worst, singular])
+    scaled: FloatArray = both / np.abs(both).max(axis=1, keepdims=True)
+    return scaled
+
+
+def _regions(case: Case) -> list[IntArray]:
+    """Return the unknowns of each chain, and those of all multipliers."""
+    nodes = [chain for side in (case.interface.slave, case.interface.master) for chain in _chains(side)]
+    regions = [np.sort(np.concatenate([2 * chain, 2 * chain + 1])) for chain in nodes]
+    if case.n_multipliers:
+        regions.append(np.arange(case.interface.n_unknowns, case.z.size))
+    return regions
+
+
+def _chains(surface: Surface) -> list[IntArray]:
+    """Return the nodes of each chain of a surface."""
+    n_nodes = int(surface.segments.max()) + 1
+    links = csr_array((np.ones(len(surface)), tuple(surface.segments.T)), shape=(n_nodes, n_nodes))
+    _, label = csgraph.connected_components(links, directed=False)
+    nodes = surface.nodes
+    return [nodes[label[nodes] == number] for number in np.unique(label[nodes])]

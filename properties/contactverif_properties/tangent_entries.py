@@ -105,22 +105,7 @@ def tangent_long(case: Case, subject: Subject) -> Measurement:
 
 
 def measure_blocks(case: Case, subject: Subject) -> Measurement:
-    """Compare each block of the tangent, rows of a node × columns of a node, with the derivative of the residual.
-
-    Parameters
-    ----------
-    case : Case
-        A state.
-    subject : Subject
-        A formulation with a tangent.
-
-    Returns
-    -------
-    Measurement
-        The error of the block that is furthest beyond its tolerance or nearest to it, over the largest entry of that
-        block, and the number of entries that the pattern lacks. Its place says which block it is. Details: the number
-        of blocks, and of those that are excused.
-    """
+    """Compare each block of the tangent, rows of a node × columns of a node, with the derivative of the residual."""
     judge = judge_of(case, subject)
     comparison = compare_blocks(judge)
     excess, excuses = comparison.excess, Excuses(0, 0)
@@ -237,22 +222,12 @@ def _excuse(judge: BlockJudge, comparison: Comparison) -> tuple[FloatArray, Excu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sides:
-    """One-sided differences of some rows and columns, in doubles or better.
+    """One-sided differences of some rows and columns, in doubles or better."""
 
-    Attributes
-    ----------
-    ahead, behind : FloatArray, shape (n_steps, n_columns, n_rows)
-        The differences to both sides, for the steps in STEPS.
-    tangent : FloatArray, shape (n_columns, n_rows)
-        The columns of the tangent.
-    step : float
-        The step h over ℓ.
-    """
-
-    ahead: FloatArray
+    ahead: FloatArray  # (n_steps, n_columns, n_rows) The differences to both sides, for the steps in STEPS.
     behind: FloatArray
-    tangent: FloatArray
-    step: float
+    tangent: FloatArray  # (n_columns, n_rows) The columns of the tangent.
+    step: float  # The step h over ℓ.
 
     @classmethod
     def of_column(cls, judge: BlockJudge, column: int) -> _Sides:

@@ -21,8 +21,17 @@ from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif_properties.balance import symmetric
-from contactverif_properties.invariants import BEHIND, CLOSED, FAR, remote, renumbering, renumbering_cases
-from contactverif_properties.shared.relabelled import exchange_roles, mirror_case, renumber
+from contactverif_properties.invariants import (
+    BEHIND,
+    CLOSED,
+    FAR,
+    exchange_roles,
+    mirror_case,
+    remote,
+    renumber,
+    renumbering,
+    renumbering_cases,
+)
 from contactverif_properties.shared.same_answer import BITS
 
 PROMISED_BY_ALL = ("mirror", "renumbering", "remote")

@@ -19,9 +19,8 @@ from contactverif.problems.stability_states import SWEEPS, stability_scenes, sta
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation
 from contactverif.run.runner import run
-from contactverif_properties.shared.exact_motions import ExactMotion
-from contactverif_properties.shared.sweep_measurement import CONDITION, ERROR, FORCE_ERROR
-from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, move_swept, stability_sweep
+from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR
+from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, ExactMotion, move_swept, stability_sweep
 from contactverif_properties.stability_solutions import stability_stiffness
 
 

@@ -12,13 +12,14 @@ from handmade import Handmade, case, over_a_node, subject
 from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Traits
 from contactverif.run.judge import judge_case
-from contactverif_properties.shared.directions import random_directions
-from contactverif_properties.shared.tangent_directions import defect_directions, first_directions
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.tangent_directional import (
     CENTRAL,
     COMPLEX,
     SLOPE,
     TAYLOR,
+    defect_directions,
+    first_directions,
     tangent_directional,
     taylor_slope,
 )

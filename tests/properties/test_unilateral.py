@@ -22,8 +22,7 @@ from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
 from contactverif.run.runner import run
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.pushes import allowed_pushes, nodal_push, unilateral
-from contactverif_properties.shared.openings import lift_slave
+from contactverif_properties.pushes import allowed_pushes, lift_slave, nodal_push, unilateral
 
 
 class Springs:

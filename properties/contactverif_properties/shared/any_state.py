@@ -13,9 +13,10 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
@@ -25,14 +26,7 @@ SMALLEST, LARGEST = 0.125, 0.25  # The range of random multipliers over the shor
 
 @random_source("contactverif_properties.shared.any_state.any_cases")
 def any_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return a strategy of random meshes and states, exact ties among them.
-
-    Parameters
-    ----------
-    interface : Interface | None
-        A given interface, on which only the states are random. By default the meshes are random too, and about one
-        case in three is an exact tie between two answers.
-    """
+    """Return a strategy of random meshes and states, exact ties among them."""
     if interface is not None:
         return general_cases(interface)
     return st.one_of(general_cases(), general_cases(), tie_cases())
@@ -58,3 +52,54 @@ def move_state(case: Case, shift: FloatArray) -> Case:
     positions = (case.positions + shift).reshape(-1)
     interface = case.interface.at(case.interface.nodes + shift)
     return replace(case, interface=interface, z=np.concatenate([positions, case.multipliers]))
+
+
+def forces_of_any_state(case: Case, subject: Subject) -> tuple[Case, FloatArray]:
+    """Return the case as the formulation is asked about it, and the residual of its nodes.
+
+    Returns
+    -------
+    state : Case
+        The case, with random multipliers if the formulation has any (`prepare_state`).
+    forces : FloatArray, shape (n_nodes, 2)
+        The position rows of the residual there.
+    """
+    formulation, state = prepare_state(case, subject)
+    pairing = formulation.pair(state.interface, state.z)
+    forces = formulation.residual(state.interface, pairing, state.z)
+    return state, forces[: state.interface.n_unknowns].reshape(-1, 2)
+
+
+def ask_forces_and_tangents(
+    formulation: CheckedFormulation, *states: tuple[Interface, Pairing | None, FloatArray]
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return the residuals (n,) and the tangents (n, n) in some states.
+
+    Parameters
+    ----------
+    formulation : CheckedFormulation
+        The formulation.
+    *states : tuple[Interface, Pairing | None, FloatArray]
+        The meshes, the frozen pairing and the state z (n,), for n unknowns and multipliers.
+    """
+    methods = ["residual", *(["tangent"] if "tangent" in formulation.provides else [])]
+    answers = formulation.answers([(method, *state) for method in methods for state in states])
+    return answers[: len(states)], [dense(tangent) for tangent in answers[len(states) :]]
+
+
+def random_moves(seed: int, count: int, size: int) -> FloatArray:
+    """Draw vectors (count, size) whose entries are uniform in [−1, 1]."""
+    return np.random.default_rng(seed).uniform(-1, 1, (count, size))
+
+
+def random_directions(seed: int, count: int, size: int) -> FloatArray:
+    """Draw directions (count, size): random moves, each divided by its largest entry in absolute value.
+
+    Returns
+    -------
+    FloatArray, shape (count, size)
+        Entries in [−1, 1]; the largest of each direction is ±1.
+    """
+    moves = random_moves(seed, count, size)
+    directions: FloatArray = moves / np.abs(moves).max(axis=1, keepdims=True)
+    return directions

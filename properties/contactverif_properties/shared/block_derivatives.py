@@ -31,15 +31,9 @@ COMPLEX_STEP = 2.0**-100  # The imaginary step over ℓ; its square vanishes.
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """The nodes and multipliers of a problem: a node has two unknowns, a multiplier has one.
+    """The nodes and multipliers of a problem: a node has two unknowns, a multiplier has one."""
 
-    Attributes
-    ----------
-    n_slave, n_nodes, n_multipliers : int
-        The numbers of slave nodes, of all nodes and of multipliers.
-    """
-
-    n_slave: int
+    n_slave: int  # The numbers of slave nodes, of all nodes and of multipliers.
     n_nodes: int
     n_multipliers: int
 
@@ -95,17 +89,10 @@ def groups_of(case: Case) -> Groups:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moves:
-    """Sets of unknowns that move together.
+    """Sets of unknowns that move together."""
 
-    Attributes
-    ----------
-    members : Sequence[IntArray]
-        The unknowns of each move.
-    owner : IntArray, shape (n_moves, size)
-        The unknown whose column an entry of the answer belongs to; −1 where no member may be felt.
-    """
-
-    members: Sequence[IntArray]
+    members: Sequence[IntArray]  # The unknowns of each move.
+    # (n_moves, size) The unknown whose column an entry of the answer belongs to; −1 where no member may be felt.
     owner: IntArray
 
     def directions(self) -> FloatArray:
@@ -185,21 +172,11 @@ def _colours(contacts: sparse.csr_array) -> list[list[int]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Differences:
-    """The residual at a state, and its differences along directions.
+    """The residual at a state, and its differences along directions."""
 
-    Attributes
-    ----------
-    formulation : CheckedFormulation
-        The formulation.
-    case : Case
-        The state x, with its multipliers if any.
-    pairing : Pairing | None
-        The pairing, which stays frozen.
-    """
-
-    formulation: CheckedFormulation
-    case: Case
-    pairing: Pairing | None
+    formulation: CheckedFormulation  # The formulation.
+    case: Case  # The state x, with its multipliers if any.
+    pairing: Pairing | None  # The pairing, which stays frozen.
 
     def roundoff(self, dtype: type) -> float:
         """Return u S/ℓ in a precision."""

@@ -29,11 +29,15 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Quantity
+from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation
-from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.roundoff import ratio
 
+# The names of the details. `contactverif_reports` draws them.
+ERROR = "relative error"
+CONDITION = "condition number"
+FORCE_ERROR = "force error"
 MOST_ROUNDINGS = 16.0  # The tolerance of ω; right kernels in other ways of writing reach 3.
 TANGENT_STEP = 2.0**-20  # The motion of the nodes over the shortest segment that shows how a tangent changes.
 N_TANGENT_DIRECTIONS = 2  # The random directions of that motion.
@@ -56,18 +60,14 @@ def tangent_quantity(name: str) -> Quantity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditioning:
-    """The size of the answers at a state, and what a relative rounding of the whole input may change in them.
+    """The size of the answers at a state, and what a relative rounding of the whole input may change in them."""
 
-    Attributes
-    ----------
-    reach : FloatArray, shape (n_nodes + n_multipliers,)
-        For each node, and behind them for each constraint row: Σ_b ‖K_ab‖ d_b + Σ_j ‖K_aj‖ |λ_j| + floor, in the unit
-        of the row. A relative rounding u of the input changes the row by u times this at most.
-    floor : FloatArray, shape (n_nodes + n_multipliers,)
-        The largest force max_c |R_c| for a node; the largest constraint row for a constraint row.
-    """
-
+    # (n_nodes + n_multipliers,) For each node, and behind them for each constraint row: Σ_b ‖K_ab‖ d_b + Σ_j ‖K_aj‖
+    # |λ_j| + floor, in the unit of the row. A relative rounding u of the input changes the row by u times this at
+    # most.
     reach: FloatArray
+    # (n_nodes + n_multipliers,) The largest force max_c |R_c| for a node; the largest constraint row for a constraint
+    # row.
     floor: FloatArray
 
     def worst_row(self, error: Array) -> WorstRow:
@@ -100,20 +100,12 @@ class WorstRow:
     """The row of a residual with the largest ω.
 
     The three numbers belong together: error = roundings × u × condition.
-
-    Attributes
-    ----------
-    roundings : float
-        The error in roundings, ω.
-    error : float
-        The error of the row over the largest force, or over the largest constraint row.
-    condition : float
-        The condition number κ of the row: the relative change of the row by a relative change of the whole input.
-        It is at least 1.
     """
 
-    roundings: float
-    error: float
+    roundings: float  # The error in roundings, ω.
+    error: float  # The error of the row over the largest force, or over the largest constraint row.
+    # The condition number κ of the row: the relative change of the row by a relative change of the whole input. It is
+    # at least 1.
     condition: float
 
 
@@ -132,11 +124,6 @@ def measure_conditioning(
         The pairing of that state, which stays frozen; None for a plugin without ``pair``.
     forces : Array, shape (n_unknowns + n_multipliers,)
         The residual of that state.
-
-    Returns
-    -------
-    Conditioning
-        For each node and each constraint row.
     """
     return conditioning_of(case, difference_quotient(case, formulation, pairing), forces)
 
@@ -166,15 +153,6 @@ def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pa
 
     The step of a position is ℓ (u X/ℓ)^(1/3), at which truncation and roundoff are equal, about (u X/ℓ)^(2/3) relative.
     That of a multiplier is the largest multiplier, since the residual is affine in them.
-
-    Parameters
-    ----------
-    case : Case
-        The state near the origin, with its multipliers if any.
-    formulation : CheckedFormulation
-        The formulation.
-    pairing : Pairing | None
-        The pairing, which stays frozen; None for a plugin without ``pair``, whose one-sided differences may disagree.
 
     Returns
     -------
@@ -262,3 +240,34 @@ def _block_norms(matrix: FloatArray, n_nodes: int) -> FloatArray:
     rows = np.vstack([np.hypot(matrix[0:n:2], matrix[1:n:2]), matrix[n:]])
     norms: FloatArray = np.hstack([np.hypot(rows[:, 0:n:2], rows[:, 1:n:2]), np.abs(rows[:, n:])])
     return norms
+
+
+def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool) -> Measurement:
+    """Return ω of an error of the residual, with the row that has it.
+
+    Parameters
+    ----------
+    quantity : Quantity
+        The quantity that ω is.
+    conditioning : Conditioning
+        The condition numbers of the rows.
+    error : Array, shape (n_unknowns + n_multipliers,)
+        The error of the residual.
+    idle : bool
+        The residual is 0 everywhere.
+
+    Returns
+    -------
+    Measurement
+        The number of roundings ω against 16. Details: error and condition number of the row with that ω, the largest
+        error of a force over the largest force.
+    """
+    worst = conditioning.worst_row(error)
+    n = 2 * (len(error) - len(conditioning.reach))
+    largest = float(np.linalg.norm(np.asarray(error[:n], dtype=np.float64).reshape(-1, 2), axis=1).max())
+    details = {
+        ERROR: worst.error,
+        CONDITION: worst.condition,
+        FORCE_ERROR: ratio(largest, float(conditioning.floor[0])),
+    }
+    return Measurement([quantity.check(worst.roundings, MOST_ROUNDINGS)], details=details, idle=idle)

@@ -40,52 +40,26 @@ _ORDERS_OF_PAIRINGS = (
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The arguments of a residual, a tangent or contact points.
+    """The arguments of a residual, a tangent or contact points."""
 
-    Attributes
-    ----------
-    interface : Interface
-        The meshes.
-    pairing : Pairing | None
-        The frozen pairing.
-    z : FloatArray, shape (n_unknowns + n_multipliers,)
-        The state.
-    """
-
-    interface: Interface
-    pairing: Pairing | None
-    z: FloatArray
+    interface: Interface  # The meshes.
+    pairing: Pairing | None  # The frozen pairing.
+    z: FloatArray  # (n_unknowns + n_multipliers,) The state.
 
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """The number of entries that change, by what makes them change.
+    """The number of entries that change, by what makes them change."""
 
-    Attributes
-    ----------
-    repeated : float
-        Entries of the residual that change when an instance is asked the same again.
-    residual, tangent, contact_points, residual_and_tangent : float
-        Entries that change with the order of the questions.
-    """
-
-    repeated: float
-    residual: float
+    repeated: float  # Entries of the residual that change when an instance is asked the same again.
+    residual: float  # Entries that change with the order of the questions.
     tangent: float
     contact_points: float
     residual_and_tangent: float
 
 
 def count_changes(first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]) -> Changes:
-    """Ask two instances the same questions in different orders, and count the entries of the answers that differ.
-
-    Parameters
-    ----------
-    first, second : CheckedFormulation
-        Two instances of one formulation.
-    questions : Sequence[Question]
-        Two states of one interface and one of another; behind them, if given, two pairings of one more state.
-    """
+    """Ask two instances the same questions in different orders, and count the entries of the answers that differ."""
     with_pairings = len(questions) > 3
     calls, others = (
         [call for call in order + (of_pairings if with_pairings else ()) if _provides(first, call[0])]
@@ -138,13 +112,6 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
 
     The nodes of each side are numbered from the last to the first, and the reference is twice as large.
 
-    Parameters
-    ----------
-    case : Case
-        The state, with the multipliers of the formulation if it has any.
-    formulation : CheckedFormulation
-        The formulation, for the number of its multipliers on the other interface.
-
     Returns
     -------
     interface : Interface
@@ -158,3 +125,33 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
     other = Interface(2 * interface.nodes[number], slave, master)
     multipliers = np.resize(case.multipliers, formulation.n_multipliers(other))
     return other, np.concatenate([case.positions[number].reshape(-1), multipliers])
+
+
+def compare_two_pairings(
+    formulation: CheckedFormulation, interface: Interface, z: FloatArray, distant: FloatArray
+) -> list[str]:
+    """Pair twice at a state, with another state in between, and return in words what differs.
+
+    Parameters
+    ----------
+    formulation : CheckedFormulation
+        The formulation.
+    interface : Interface
+        The meshes.
+    z, distant : FloatArray, shape (n_unknowns + n_multipliers,)
+        The state, and another one.
+    """
+    first = formulation.own_pairing(interface, z)
+    if first is None or not first.opaque:
+        return []
+    formulation.own_pairing(interface, distant)
+    methods = ["residual", *(["tangent"] if "tangent" in formulation.provides else [])]
+    answers = [dense(getattr(formulation, method)(interface, first, z)) for method in methods]
+    second = formulation.own_pairing(interface, z)
+    if first != second:
+        return ["the pairing of a state differs in a repeated call"]
+    return [
+        f"the {method} differs on two pairings of one state"
+        for method, answer in zip(methods, answers, strict=True)
+        if not np.array_equal(answer, dense(getattr(formulation, method)(interface, second, z)))
+    ]

@@ -20,7 +20,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
-from contactverif_properties.shared.directions import random_directions
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
@@ -49,12 +49,6 @@ def explain_by_kink(
         By how much the coordinates are rounded, a length.
     errors : dict[str, float]
         The largest error of an entry, under "forces" or "tangent", for each of the two that failed.
-
-    Returns
-    -------
-    str
-        A reason if a decision hangs on less than `reach`, or if moving the nodes by `reach` changes the answer by a
-        quarter of each error or more; and if the forces are among those around the state.
     """
     directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
     reason = find_kink(case, formulation, pairing, reach, directions[0])
@@ -176,15 +170,6 @@ def explain_by_rounded_decision(case: Case, formulation: CheckedFormulation, pai
 
     Each coordinate may move by 64 u D, whatever its distance from the origin. How much the forces change is not asked:
     where errors are counted in roundings, that would excuse a hundred of them.
-
-    Parameters
-    ----------
-    case : Case
-        The state near the origin.
-    formulation : CheckedFormulation
-        The formulation; its contact points are used if it provides them.
-    pairing : Pairing | None
-        The pairing of the state.
     """
     direction = random_directions(case.seed, 1, case.z.size)[0]
     return find_kink(case, formulation, pairing, COORDINATE_ROUNDING * case.diameter, direction)

@@ -19,27 +19,13 @@ from contactverif.contract.interface import Interface
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pass:
-    """The points of one pass, with the interface and the positions in the roles of that pass.
+    """The points of one pass, with the interface and the positions in the roles of that pass."""
 
-    Attributes
-    ----------
-    interface : Interface
-        The interface in which the points lie on the slave.
-    z : FloatArray, shape (n_unknowns,)
-        The current positions, flat, in the order of its nodes; no multipliers.
-    points : ContactPoints
-        The points.
-    numbers : IntArray, shape (n_nodes,)
-        The number that each node of `interface` has in the interface of the case.
-    second : bool
-        True for the second pass, in which the roles are exchanged.
-    """
-
-    interface: Interface
-    z: FloatArray
-    points: ContactPoints
-    numbers: IntArray
-    second: bool
+    interface: Interface  # The interface in which the points lie on the slave.
+    z: FloatArray  # (n_unknowns,) The current positions, flat, in the order of its nodes; no multipliers.
+    points: ContactPoints  # The points.
+    numbers: IntArray  # (n_nodes,) The number that each node of `interface` has in the interface of the case.
+    second: bool  # True for the second pass, in which the roles are exchanged.
 
     @property
     def positions(self) -> FloatArray:
@@ -48,15 +34,7 @@ class Pass:
 
 
 def split_passes(case: Case, points: ContactPoints) -> Iterator[Pass]:
-    """Yield the points of the slave, and those of a second pass if there are any.
-
-    Parameters
-    ----------
-    case : Case
-        The state that the points belong to.
-    points : ContactPoints
-        What a formulation reports there.
-    """
+    """Yield the points of the slave, and those of a second pass if there are any."""
     interface, numbers = case.interface, np.arange(case.interface.n_nodes)
     for second in (False, True):
         mask = points.on_master == second
@@ -72,13 +50,6 @@ def nearest_sum(points: ContactPoints, force: float) -> float:
     """Return the sum of pressure × weight over active points that is nearer to a force on the slave.
 
     In two passes the points of both surfaces push both bodies. In half passes those of the slave push the slave alone.
-
-    Parameters
-    ----------
-    points : ContactPoints
-        What a formulation reports.
-    force : float
-        The sum of the pushes on the slave along the normals of its nodes.
     """
     pushes = np.where(points.active, points.pressure * points.weight, 0.0)
     sums = float(pushes[~points.on_master].sum()), float(pushes.sum())

@@ -69,16 +69,7 @@ def mean_penetration(case: Case, forces: Array) -> float:
 
 
 def rounding_distance(case: Case, traits: Traits) -> float:
-    """Return the distance Z, a length, at which a formulation may round the position of a point.
-
-    Parameters
-    ----------
-    case : Case
-        The state that is judged.
-    traits : Traits
-        The promises of the formulation. One that promises `translation_stable` rounds positions relative to one
-        another, so Z is the diameter D. Any other may form a point before it subtracts, so Z is the largest coordinate.
-    """
+    """Return the distance Z, a length, at which a formulation may round the position of a point."""
     return case.diameter if traits.translation_stable else case.largest_coordinate
 
 
@@ -120,17 +111,7 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
 def select_failures(
     errors: Mapping[str, float], values: Mapping[Quantity, float], tolerance: float
 ) -> dict[str, float]:
-    """Return those errors whose value is above the tolerance.
-
-    Parameters
-    ----------
-    errors : Mapping[str, float]
-        The largest error of an entry, under "forces" or "tangent".
-    values : Mapping[Quantity, float]
-        The same errors in the same order, over the size of what they belong to, by the names of quantities.
-    tolerance : float
-        The tolerance of all values.
-    """
+    """Return those errors whose value is above the tolerance."""
     pairs = zip(errors.items(), values.values(), strict=True)
     return {part: error for (part, error), value in pairs if value > tolerance}
 

@@ -16,7 +16,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import default_points, nearest_segments
-from contactverif_properties.shared.forces_and_tangents import ask_forces_and_tangents
+from contactverif_properties.shared.any_state import ask_forces_and_tangents
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
@@ -37,42 +37,22 @@ TIE = "a tie: a point in the normal cone of a vertex is as near to one segment a
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer of a formulation in one state.
+    """The answer of a formulation in one state."""
 
-    Attributes
-    ----------
-    case : Case
-        The state, with uniform multipliers if the formulation has any.
-    formulation : CheckedFormulation
-        The formulation that answered.
-    pairing : Pairing | None
-        Its pairing there.
-    forces : FloatArray, shape (n_nodes, 2)
-        The position rows of the residual.
-    tangent : FloatArray | None, shape (n_unknowns, n_unknowns)
-        The rows and columns of positions; None where the plugin has no tangent.
-    """
-
-    case: Case
-    formulation: CheckedFormulation
-    pairing: Pairing | None
-    forces: FloatArray
+    case: Case  # The state, with uniform multipliers if the formulation has any.
+    formulation: CheckedFormulation  # The formulation that answered.
+    pairing: Pairing | None  # Its pairing there.
+    forces: FloatArray  # (n_nodes, 2) The position rows of the residual.
+    # (n_unknowns, n_unknowns) The rows and columns of positions; None where the plugin has no tangent.
     tangent: FloatArray | None
 
 
 @dataclass(frozen=True, slots=True)
 class Carry:
-    """The way in which the first of two states becomes the second.
+    """The way in which the first of two states becomes the second."""
 
-    Attributes
-    ----------
-    nodes : IntArray, shape (n_nodes,)
-        The number, in the second state, of each node of the first.
-    matrix : FloatArray, shape (2, 2)
-        What becomes of vectors: a force f becomes matrix · f.
-    """
-
-    nodes: IntArray
+    nodes: IntArray  # (n_nodes,) The number, in the second state, of each node of the first.
+    # (2, 2) What becomes of vectors: a force f becomes matrix · f.
     matrix: FloatArray = field(default_factory=lambda: np.eye(2))
 
 
@@ -116,19 +96,6 @@ def compare(
     explain: bool = True,
 ) -> Measurement:
     """Compare the answers in two states.
-
-    Parameters
-    ----------
-    quantities : tuple[Quantity, Quantity]
-        The quantities of `same_answer_quantities`.
-    subject : Subject
-        The formulation, for its promises.
-    first, second : Answer
-        The two answers.
-    carry : Carry
-        The way in which the first state becomes the second.
-    explain : bool
-        Look for a kink that excuses a failure. It takes time, and is of no use where the formulation promises nothing.
 
     Returns
     -------

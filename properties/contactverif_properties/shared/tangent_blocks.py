@@ -58,25 +58,14 @@ MOST_REPEATED = 3  # So many moves of a long interface that look wrong are taken
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """The blocks of a tangent beside those of the derivative of the residual.
+    """The blocks of a tangent beside those of the derivative of the residual."""
 
-    Attributes
-    ----------
-    error, tolerance : FloatArray, shape (count, count)
-        The largest error of an entry of each block, and what is allowed, both in the unit of the entry.
-    largest : FloatArray, shape (count, count)
-        The largest entry of each block, of tangent or derivative.
-    surroundings : FloatArray, shape (count, count)
-        The largest block in the row or the column of each.
-    derivative : FloatArray, shape (size, size)
-        The derivative, by the step that agrees best with the tangent in each block.
-    """
-
+    # (count, count) The largest error of an entry of each block, and what is allowed, both in the unit of the entry.
     error: FloatArray
     tolerance: FloatArray
-    largest: FloatArray
-    surroundings: FloatArray
-    derivative: FloatArray
+    largest: FloatArray  # (count, count) The largest entry of each block, of tangent or derivative.
+    surroundings: FloatArray  # (count, count) The largest block in the row or the column of each.
+    derivative: FloatArray  # (size, size) The derivative, by the step that agrees best with the tangent in each block.
 
     @property
     def excess(self) -> FloatArray:
@@ -87,27 +76,13 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlockJudge:
-    """The tangent of a state, and how it is compared with the derivative of the residual.
+    """The tangent of a state, and how it is compared with the derivative of the residual."""
 
-    Attributes
-    ----------
-    differences : Differences
-        The residual at the state.
-    tangent : FloatArray, shape (size, size)
-        The tangent K.
-    pattern : BoolArray, shape (size, size)
-        The entries that the tangent has.
-    groups : Groups
-        Nodes and multipliers.
-    dtype : type
-        The precision of the differences; complex for a complex step.
-    """
-
-    differences: Differences
-    tangent: FloatArray
-    pattern: BoolArray
-    groups: Groups
-    dtype: type
+    differences: Differences  # The residual at the state.
+    tangent: FloatArray  # (size, size) The tangent K.
+    pattern: BoolArray  # (size, size) The entries that the tangent has.
+    groups: Groups  # Nodes and multipliers.
+    dtype: type  # The precision of the differences; complex for a complex step.
 
     @property
     def by_complex_step(self) -> bool:
@@ -179,18 +154,7 @@ def scatter(answers: FloatArray, moves: Moves) -> FloatArray:
 
 
 def compare_blocks(judge: BlockJudge) -> Comparison:
-    """Compare all blocks; on a long interface, what looks wrong is measured again, one unknown at a time.
-
-    Parameters
-    ----------
-    judge : BlockJudge
-        The tangent of a state.
-
-    Returns
-    -------
-    Comparison
-        The blocks. Errors that are not confirmed by moves of single unknowns are 0.
-    """
+    """Compare all blocks; on a long interface, what looks wrong is measured again, one unknown at a time."""
     moves = plan_moves(judge.differences.case, judge.pattern)
     answers = judge.answers(moves)
     derivatives = scatter(answers, moves)

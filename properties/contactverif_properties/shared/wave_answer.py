@@ -17,9 +17,9 @@ from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns
 from contactverif.problems.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
-from contactverif_properties.shared.frozen_solution import solve_frozen
 from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
+MOST_STEPS = 12
 # Springs that add less than this share s to the compliance of the bodies count as adding so much. They are 1/s times as
 # stiff, which is the condition of the matrix, so that roundoff of the solution adds u/s. Both are equal at s = √u.
 _LEAST_SHARE = UNIT_ROUNDOFF**0.5
@@ -99,3 +99,41 @@ def _point_range(
         return np.nan  # A formulation without a pairing may have other points.
     change = after.pressure - before.pressure
     return float(np.ptp(change[np.isfinite(change)])) / WAVE
+
+
+def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
+    """Solve a scene on one pairing, with the formulation's tangent or, where that does not converge, by differences.
+
+    Parameters
+    ----------
+    system : System
+        The scene with its formulation.
+    start : FloatArray, shape (n_free + n_multipliers,)
+        The first guess.
+    pairing : Pairing | None
+        The pairing; None if the formulation has none, which then decides anew at each iterate.
+
+    Returns
+    -------
+    FloatArray | None, shape (n_free + n_multipliers,)
+        The unknowns once the residual is down to its own roundoff; None if it does not get there.
+    """
+    for use_tangent in (True, False):
+        system.use_tangent = use_tangent
+        if (solution := _iterate(system, start, pairing)) is not None:
+            return solution
+    return None
+
+
+def _iterate(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
+    u = start
+    for _ in range(MOST_STEPS):
+        residual = system.residual(u, pairing)
+        matrix, floor = system.matrix(u, pairing)
+        if (np.abs(residual) <= floor).all():
+            return u
+        change = system.step(matrix, -residual, floor).change
+        if change is None or not np.isfinite(change).all():
+            return None
+        u = u + change
+    return None
