@@ -53,19 +53,9 @@ class CondensedBody:
     _gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the displacements of all nodes.
+        """Return the displacements (n_nodes, 2) of all nodes, a length each, in global axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_nodes, 2)
-            The displacements, a length each, in global axes.
+        `q` (n,) are the unknowns, and `factor` is the share of loads and imposed displacements.
         """
         u = factor * self._particular
         u[self._interior] += self._influence @ q
@@ -74,20 +64,10 @@ class CondensedBody:
         return displacements
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the stresses at the Gauss points.
+        """Return the stresses (n_cells, n_points, 3) at the Gauss points, in the body's axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_cells, n_points, 3)
-            Normal stress along the first axis, normal stress across it, and shear stress, in the body's axes; force per
-            length squared, positive in tension.
+        They are along its first axis, across and shear, a force per length squared, positive in tension. The arguments
+        are those of `displacements`.
         """
         u = (self.displacements(q, factor) @ self.body.frame)[self.body.cells]  # (n_cells, n_corners, 2)
         gradient = np.einsum("eqad,eac->eqcd", self._gradients, u)
@@ -106,14 +86,9 @@ def elasticity(body: Body) -> FloatArray:
 
 
 def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
-    """Assemble the stiffness matrix of a body.
+    """Return K (2 n_nodes, 2 n_nodes) and the shape functions' gradients, both in the body's axes.
 
-    Returns
-    -------
-    matrix : FloatArray or scipy.sparse array, shape (2 n_nodes, 2 n_nodes)
-        The stiffness K in the body's axes: dense up to `DENSE_LIMIT` unknowns, else sparse.
-    gradients : FloatArray, shape (n_cells, n_points, n_corners, 2)
-        The gradients of the shape functions at the Gauss points, in the body's axes.
+    K is dense up to `DENSE_LIMIT` unknowns, else sparse. Gradients are (n_cells, n_points, n_corners, 2).
     """
     gradients, areas = _evaluate_shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
     n_cells, n_points, n_corners, _ = gradients.shape

@@ -105,13 +105,6 @@ def mean_node_lengths(interface: Interface, forces: FloatArray) -> FloatArray:
     """Return the length (n_multipliers,) that each nodal multiplier stands for.
 
     It is half of the segments beside the slave nodes that it pushes, weighted by its forces.
-
-    Parameters
-    ----------
-    interface : Interface
-        The interface.
-    forces : FloatArray, shape (n_multipliers, n_unknowns)
-        The nodal forces of unit multipliers.
     """
     halves = np.repeat(interface.slave.lengths(interface.nodes) / 2, 2)
     lengths = np.bincount(interface.slave.segments.reshape(-1), weights=halves, minlength=interface.n_slave_nodes)

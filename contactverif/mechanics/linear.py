@@ -36,19 +36,10 @@ class Step:
 
 
 def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None = None) -> Step:
-    """Solve matrix · step = right.
+    """Solve matrix · step = right (n,), where multipliers come behind `n_positions` unknowns that are positions.
 
-    Parameters
-    ----------
-    matrix : FloatArray or scipy.sparse array, shape (n, n)
-        The derivative of the residual.
-    right : FloatArray, shape (n,)
-        The negative residual.
-    n_positions : int
-        The number of unknowns that are positions; the multipliers come behind them.
-    floor : FloatArray | None, shape (n,)
-        The largest part of `right` that roundoff alone may cause; 0 by default. Constraints that depend on one another
-        must not contradict one another by more.
+    `floor` (n,) is the largest part of `right` that roundoff alone may cause; 0 by default. Constraints that depend on
+    one another must not contradict one another by more.
     """
     if n_positions == len(right):
         step, condition = _factorise(matrix, right)
@@ -72,22 +63,10 @@ def _solve_saddle_point(matrix: Any, right: FloatArray, n_positions: int, floor:
 
 
 def scale_factors(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray]:
-    """Return factors that make constraints and multipliers comparable with forces and positions.
+    """Return factors (n,) of rows and of columns that make multipliers comparable with positions.
 
-    Parameters
-    ----------
-    matrix : FloatArray or scipy.sparse array, shape (n, n)
-        The derivative of the residual.
-    n_positions : int
-        The number of unknowns that are positions.
-
-    Returns
-    -------
-    rows : FloatArray, shape (n,)
-        The factors of rows, 1 for forces.
-    columns : FloatArray, shape (n,)
-        The factors of columns, 1 for positions. The factor of a multiplier's column is the pressure or force that has
-        as much effect as a unit of displacement.
+    They are 1 for forces and for positions. The factor of a multiplier's column is the pressure or force that has as
+    much effect as a unit of displacement.
     """
     bulk, transfer = abs(matrix[:n_positions, :n_positions]), abs(matrix[:n_positions, n_positions:])
     stiffest, widest = (float(part.max()) if min(part.shape) else 0.0 for part in (bulk, transfer))

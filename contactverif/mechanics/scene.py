@@ -364,15 +364,10 @@ def forget_bodies() -> None:
 
 
 def scene_of(case: Case) -> Scene:
-    """Return the scene of a case that `Scene.case` made.
+    """Return the scene of a case that `Scene.case` made; bodies that two cases share are two bodies then.
 
     The last cases have their scenes still, with whatever is condensed of them. Any other case, such as a stored one,
     gives the same scene to the last bit.
-
-    Returns
-    -------
-    Scene
-        The scene; bodies that two cases share are two bodies here.
     """
     if (scene := _ORIGINS.find(case)) is not None:
         return scene

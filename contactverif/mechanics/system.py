@@ -145,23 +145,9 @@ class System:
         return bool(largest > 0 and np.abs(residual).max(initial=0.0) <= tolerance * largest)
 
     def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
-        """Return the derivative of the residual, and the part of the residual that roundoff alone may cause.
+        """Return the derivative (n, n) of the residual, and the part (n,) of it that roundoff alone may cause.
 
         The residual of a formulation without a tangent is differentiated on the frozen pairing.
-
-        Parameters
-        ----------
-        u : FloatArray, shape (n,)
-            The unknowns.
-        pairing : Pairing | None
-            The frozen pairing.
-
-        Returns
-        -------
-        matrix : FloatArray or scipy.sparse array, shape (n, n)
-            The derivative.
-        floor : FloatArray, shape (n,)
-            The effect of the roundoff of positions and forces on each entry of the residual.
         """
         return self.assemble(u, pairing, *self.forces_and_tangent(u, pairing))
 
@@ -184,14 +170,7 @@ class System:
     def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
         """Return the part of the residual (n,) that roundoff of positions and forces alone may cause.
 
-        Parameters
-        ----------
-        u : FloatArray, shape (n,)
-            The unknowns.
-        contact : FloatArray or scipy.sparse array, shape (n, n)
-            The derivative of the contact forces there, or nearby.
-        forces : FloatArray, shape (n_unknowns + n_multipliers,)
-            The contact forces.
+        `contact` (n, n) is the derivative of the contact forces at u, or nearby.
         """
         start = process_time()
         scene, n_free = self.scene, self.scene.n_free

@@ -4,12 +4,15 @@ Rule for the next editor: the judge shares no code with the judged. No plugin us
 the compiled geometry of plugins. Where it is affordable, the arithmetic is rational and thus exact.
 """
 
-from contactverif.oracle.consistent import uniform_pressure_weights, uniform_pressure_weights_exact
 from contactverif.oracle.exact_nearest import Nearest, NearSegment, nearest_segments
 from contactverif.oracle.exact_projection import Projection, project_point, projection_cases
+from contactverif.oracle.flat_answers import (
+    is_of_class,
+    nodal_spring_weights,
+    uniform_pressure_weights,
+    uniform_pressure_weights_exact,
+)
 from contactverif.oracle.kink_distance import default_points, kink_margin
-from contactverif.oracle.mesh_classes import is_of_class
-from contactverif.oracle.nodal_springs import nodal_spring_weights
 from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 
 __all__ = [

@@ -25,23 +25,10 @@ DEEP = 2.0  # Segments that penetrate by more than this many lengths of both nee
 
 
 def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return how much farther than the nearest closed segment the chosen ones are.
+    """Return how much farther than the nearest closed segment the chosen ones are, and how many are nearest.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The state.
-    points : ExactPoints
-        The points.
-    segments : IntArray, shape (n_points,)
-        The master segment that was chosen for each point.
-
-    Returns
-    -------
-    excess : FloatArray, shape (n_points,)
-        The distance of the chosen segment less the least distance, a length ≥ 0.
-    ties : IntArray, shape (n_points,)
-        The number of segments at the least distance, exactly.
+    Both are (n_points,): a length ≥ 0, and the exact number of segments at the least distance. `segments` (n_points,)
+    are the master segments that were chosen.
     """
     point, candidate = _near_pairs(lattice, points, segments)
     nodes, master = [tuple(node) for node in lattice.nodes.tolist()], lattice.master.tolist()
@@ -88,24 +75,9 @@ def seen_excess(
 ) -> FloatArray:
     """Return how far the chosen segments are from being the nearest that the slave sees along its normal.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The state.
-    points : ExactPoints
-        The points.
-    slave_segment : IntArray, shape (n_points,)
-        Their slave segments.
-    segments : IntArray, shape (n_points,)
-        The master segment that was chosen for each point.
-    cells : bool
-        The choice may also be made in the middle of the overlap of the two segments, once for all points of a cell.
-
-    Returns
-    -------
-    FloatArray, shape (n_points,)
-        A length ≥ 0: how much farther the chosen segment is than the nearest, or how far the foot lies past its end;
-        infinite where it does not face the slave.
+    That is a length ≥ 0 (n_points,): how much farther the chosen segment is than the nearest, or how far the foot lies
+    past its end; infinite where it does not face the slave. With `cells` the choice may also be made in the middle of
+    the overlap of the two segments, once for all points of a cell.
     """
     view = slave_normal_view(lattice, points, segments)
     past = np.maximum(np.maximum(-view.xi.floats(), view.xi.floats() - 1), 0.0) * view.master_length
@@ -145,13 +117,8 @@ def _middles(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> E
 def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> tuple[Integers, Integers, Integers]:
     """Return the overlaps of slave segments with master segments that face them, seen along the slave's normal.
 
-    Returns
-    -------
-    low, high : Integers, shape (n_pairs,)
-        The ends c of the overlap on the slave segment times `squared`, cut to the segment; high ≤ low where there is
-        none.
-    squared : Integers, shape (n_pairs,)
-        The square of the slave segment's length on the lattice.
+    They are low, high and `squared` (n_pairs,): the ends c on the slave segment times `squared`, cut to the segment,
+    with high ≤ low where there is none; and the square of the slave segment's length on the lattice.
     """
     x_a, x_b = (lattice.nodes[lattice.slave[slave_segment, end]] for end in (0, 1))
     x_1, x_2 = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))

@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import NamedTuple
 
+from contactverif.contract.arrays import FloatArray
+
 Point = tuple[int, int]
 
 
@@ -26,6 +28,13 @@ class Reach(NamedTuple):
     across: int  # The gap × length of the segment × W: positive on the right of the segment, negative on its left.
     past: int  # The length by which the foot lies at or past an end, times the segment's length and W; 0 inside.
     end: int  # The end that is nearest: 0 or 1, or −1 where the foot lies inside.
+
+
+def integers(values: FloatArray) -> tuple[list[int], int]:
+    """Return integers and one power of two, the scale, such that value = integer / scale exactly."""
+    ratios = [value.as_integer_ratio() for value in values.reshape(-1).tolist()]
+    scale = max(denominator for _, denominator in ratios)
+    return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
 
 
 def subtract(a: Point, b: Point) -> Point:

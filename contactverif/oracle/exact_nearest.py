@@ -14,8 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.oracle.exact_distance import Reach, nearest_of, reach
-from contactverif.oracle.rationals import integers
+from contactverif.oracle.exact_distance import Reach, integers, nearest_of, reach
 
 # The distance below has an error of at most 16 u (L + |P − A|); this leaves room for whoever writes it otherwise.
 _DOUBT = 64 * UNIT_ROUNDOFF
@@ -63,14 +62,7 @@ class Nearest:
 def nearest_segments(nodes: FloatArray, segments: IntArray, point: tuple[float, float]) -> Nearest:
     """Return all nearest segments to a point, in exact arithmetic on the stored floats.
 
-    Parameters
-    ----------
-    nodes : FloatArray, shape (n_nodes, 2)
-        The positions.
-    segments : IntArray, shape (n_segments, 2)
-        The numbers of the first and the second node of each segment; the body is on its left.
-    point : tuple[float, float]
-        The point.
+    Positions are (n_nodes, 2); segments (n_segments, 2) have the body on their left.
     """
     candidates = _candidates(nodes, segments, np.array(point))
     ends = segments[candidates]

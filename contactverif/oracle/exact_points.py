@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.rationals import integers
+from contactverif.oracle.exact_distance import integers
 
 Integers = NDArray[Any]  # An array of Python integers of any size.
 

@@ -16,8 +16,16 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_distance import Point, cross, dot, nearest_of, reach, squared_overshoot, subtract
-from contactverif.oracle.rationals import integers
+from contactverif.oracle.exact_distance import (
+    Point,
+    cross,
+    dot,
+    integers,
+    nearest_of,
+    reach,
+    squared_overshoot,
+    subtract,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +47,11 @@ class Projection:
 
 
 def project_point(interface: Interface, z: FloatArray, slave_segment: int, c: float | Fraction) -> Projection:
-    """Project a point of a slave segment onto the master, in exact arithmetic.
+    """Project the point at c ∈ [−1, 1] of a slave segment onto the master, in exact arithmetic.
 
     The nearest closed segment is taken; where the foot lies at or past an end, the distance is that to the end node. A
     tie is decided by the smallest overshoot, the length of the unclipped foot past the segment's end, then by the lower
     number.
-
-    Parameters
-    ----------
-    interface : Interface
-        The two meshes.
-    z : FloatArray, shape (n_unknowns,)
-        The current positions, flat.
-    slave_segment : int
-        The number of the slave segment.
-    c : float | Fraction
-        The place on it, from −1 at its first node to +1 at its second.
     """
     exact = _Exact(interface, z, [Fraction(c)])
     return exact.nearest(exact.point(slave_segment, Fraction(c)))
@@ -105,24 +102,10 @@ class _Exact:
 def projection_cases(interface: Interface, z: FloatArray, n: int = 2) -> Counter[str]:
     """Count how the areas of competence of n virtual slave nodes a segment fall on the master; for small meshes.
 
-    The virtual slave nodes lie at c = −1 + (2k+1)/n.
-
-    Parameters
-    ----------
-    interface : Interface
-        The two meshes.
-    z : FloatArray, shape (n_unknowns,)
-        The current positions, flat.
-    n : int
-        The number of virtual slave nodes on each slave segment.
-
-    Returns
-    -------
-    Counter[str]
-        The number of each of these: "one segment"; the roles "first", "intermediate" and "last" of segments where there
-        are several; "node exactly hit" by a foot or an end; "beyond an end"; "convex vertex" and "concave vertex"
-        inside an area; "edge-on", before a segment seen edge-on or from behind, where the walk stops; "turned away",
-        where nothing is covered.
+    The virtual slave nodes lie at c = −1 + (2k+1)/n. Counted are "one segment"; the roles "first", "intermediate" and
+    "last" of segments where there are several; "node exactly hit" by a foot or an end; "beyond an end"; "convex vertex"
+    and "concave vertex" inside an area; "edge-on", before a segment seen edge-on or from behind, where the walk stops;
+    "turned away", where nothing is covered.
     """
     counts: Counter[str] = Counter()
     half = Fraction(1, n)

@@ -21,14 +21,8 @@ _SNAP = 1e-2  # Formulations may still see contact past a free end by this share
 def default_points(interface: Interface) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Return contact points for plugins that name none: nodes, quarter points and middles of the slave segments.
 
-    Returns
-    -------
-    slave_segment : IntArray, shape (n_points,)
-        The segment of each point; five points a segment.
-    c : FloatArray, shape (n_points,)
-        The place of each point on its segment.
-    area_from, area_to : FloatArray, shape (n_points,)
-        The ends of the areas of competence: the half of the segment around a quarter point, NaN for other points.
+    They are `slave_segment`, `c`, `area_from` and `area_to` (n_points,), five points a segment. The area of competence
+    of a quarter point is its half of the segment; its ends are NaN for other points.
     """
     places = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
     count = len(interface.slave)
@@ -47,35 +41,19 @@ def kink_margin(
 ) -> float:
     """Return how far every node may move, at least, before a formulation of the node-to-segment kind decides otherwise.
 
-    Parameters
-    ----------
-    interface : Interface
-        The two meshes.
-    z : FloatArray, shape (n_unknowns,)
-        The current positions, flat.
-    slave_segment, c : ArrayLike, shape (n_points,)
-        The contact points; −1 or NaN is no point.
-    area_from, area_to : ArrayLike | None, shape (n_points,)
-        The ends of their areas of competence, as `c`; NaN or None where there is none. An end exactly at the node where
-        the walk must stop was cut there by the formulation, which is no decision.
+    That is a length r ≥ 0. As long as no node moves by more than r, the same master segment is nearest to each point,
+    its gap keeps its sign, its foot stays on its side of a free end (and of 1e-2 segments past it), and the walk from
+    that segment to the ends of the area crosses the same nodes. Never more than ℓ/8, with ℓ the shortest master
+    segment.
 
-    Returns
-    -------
-    float
-        A length r ≥ 0. As long as no node moves by more than r, the same master segment is nearest to each point, its
-        gap keeps its sign, its foot stays on its side of a free end (and of 1e-2 segments past it), and the walk from
-        that segment to the ends of the area crosses the same nodes. Never more than ℓ/8, with ℓ the shortest master
-        segment.
+    Points and ends of areas of competence are (n_points,); −1, NaN or None is no point and no area. An end exactly at
+    the node where the walk must stop was cut there by the formulation, which is no decision.
 
-    Notes
-    -----
     Points are convex combinations of nodes, so a difference d of two places changes by 2r, and the tangent of a segment
     of length l turns by at most 1.05 (2r/l) while r ≤ l/8. Thus d·t changes by less than 3r (1 + |d|/l), and each
     decision of that form gets the margin |d·t| / 3(1 + |d|/l). The bisector at a vertex, whose direction is the mean of
     two, has the mean of both 1/l. For gaps the overshoot of the foot replaces |d|, since a line moves by r (1 + 2
     overshoot/l) there. Other pairs of segments get a quarter of the difference of the distances, which changes by 4r.
-    The bound is conservative by a factor of about 2. It is computed in floats and means nothing below roundoff, some u
-    X.
     """
     nodes = np.asarray(z, dtype=np.float64)[: interface.n_unknowns].reshape(-1, 2)
     valid = (np.asarray(slave_segment) >= 0) & np.isfinite(c)

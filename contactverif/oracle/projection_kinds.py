@@ -22,21 +22,7 @@ Vector = tuple[Fraction, Fraction]
 
 
 def is_of_kind(interface: Interface, z: FloatArray, kind: str, slave_segment: int, c: float) -> bool:
-    """Return whether the projection of a slave point onto the master is of a kind.
-
-    Parameters
-    ----------
-    interface : Interface
-        The two meshes.
-    z : FloatArray, shape (n_unknowns,)
-        The current positions, flat.
-    kind : str
-        One of `KIND_TESTS`.
-    slave_segment : int
-        The number of the slave segment that carries the point.
-    c : float
-        The place of the point on it, from −1 to 1.
-    """
+    """Return whether the projection of the point at c ∈ [−1, 1] of a slave segment is of a kind of `KIND_TESTS`."""
     return KIND_TESTS[kind](_Probe(interface, z, slave_segment, c))
 
 

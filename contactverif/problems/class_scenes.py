@@ -1,6 +1,6 @@
 """Two blocks whose meshes belong to the classes on which simple formulations pass the patch test, in finite lists.
 
-`contactverif.oracle.mesh_classes` says what the classes are. The pressure is uniform and known exactly.
+`contactverif.oracle.flat_answers` says what the classes are. The pressure is uniform and known exactly.
 
 Rule for the next editor: roundoff decides nothing. In the paper's scenes, where both surfaces end together, coordinates
 along the interface are exact. In ours the master goes beyond the slave, so that no slave node faces a free end.

@@ -1,7 +1,7 @@
 """Flat interfaces under uniform penetration, for the patch test: any meshes, and those of the paper's classes.
 
 Each slave chain lies wholly over one master chain; ends may coincide. Meshes match or not, neighbours' lengths differ
-by up to 2^20, and up to 100 master segments lie under one slave segment. `contactverif.oracle.mesh_classes` says what
+by up to 2^20, and up to 100 master segments lie under one slave segment. `contactverif.oracle.flat_answers` says what
 the classes are: of the slave's nodes, and of the middles of its segments, some carry a master node.
 """
 
@@ -20,7 +20,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.oracle.mesh_classes import is_of_class
+from contactverif.oracle.flat_answers import is_of_class
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
 from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles

@@ -24,30 +24,16 @@ from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_kernel, match_precision
 from contactverif.geometry.projection import frame, node
 from contactverif_mortar.cell_geometry import (
-    D_C,
     D_WEIGHT,
     A,
     B,
     cut_gains,
-    facing_point,
     point_gains,
     seen_from,
     slave_view,
     turn_of_ends,
 )
-from contactverif_mortar.integration_cells import (
-    GAP,
-    NORMAL_X,
-    NORMAL_Y,
-    WEIGHT,
-    XI,
-    C,
-    Cells,
-    Fields,
-    Quadrature,
-    Sides,
-    any_end,
-)
+from contactverif_mortar.integration_cells import Cells, Fields, Quadrature, Sides, any_end, place_gains, write_point
 
 LOW, HIGH = 4, 5  # The local nodes that cut a range, behind A, B, 1 and 2.
 N_LOCAL = 6
@@ -167,12 +153,7 @@ def _points(x: Array, segments: Fields, ranges: Fields, rule: Fields) -> Array:
             length, _, _ = frame(view.x_a, view.x_b)
             if not current:
                 length = 0 * length + reference_length[s]
-            c = (low + high) / 2 + (high - low) / 2 * places[q]
-            xi, gap, n = facing_point(view, x_1, x_2, c)
-            point = points[state, number]
-            point[C], point[XI], point[GAP] = c, xi, gap
-            point[WEIGHT] = weights[q] * (high - low) / 2 * length
-            point[NORMAL_X], point[NORMAL_Y] = n
+            write_point(points[state, number], view, x_1, x_2, low, high, places[q], weights[q], length)
     return points
 
 
@@ -202,11 +183,7 @@ def _gains(x: FloatArray, segments: Fields, ranges: Fields, rule: Fields) -> Flo
         length, t_s, _ = frame(view.x_a, view.x_b)
         if not current:
             length = reference_length[s]
-        for k in range(N_LOCAL):
-            for i in range(2):
-                spread = d_high[k, i] - d_low[k, i]
-                d[D_C, k, i] = (d_low[k, i] + d_high[k, i]) / 2 + spread / 2 * places[q]
-                d[D_WEIGHT, k, i] = weights[q] * spread / 2 * length
+        place_gains(d, d_low, d_high, places[q], weights[q], length)
         if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
             share = weights[q] * (high - low) / 2
             for i in range(2):

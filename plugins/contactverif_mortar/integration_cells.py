@@ -22,7 +22,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_kernel, compile_part, match_precision
+from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
@@ -237,6 +237,26 @@ def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bo
     return low, high
 
 
+@compile_inline
+def write_point(
+    point: Array,
+    view: SlaveView,
+    x_1: Vector,
+    x_2: Vector,
+    low: float,
+    high: float,
+    place: float,
+    weight: float,
+    length: float,
+) -> None:
+    """Write the six numbers of the point at a place of the rule on the part [low, high] of a slave segment."""
+    c = (low + high) / 2 + (high - low) / 2 * place
+    xi, gap, n = facing_point(view, x_1, x_2, c)
+    point[C], point[XI], point[GAP] = c, xi, gap
+    point[WEIGHT] = weight * (high - low) / 2 * length
+    point[NORMAL_X], point[NORMAL_Y] = n
+
+
 @compile_kernel
 def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
     """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
@@ -256,12 +276,7 @@ def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
             if not current:
                 length = 0 * length + reference_length[s]
             for q in range(n_q):
-                c = (low + high) / 2 + (high - low) / 2 * places[q]
-                xi, gap, n = facing_point(view, x_1, x_2, c)
-                point = points[state, cell * n_q + q]
-                point[C], point[XI], point[GAP] = c, xi, gap
-                point[WEIGHT] = weights[q] * (high - low) / 2 * length
-                point[NORMAL_X], point[NORMAL_Y] = n
+                write_point(points[state, cell * n_q + q], view, x_1, x_2, low, high, places[q], weights[q], length)
     return points
 
 
@@ -290,7 +305,7 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
             length = reference_length[s]
         for q in range(n_q):
             d = gains[cell * n_q + q]
-            _place_gains(d, d_low, d_high, places[q], weights[q], length)
+            place_gains(d, d_low, d_high, places[q], weights[q], length)
             if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
                 share = weights[q] * (high - low) / 2
                 for i in range(2):
@@ -302,7 +317,7 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
 
 
 @compile_part
-def _place_gains(
+def place_gains(
     d: FloatArray, d_low: FloatArray, d_high: FloatArray, place: float, weight: float, length: float
 ) -> None:
     """Write Δc and, at a fixed length of the slave segment, Δ of the weight of a point into `d` (5, n_local, 2)."""

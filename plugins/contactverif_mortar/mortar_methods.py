@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, BoolArray, FloatArray
+from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
@@ -27,7 +27,7 @@ from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
 from contactverif_mortar.node_factors import Factors
 from contactverif_mortar.node_rows import NodeState
-from contactverif_mortar.weighted_gaps import StateWeights, Weighting, own_lengths
+from contactverif_mortar.weighted_gaps import Carried, Weighting, own_lengths
 
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
@@ -65,7 +65,7 @@ class Mortar:
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        rows = self.weighting.tangent(interface, *self._node_state(interface, pairing, z))
+        rows = self.weighting.tangent(interface, self._carried(interface, pairing, z))
         return rows.forces, rows.rest
 
     def factors(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Factors:
@@ -74,19 +74,17 @@ class Mortar:
         The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
         the tangent, or that knows the pressures as unknowns of their own, does not need it.
         """
-        return self.weighting.factors(interface, *self._node_state(interface, pairing, z))
+        return self.weighting.factors(interface, self._carried(interface, pairing, z))
 
-    def _node_state(
-        self, interface: Interface, pairing: Pairing, z: FloatArray
-    ) -> tuple[Cells, BoolArray, StateWeights, FloatArray, NodeState]:
-        """Return the cells that carry pressures, which nodes are active, weights, positions and the slave nodes."""
+    def _carried(self, interface: Interface, pairing: Pairing, z: FloatArray) -> Carried:
+        """Return the cells that carry pressures, with the pressures of the slave nodes."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)
         integrals = self.weighting.weigh(interface, cells, x)
         areas = np.where(active, integrals.areas, 1.0)
         gaps = np.where(active, integrals.with_gap / areas, 0.0)
         weights = np.where(active, -self.penalty, 0.0)
-        return cells, active, integrals, x, NodeState(weights * gaps, weights, gaps, areas)
+        return Carried(cells, active, integrals, x, NodeState(weights * gaps, weights, gaps, areas))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""

@@ -60,6 +60,16 @@ class WeightedState(NamedTuple):
 StateWeights = Weights | WeightedState
 
 
+class Carried(NamedTuple):
+    """The cells that carry pressures at one state, and what a method makes of them."""
+
+    cells: Cells
+    active: BoolArray  # (n_slave_nodes,)
+    weights: StateWeights
+    x: FloatArray  # (n_nodes, 2)
+    state: NodeState
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Weighted:
     """The points of some cells at some states, the slave nodes' shapes there, and weighted gaps."""
@@ -121,38 +131,21 @@ class Weighting:
         _, gaps = self.gaps(interface, cells, x)
         return Pairing({**cells.as_arrays(), "active": multipliers - penalty * gaps >= 0})  # false where the gap is NaN
 
-    def tangent(
-        self,
-        interface: Interface,
-        cells: Cells,
-        active: BoolArray,
-        weights: StateWeights,
-        x: FloatArray,
-        state: NodeState,
-    ) -> NodeRows:
+    def tangent(self, interface: Interface, carried: Carried) -> NodeRows:
         """Compute forces and the assembled tangent, which is the `rest` of the result."""
-        n_nodes = len(active)
+        n_nodes = len(carried.active)
 
         def choose_pattern(groups: RowGroups) -> Couplings:
             check_product(groups.starts[: n_nodes + 1])
             return groups.pattern(0, n_nodes)
 
-        rows = self._rows(interface, cells, active, weights, x, state, choose_pattern)
-        rows.multiply(state.weights, 0, len(rows.groups.starts) - 1)
+        rows = self._rows(interface, carried, choose_pattern)
+        rows.multiply(carried.state.weights, 0, len(rows.groups.starts) - 1)
         return rows
 
-    def factors(
-        self,
-        interface: Interface,
-        cells: Cells,
-        active: BoolArray,
-        weights: StateWeights,
-        x: FloatArray,
-        state: NodeState,
-    ) -> Factors:
+    def factors(self, interface: Interface, carried: Carried) -> Factors:
         """Compute the tangent in factors at a state of the slave nodes."""
-        rows = self._rows(interface, cells, active, weights, x, state, RowGroups.pattern_of_cells)
-        return rows.factors(state.weights)
+        return self._rows(interface, carried, RowGroups.pattern_of_cells).factors(carried.state.weights)
 
     def saddle(
         self, interface: Interface, cells: Cells, active: BoolArray, x: FloatArray, multipliers: FloatArray
@@ -166,22 +159,16 @@ class Weighting:
                 return groups.pattern(n_nodes, len(groups.starts) - 1)
             return groups.pattern_of_cells()
 
-        rows = self._rows(interface, cells, active, weights, x, state, choose_pattern)
+        rows = self._rows(interface, Carried(cells, active, weights, x, state), choose_pattern)
         rows.multiply(ones, n_nodes, len(rows.groups.starts) - 1)
         rest, left, _, right = rows.factors(ones)
         return Factors(rest, left[:n_nodes], ones, right[:n_nodes])
 
     def _rows(
-        self,
-        interface: Interface,
-        cells: Cells,
-        active: BoolArray,
-        weights: StateWeights,
-        x: FloatArray,
-        state: NodeState,
-        choose_pattern: Callable[[RowGroups], Couplings],
+        self, interface: Interface, carried: Carried, choose_pattern: Callable[[RowGroups], Couplings]
     ) -> NodeRows:
         """Compute forces and factors, with a pattern for the rest that depends on the groups of the rows."""
+        cells, active, weights, x, state = carried
         groups = group_nodes(
             interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, self.dual
         )

@@ -39,7 +39,7 @@ from contactverif.geometry.threads import run_in_threads, split_range
 from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
-from contactverif_nts.point_contact import add_locking
+from contactverif_nts.point_contact import add_locking, place_points
 from contactverif_nts.walk import FREE_ENDS, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
@@ -165,26 +165,12 @@ class PatchTestPassing:
         whole = np.array([walk.middle_of_part(point, self.n, 1.0) for point in range(self.n)])
         whole = np.tile(np.column_stack([whole + 1 / self.n, whole - 1 / self.n]), (len(slave), 1))
         ends = np.where(shares[:, None] > 0, ends, whole)
-        c = ends.mean(axis=1)
         segment = np.repeat(np.arange(len(slave)), self.n)
-        x_a, x_b = np.swapaxes(x[slave[segment]], 0, 1)
-        position = (1 - c[:, None]) / 2 * x_a + (1 + c[:, None]) / 2 * x_b
-        x1, x2 = np.swapaxes(x[master[pairing["master"]]], 0, 1)
-        length = np.linalg.norm(x2 - x1, axis=1)
-        t = (x2 - x1) / length[:, None]
-        normal = np.column_stack([t[:, 1], -t[:, 0]])
-        d = (1 - c[:, None]) / 2 * (x_a - x1) + (1 + c[:, None]) / 2 * (x_b - x1)  # differences first
-        gap = (d[:, 0] * (x2 - x1)[:, 1] - d[:, 1] * (x2 - x1)[:, 0]) / length
-        pressure = multipliers if len(multipliers) else -self.penalty * gap
+        place = place_points(interface, x, segment, ends.mean(axis=1), pairing["master"])
+        pressure = multipliers if len(multipliers) else -self.penalty * place["gap"]
         lengths = interface.slave.lengths(x if self.current_area else interface.nodes)
         return ContactPoints(
-            slave_segment=segment,
-            c=c,
-            master_segment=pairing["master"],
-            xi=(d * t).sum(axis=1) / length,
-            position=position,
-            normal=normal,
-            gap=gap,
+            **place,
             pressure=np.where(pairing["active"], pressure, 0.0),
             weight=lengths[segment] * shares,
             active=pairing["active"],

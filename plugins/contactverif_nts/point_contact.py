@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -96,15 +97,8 @@ class PointContact:
         The ends of areas of competence are NaN: the points stand for areas, but no decision depends on where they end.
         """
         x, multipliers = split_state(interface, z)
-        ends = x[interface.slave.segments[pairing["segment"]]]  # (n_points, 2, dim)
-        c = self.c[pairing["slot"]]
-        position = (1 - c[:, None]) / 2 * ends[:, 0] + (1 + c[:, None]) / 2 * ends[:, 1]
-        x1, x2 = np.swapaxes(x[interface.master.segments[pairing["master"]]], 0, 1)
-        length = np.linalg.norm(x2 - x1, axis=1)
-        t = (x2 - x1) / length[:, None]
-        normal = np.column_stack([t[:, 1], -t[:, 0]])
-        d = (1 - c[:, None]) / 2 * (ends[:, 0] - x1) + (1 + c[:, None]) / 2 * (ends[:, 1] - x1)  # differences first
-        gap = (d[:, 0] * (x2 - x1)[:, 1] - d[:, 1] * (x2 - x1)[:, 0]) / length
+        place = place_points(interface, x, pairing["segment"], self.c[pairing["slot"]], pairing["master"])
+        gap = place["gap"]
         measured = interface.nodes if self.area_from == eq6.REFERENCE else x
         lengths = np.append(interface.slave.lengths(measured), 0.0)  # the last one stands for "no segment", −1
         weight = self.weight[pairing["slot"]] * (lengths[pairing["segment"]] + lengths[pairing["other"]])
@@ -113,13 +107,7 @@ class PointContact:
         pressure = multipliers if len(multipliers) else -self.penalty * gap
         undefined = np.full_like(gap, np.nan)
         return ContactPoints(
-            slave_segment=pairing["segment"],
-            c=c,
-            master_segment=pairing["master"],
-            xi=(d * t).sum(axis=1) / length,
-            position=position,
-            normal=normal,
-            gap=gap,
+            **place,
             pressure=np.where(pairing["active"], pressure, 0.0),
             weight=weight,
             active=pairing["active"],
@@ -150,6 +138,26 @@ class PointContact:
         reference, c, weight = match_precision(z, interface.nodes, self.c, self.weight)
         points = tuple([pairing[name] for name in eq6.Points._fields])
         return self._surfaces(interface, reference), points, (c, weight, self.area_from, self.penalty)
+
+
+def place_points(
+    interface: Interface, x: FloatArray, segment: IntArray, c: FloatArray, master: IntArray
+) -> dict[str, Any]:
+    """Return what contact points at c on slave segments see of their master segments, by the names of the fields."""
+    ends = x[interface.slave.segments[segment]]  # (n_points, 2, dim)
+    x1, x2 = np.swapaxes(x[interface.master.segments[master]], 0, 1)
+    length = np.linalg.norm(x2 - x1, axis=1)
+    t = (x2 - x1) / length[:, None]
+    d = (1 - c[:, None]) / 2 * (ends[:, 0] - x1) + (1 + c[:, None]) / 2 * (ends[:, 1] - x1)  # differences first
+    return {
+        "slave_segment": segment,
+        "c": c,
+        "master_segment": master,
+        "xi": (d * t).sum(axis=1) / length,
+        "position": (1 - c[:, None]) / 2 * ends[:, 0] + (1 + c[:, None]) / 2 * ends[:, 1],
+        "normal": np.column_stack([t[:, 1], -t[:, 0]]),
+        "gap": (d[:, 0] * (x2 - x1)[:, 1] - d[:, 1] * (x2 - x1)[:, 0]) / length,
+    }
 
 
 def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
