@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
     from contactverif.run.judge import judge_case
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import run as verify
+    from contactverif.run.run import run as verify
 
 __version__ = "0.1.0"
 
@@ -63,8 +63,9 @@ _HOMES = {
     "mechanics.scene": ("Scene",),
     "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),
     "meshes.mesh_file": ("read_interface",),
+    "run.judge": ("judge_case",),
     "run.registry": ("load_formulation", "load_properties"),
-    "run.runner": ("judge_case", "verify"),
+    "run.run": ("verify",),
     "problems.blocks": ("two_blocks",),
     "problems.catalogue": ("load_scene",),
     "problems.named_states": ("named_case",),

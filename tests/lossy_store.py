@@ -6,7 +6,7 @@ import pytest
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome
-from contactverif.run.outcome_store import OutcomeStore
+from contactverif.run.rows import OutcomeStore
 
 
 def lose_one_outcome(monkeypatch: pytest.MonkeyPatch) -> None:

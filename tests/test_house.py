@@ -231,7 +231,7 @@ def test_imports_run_one_way(module: str) -> None:
         ),
         (
             "contactverif_nts.a",
-            "if TYPE_CHECKING:\n    from contactverif.run.runner import run",
+            "if TYPE_CHECKING:\n    from contactverif.run.run import run",
             "contactverif_nts may not import run",
         ),
         ("contactverif_nts.a", "import contactverif_mortar.b", "contactverif_nts may not import contactverif_mortar"),
@@ -273,7 +273,7 @@ def test_the_reader_of_imports_sees_a_wrong_one(module: str, source: str, messag
             "contactverif.contract.a",
             "from scipy import sparse\nfrom scipy.sparse import linalg\nfrom .case import Case",
         ),
-        ("contactverif.cli.a", "from contactverif.run.runner import run\nimport os\nprint(1)"),
+        ("contactverif.cli.a", "from contactverif.run.run import run\nimport os\nprint(1)"),
     ],
 )
 def test_the_reader_of_imports_lets_a_right_one_pass(module: str, source: str) -> None:

@@ -52,7 +52,7 @@ from contactverif.oracle import projection_cases
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties, property_ids, standalone_names
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verify --all --profile ci` asks.
 

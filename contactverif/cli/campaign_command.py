@@ -13,8 +13,8 @@ from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, make_plan, new_job
 
 if TYPE_CHECKING:
+    from contactverif.run.campaign import Shard
     from contactverif.run.run_journal import Plan
-    from contactverif.run.shards import Shard
 
 CAMPAIGN = "campaign"
 _SEED = 0  # The seed if there is none: all shards must have the same.
@@ -52,8 +52,8 @@ def campaign(
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
       contactverif merge runs --out nts-ar.nc
     """
+    from contactverif.run.campaign import Shard, open_shard
     from contactverif.run.journal import hold_journal
-    from contactverif.run.shards import Shard, open_shard
     from contactverif_reports.files import made_folder
 
     piece = Shard.parse(shard)
@@ -79,8 +79,10 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
     from contactverif.contract.property import Property
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
+    from contactverif.run.campaign import mark_done
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.shards import judge_shard
+    from contactverif.run.run import judge_share
+    from contactverif.run.run_journal import Journal
 
     limits = job.options.isolation.limits()
     items = [*(load_formulation(name, limits) for name in job.options.names), *load_properties(job.options.properties)]
@@ -91,6 +93,7 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
     subjects = [item for item in items if isinstance(item, Subject)]
     questions = [item for item in items if isinstance(item, Property)]
     with Bar() as bar:
-        count = judge_shard(shard, subjects, questions, job.sampling, bar.show_progress, folder, plan)
+        journal = Journal(plan, folder, [folder])
+        judge_share(subjects, questions, job.sampling, bar.show_progress, journal, share=shard.share)
     show_what_plugins_printed()
-    return count
+    return mark_done(folder, plan)

@@ -29,10 +29,10 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
-from contactverif.run.completeness import find_gap
 from contactverif.run.judge import forces_on
 from contactverif.run.registry import formulation_names, load_formulation, load_properties
-from contactverif.run.workers import worker_pool
+from contactverif.run.rows import find_gap
+from contactverif.run.scheduler import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing

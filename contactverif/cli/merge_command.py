@@ -36,7 +36,7 @@ def merge(
     \bExample
       contactverif merge runs --out nts-ar.nc --out nts-ar.html
     """
-    from contactverif.run.shards import read_shards
+    from contactverif.run.campaign import read_shards
 
     plan, journals = read_shards(folder, _FOLDER)
     options = options_of(plan, CAMPAIGN, _FOLDER)

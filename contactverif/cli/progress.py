@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from contactverif.contract.foreign_text import one_line
-from contactverif.run import runner
+from contactverif.run import scheduler
 
 _LONGEST = 120  # Characters beside the bar.
 
@@ -55,8 +55,8 @@ class Bar:
         self._interrupted = True
         raise KeyboardInterrupt
 
-    def show_progress(self, step: runner.Progress) -> None:
-        """Show how far a run is; the runner calls this after every case."""
+    def show_progress(self, step: scheduler.Progress) -> None:
+        """Show how far a run is; the scheduler calls this after every case."""
         self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.count, step.planned)
 
     def update(self, description: str, n_finished: int, n_planned: int) -> None:

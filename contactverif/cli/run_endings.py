@@ -101,8 +101,8 @@ def watch_for_stops(job: VerifyJob) -> Iterator[None]:
     """
     from contactverif.cli.console import show
     from contactverif.cli.run_tables import RunTable
-    from contactverif.run.runner import RunStopped
-    from contactverif.run.workers import WorkerError
+    from contactverif.run.run import RunStopped
+    from contactverif.run.scheduler import WorkerError
 
     try:
         yield

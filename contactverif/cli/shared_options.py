@@ -97,7 +97,7 @@ class WorkerOptions:
 
     def number(self, n_formulations: int, n_properties: int, examples: int) -> int:
         """Return the number of processes: the user's, or one that fits the work."""
-        from contactverif.run.workers import check_jobs, default_jobs
+        from contactverif.run.scheduler import check_jobs, default_jobs
 
         if self.jobs is None:
             return default_jobs(n_formulations * n_properties * examples)

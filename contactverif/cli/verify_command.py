@@ -107,10 +107,10 @@ def verify(
 def run_job(job: VerifyJob) -> int:
     """Judge what a job says, show the tables and write the files; return the exit status."""
     from contactverif.cli.progress import Bar
-    from contactverif.run.completeness import find_gap
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import run
-    from contactverif.run.workers import worker_pool
+    from contactverif.run.rows import find_gap
+    from contactverif.run.run import run
+    from contactverif.run.scheduler import worker_pool
 
     limits = job.options.isolation.limits()
     with watch_for_stops(job), ExitStack() as stack:

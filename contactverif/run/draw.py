@@ -19,7 +19,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Property
+from contactverif.contract.property import Outcome, Property
 from contactverif.run.hypothesis_draws import (
     Draw,
     draw_all,
@@ -123,9 +123,9 @@ def draw_block(
     return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
 
 
-def draws_blocks(source: RandomSource, *, seed: str, examples: int) -> bool:
-    """Return whether a strategy is drawn block by block; otherwise the first block has all cases."""
-    return _block_of(source, seed, examples, 0) is not None
+def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
+    """Return whether cases are drawn block by block; otherwise the first block has all cases."""
+    return not isinstance(source, tuple) and _block_of(source, seed, examples, 0) is not None
 
 
 def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
@@ -136,6 +136,16 @@ def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> C
     if draws is None:
         return _draw_with_engine(source, seed=seed, examples=examples, progress=lambda _: None).cases[number]
     return draws[number % BLOCK].case
+
+
+def with_case(sampling: Sampling, question: Property, number: int, outcome: Outcome) -> Outcome:
+    """Return the outcome with this number in its row with its case, which is drawn once more if it was not kept."""
+    if isinstance(outcome.case_or_summary, Case):
+        return outcome
+    source = sampling.source(question)
+    assert source is not None
+    case = draw_case(source, seed=sampling.key(question), examples=sampling.examples, number=number)
+    return replace(outcome, case_or_summary=case)
 
 
 def shrink(

@@ -1,4 +1,4 @@
-"""The judgement of one case, and the order of outcomes from harmless to bad.
+"""The judgement of one case, the order of outcomes from harmless to bad, and the verdict over those of a row.
 
 Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
 """
@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from itertools import chain
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -21,6 +22,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
+from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
 
@@ -91,6 +93,36 @@ def badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
     if outcome.measurement is None or outcome.measurement.broken:
         return 1, inf
     return 1, max((number.ratio for number in checked_numbers(info, outcome.measurement)), default=inf)
+
+
+def verdict_over_all(row: Row) -> tuple[Verdict, str]:
+    """Return verdict and reason of a row from its outcomes."""
+    everything = chain(row.outcomes, [row.witness] if row.witness else [])
+    worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
+    if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
+        return worst.verdict, _reason_with_name(row, worst)
+    if row.judged < JUDGED_SHARE * row.planned:
+        cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
+        return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
+    if reason := _too_idle(row):
+        return Verdict.NOT_JUDGED, reason
+    return Verdict.PASS, ""
+
+
+def _too_idle(row: Row) -> str:
+    """Return why too few cases were in contact, or an empty string. One idle case may be chance; all of them is not."""
+    counts, least = row.tally.counts, row.info.least_contact
+    if not counts.idle or counts.contact_share >= least or (counts.idle == 1 and counts.judged > 1):
+        return ""
+    if counts.idle == counts.judged:
+        return "nothing was in contact in any case: nothing was judged"
+    return f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
+
+
+def _reason_with_name(row: Row, outcome: Outcome) -> str:
+    """Return the reason of an outcome, with the name of its case before it where a finite list has named it."""
+    name = outcome.case_or_summary.name
+    return f"{name}: {outcome.reason}" if name and outcome is not row.witness else outcome.reason
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:

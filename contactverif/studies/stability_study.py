@@ -10,7 +10,8 @@ from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.provenance import collect_provenance
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import Progress, run
+from contactverif.run.run import run
+from contactverif.run.scheduler import Progress
 
 PROPERTIES = ("stability.sweep", "stability.stiffness")  # Their cases are finite lists of named states.
 

@@ -16,7 +16,7 @@ from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.registry import load_formulation, load_properties, subject_of
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif.testing.failure_text import explain
 from contactverif.testing.parametrize import CheckOptions
 

@@ -6,11 +6,12 @@ Rule for the next editor: an item computes the same data in every process, and n
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
+from functools import partial
 from typing import Any
 
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.workers import Team
+from contactverif.run.scheduler import Job, Scheduler
 from contactverif_paper.items import ITEMS
 from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress, steps_of
 
@@ -24,7 +25,7 @@ def compute(
 ) -> Paper:
     """Compute the items."""
     selection = _select(items, with_study=with_study)
-    data = _compute_all(selection, report_progress, Team(executor))
+    data = _compute_all(selection, report_progress, executor)
     results = [ItemResult(item, each, item.statements(each), item.tables(each)) for item, each in data]
     return Paper(tuple(results), _provenance())
 
@@ -38,18 +39,22 @@ def _select(items: tuple[Item, ...], *, with_study: bool) -> tuple[Item, ...]:
     return tuple(item for item in items if with_study or not item.slow)
 
 
-def _compute_all(items: tuple[Item, ...], report_progress: Progress, team: Team) -> list[tuple[Item, Any]]:
+def _compute_all(
+    items: tuple[Item, ...], report_progress: Progress, executor: Executor | None
+) -> list[tuple[Item, Any]]:
     """Return each item with its data, in their order; the slow ones are begun first where processes share the work."""
-    if team.limit == 1:
+    if executor is None:
         return [(item, item.compute(report_progress)) for item in items]
-    numbers = sorted(range(len(items)), key=lambda number: not items[number].slow)
-    futures = {team.submit(_data_of, (items[number].compute,)): number for number in numbers}
     data: dict[int, Any] = {}
-    for future in as_completed(futures):
-        item = items[futures[future]]
-        data[futures[future]] = team.result(future, _data_of, (item.compute,))
-        for _ in range(item.n_steps):
-            report_progress(item.title)
+
+    def keep(number: int, answer: Any) -> tuple[()]:
+        data[number] = answer
+        for _ in range(items[number].n_steps):
+            report_progress(items[number].title)
+        return ()
+
+    numbers = sorted(range(len(items)), key=lambda number: not items[number].slow)
+    Scheduler(executor).work(Job(_data_of, (items[n].compute,), partial(keep, n)) for n in numbers)
     return [(item, data[number]) for number, item in enumerate(items)]
 
 

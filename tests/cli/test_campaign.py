@@ -24,7 +24,7 @@ N = 3
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif` with blocks of ten cases."""
-    for module in ("draw", "conductor", "shards"):
+    for module in ("draw", "run"):
         monkeypatch.setattr(f"contactverif.run.{module}.BLOCK", 10)
     return asking(monkeypatch, capsys)
 

@@ -19,7 +19,7 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif.run import judge as judging
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.write import write
 

@@ -60,7 +60,7 @@ def test_help_imports_nothing_that_takes_long(command: str) -> None:
 
 def test_a_run_that_solves_nothing_imports_no_mechanics() -> None:
     modules = modules_after("verify", "nts", "-p", "balance.*", "--examples", "2", "--seed", "1")
-    assert "contactverif.run.runner" in modules
+    assert "contactverif.run.run" in modules
     assert not {name for name in modules if name.startswith(FOR_SOLVING)}
 
 

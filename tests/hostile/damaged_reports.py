@@ -33,7 +33,7 @@ def write_report(path: Path, properties: Sequence[str] = PROPERTIES) -> str:
     """Write a small report of some properties; return the id of a counterexample."""
     from contactverif.contract.counterexample import counterexamples
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.runner import run
+    from contactverif.run.run import run
     from contactverif_reports.netcdf.write import write
 
     subjects = [load_formulation(name) for name in ("nts", "vts-ppt")]

@@ -14,7 +14,7 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties, property_ids
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 
 def load_property(property_id: str) -> Property:

@@ -16,7 +16,7 @@ from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 

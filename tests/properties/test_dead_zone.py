@@ -20,7 +20,7 @@ from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, 
 from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.patch_solved import patch_dead_zone, patch_flat_solve, patch_variants
 from contactverif_properties.shared.patch_errors import gap_error

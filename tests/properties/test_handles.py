@@ -17,7 +17,7 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.catalogue import load_scene
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 RIGHT = {
     "vts-ppt": contactverif_nts.vts_ppt,

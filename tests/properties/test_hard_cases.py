@@ -18,7 +18,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.hard_solved import covered_share
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]

@@ -25,7 +25,7 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
     script = (
         "import sys\n"
         "from contactverif.run.registry import load_properties\n"
-        "from contactverif.run.runner import run\n"
+        "from contactverif.run.run import run\n"
         "from contactverif.contract.subject import Subject\n"
         "class Silent:\n"
         "    def residual(self, interface, pairing, z): return 0 * z\n"

@@ -22,7 +22,7 @@ from contactverif.mechanics.trace import End
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.newton_attainable import newton_attainable
 from contactverif_properties.newton_convergence import (
     DISTANCES,

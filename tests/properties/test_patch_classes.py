@@ -26,7 +26,7 @@ from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_nts import force_tables
 from contactverif_properties.patch_flat import LOST_END
 

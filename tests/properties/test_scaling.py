@@ -11,7 +11,7 @@ from handmade import Springs, case, subject
 from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Traits
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.frames import SCALED_FORCES, SCALED_TANGENT, scaling
 
 SEEDS = range(1, 30)

@@ -21,7 +21,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration
@@ -140,7 +140,7 @@ from expected_verdicts import FAILS
 from subjects import load_property, load_subject
 
 from contactverif.contract.property import Verdict
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 result = run([load_subject(name) for name in FAILS], [load_property("stability.local")], examples=10, seed=0)
 for row in result.rows:

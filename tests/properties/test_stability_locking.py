@@ -24,7 +24,7 @@ from contactverif.problems.wave_blocks import (
     wave_cases,
 )
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.shared.wave_answer import answer_to_wave
 from contactverif_properties.stability_solutions import DRIFT, ROUGHNESS
 

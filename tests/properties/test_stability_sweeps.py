@@ -18,7 +18,7 @@ from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR
 from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, ExactMotion, move_swept, stability_sweep
 from contactverif_properties.stability_solutions import stability_stiffness

@@ -17,7 +17,7 @@ from contactverif.contract.property import Measurement, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.stability_forces import FORCES, SEARCH, TANGENT, stability_translation

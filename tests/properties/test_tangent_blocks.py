@@ -19,7 +19,7 @@ from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_states
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
 from contactverif_properties.shared.any_state import prepare_state

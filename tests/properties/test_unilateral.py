@@ -20,7 +20,7 @@ from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif_mortar import mortar, mortar_lm
 from contactverif_properties.pushes import allowed_pushes, lift_slave, nodal_push, unilateral
 

@@ -25,7 +25,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Finding, Measurement, Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import run as verify
+from contactverif.run.run import run as verify
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Comparison
 from contactverif_reports.compare.regression import Changes, NamedRun

@@ -18,7 +18,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import run
+from contactverif.run.run import run
 from contactverif.testing.failure_text import explain
 from contactverif_mortar import mortar_lm
 from contactverif_nts import nts, nts_ar

@@ -21,9 +21,9 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
 from contactverif.run.hypothesis_draws import draw_different, find_difference, shrink_choices
-from contactverif.run.outcome_store import WHOLE
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import run
+from contactverif.run.rows import WHOLE
+from contactverif.run.run import run
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])
 ERROR = Quantity("error", "1", "1e-6", "a number for a test")

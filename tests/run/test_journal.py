@@ -11,18 +11,19 @@ import msgspec
 import numpy as np
 import pytest
 from lossy_store import lose_one_outcome
-from test_workers import facts
+from test_scheduler import facts
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
-from contactverif.run import pieces
-from contactverif.run.completeness import find_gap
+from contactverif.run import run as run_module
 from contactverif.run.draw import Sampling
 from contactverif.run.journal import begin_journal, hold_journal, journal_folder, read_messages, remove_journal
 from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.rows import find_gap
+from contactverif.run.run import RunStopped, run
 from contactverif.run.run_journal import (
     BlockRecord,
     Journal,
@@ -32,7 +33,7 @@ from contactverif.run.run_journal import (
     check_versions,
     read_plan,
 )
-from contactverif.run.runner import Progress, RunStopped, run
+from contactverif.run.scheduler import Progress
 
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
@@ -172,19 +173,19 @@ def test_a_block_that_is_judged_is_not_drawn(
 ) -> None:
     """Only a block of which cases stay whole is drawn again, and what stays whole stays so."""
     monkeypatch.setattr("contactverif.run.draw.BLOCK", 10)
-    monkeypatch.setattr("contactverif.run.conductor.BLOCK", 10)
-    monkeypatch.setattr("contactverif.run.open_row.WHOLE", 10)
+    monkeypatch.setattr("contactverif.run.run.BLOCK", 10)
+    monkeypatch.setattr("contactverif.run.rows.WHOLE", 10)
     plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))
     subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
     first = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, tmp_path))
     numbers: list[int] = []
-    draw = pieces.draw_chunks
+    draw = run_module.draw_chunks
 
     def draw_chunks(sampling: Sampling, question: object, number: int, count: object = None) -> object:
         numbers.append(number)
         return draw(sampling, question, number)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("contactverif.run.conductor.draw_chunks", draw_chunks)
+    monkeypatch.setattr("contactverif.run.run.draw_chunks", draw_chunks)
     second = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, None, [tmp_path]))
     assert numbers == [0]
     assert facts(first) == facts(second)

@@ -21,7 +21,7 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import load_scene
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.workers import worker_pool
+from contactverif.run.scheduler import worker_pool
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs
 from contactverif_properties.newton_convergence import newton_order

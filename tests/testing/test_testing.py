@@ -236,7 +236,7 @@ def test_the_plugin_is_cheap_to_import() -> None:
         "scipy",
         "xarray",
         "matplotlib",
-        "contactverif.run.runner",
+        "contactverif.run.run",
         "numpy",
     ]
     script = f"import sys, contactverif.testing.pytest_plugin; print([name for name in {heavy} if name in sys.modules])"

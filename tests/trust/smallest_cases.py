@@ -23,7 +23,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.run.registry import load_properties
-from contactverif.run.runner import run
+from contactverif.run.run import run
 
 FILE, BEFORE = "smallest_cases.csv", "smallest_cases_before.csv"
 SEEDS = (0,)

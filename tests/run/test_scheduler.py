@@ -23,11 +23,10 @@ from contactverif.contract.property import Outcome
 from contactverif.contract.result import Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
-from contactverif.run import workers
-from contactverif.run.packing import CaseChunk, pack, unpack
+from contactverif.run import scheduler
 from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.runner import run
-from contactverif.run.workers import WorkerError, default_jobs, usable_cores, worker_pool
+from contactverif.run.run import run
+from contactverif.run.scheduler import CaseChunk, WorkerError, decode, default_jobs, encode, usable_cores, worker_pool
 
 PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
 
@@ -111,7 +110,7 @@ def test_an_executor_with_threads_is_refused() -> None:
 
 
 def test_the_default_number_of_jobs_follows_the_planned_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "usable_cores", lambda: 4)
+    monkeypatch.setattr(scheduler, "usable_cores", lambda: 4)
     assert default_jobs(10**6) == 1  # Here pytest runs.
     for name in ("PYTEST_CURRENT_TEST", "PYTEST_XDIST_WORKER"):
         monkeypatch.delenv(name, raising=False)
@@ -125,7 +124,7 @@ def test_only_the_cores_that_a_container_allows_count(monkeypatch: pytest.Monkey
 
 
 def test_what_travels_is_the_same_and_read_only_there() -> None:
-    (case,) = unpack(pack(CaseChunk([named_case("c-prime")]))).cases
+    (case,) = decode(encode(CaseChunk([named_case("c-prime")], 0))).cases
     before = named_case("c-prime")
     assert {name: values.tobytes() for name, values in case.to_arrays().items()} == {
         name: values.tobytes() for name, values in before.to_arrays().items()
@@ -135,8 +134,8 @@ def test_what_travels_is_the_same_and_read_only_there() -> None:
         with pytest.raises(ValueError, match="WRITEABLE"):
             array.setflags(write=True)
     (question,) = load_properties(["purity"])
-    assert unpack(pack(question)) is question
-    assert unpack(pack(np.empty((0, 2)))).shape == (0, 2)
+    assert decode(encode(question)) is question
+    assert decode(encode(np.empty((0, 2)))).shape == (0, 2)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signal")
@@ -162,8 +161,10 @@ def test_an_interrupt_in_the_parent_ends_workers_that_hear_none_themselves(pool:
 
 
 def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "last_words", lambda: {"loud": b"words"})
-    result, words = unpack(workers._do(pack((abs, (-1,)))))
+    monkeypatch.setattr(scheduler, "last_words", lambda: {"loud": b"words"})
+    result, words = decode(scheduler._do(encode((abs, (-1,)))))
     assert (result, words) == (1, {"loud": b"words"})
-    team = workers.Team(pool)
-    assert team.result(team.submit(abs, (-2,)), abs, (-2,)) == 2
+    results: list[int] = []
+    jobs = (scheduler.Job(abs, (number,), lambda answer: results.append(answer) or ()) for number in (-2, -3))
+    scheduler.Scheduler(pool).work(jobs)
+    assert sorted(results) == [2, 3]

@@ -22,9 +22,10 @@ from contactverif.contract.property import Measurement, Outcome, Property, Quant
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run import witnesses as witnesses_module
 from contactverif.run.judge import judge_case
-from contactverif.run.runner import PROFILES, Progress, run
+from contactverif.run.profiles import PROFILES
+from contactverif.run.run import run
+from contactverif.run.scheduler import Progress
 
 ERROR = Quantity("error", "1", "1e-6", "a number for a test")
 
@@ -105,7 +106,7 @@ def witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
             raise MisuseError("case", repr(name), "C")
         return a_case(7, "C")
 
-    monkeypatch.setattr(witnesses_module, "named_case", find_case)
+    monkeypatch.setattr("contactverif.run.rows.named_case", find_case)
 
 
 def test_as_many_different_cases_are_judged_as_asked() -> None:

@@ -1,0 +1,455 @@
+"""A run: the jobs of checking every property of some formulations, in the order in which they are handed out.
+
+Each formulation is called once before anything else. Then the cases of a strategy are drawn, once for all formulations
+and all properties that have this strategy, they are judged, and what failed is shrunk. All planned cases of a row are
+judged before one is shrunk, so that a failure ends nothing early. What the journal knows is not judged again, and a
+block of which it knows all is not drawn.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, islice
+from operator import attrgetter
+from typing import TypeVar
+
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.contract.names import unknown_name_error
+from contactverif.contract.property import Outcome, Property
+from contactverif.contract.result import NotLoaded, Run
+from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.run import draw, judge
+from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
+from contactverif.run.profiles import Profile, profile_named
+from contactverif.run.provenance import collect_provenance
+from contactverif.run.rows import WHOLE, OpenRow, Shrinking, open_rows
+from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Notes
+from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
+
+CHUNK = 25  # The number of drawn cases that are judged in one job.
+LIST_CHUNK = 5  # The same for named cases, which are often slower.
+SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
+
+_Kind = TypeVar("_Kind")
+
+
+class RunStopped(KeyboardInterrupt):
+    """The user has stopped a run.
+
+    Parameters
+    ----------
+    run : Run
+        The rows as far as they are judged; a row that is not complete is not judged, and its reason says so.
+    """
+
+    def __init__(self, run: Run) -> None:
+        super().__init__("the run was stopped")
+        self.run = run
+
+
+def run(
+    subjects: Sequence[Subject | NotLoaded],
+    properties: Sequence[Property | NotLoaded],
+    *,
+    profile: Profile | str = "dev",
+    examples: int | None = None,
+    seed: int | None = None,
+    interface: Interface | None = None,
+    scene: Case | None = None,
+    known: Mapping[str, str] | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    executor: Executor | None = None,
+    journal: Journal | None = None,
+) -> Run:
+    """Check every property of every formulation.
+
+    Parameters
+    ----------
+    subjects : Sequence[Subject | NotLoaded]
+        The formulations, as the registry loads them. One that did not load is reported and fails the run.
+    properties : Sequence[Property | NotLoaded]
+        The properties, likewise.
+    profile : Profile | str
+        The numbers of cases and the seed.
+    examples, seed : int | None
+        Numbers that overrule those of the profile.
+    interface : Interface | None
+        Check everything on this interface, with random states, instead of on random interfaces.
+    scene : Case | None
+        Check what needs bodies on this scene alone, and all else on its interface. A pass there breaks no statement
+        that the formulation fails.
+    known : Mapping[str, str] | None
+        {property id: reason why its failure is known}.
+    progress : Callable[[Progress], None] | None
+        A function that is called after every case; with an executor, after every job.
+    executor : Executor | None
+        Worker processes that do the jobs of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
+        or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
+        process does all.
+    journal : Journal | None
+        The journal, in which every outcome is noted, and whose outcomes are not judged again.
+
+    Returns
+    -------
+    Run
+        A row for each formulation and property.
+
+    Raises
+    ------
+    MisuseError
+        If a known failure names no property of this run, or a name stands there twice.
+    WorkerError
+        If a worker process dies.
+    RunStopped
+        If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
+    """
+    known = known or {}
+    _check_known(known, properties)
+    resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
+    assert resolved.seed is not None
+    place = interface if scene is None else scene.interface
+    jobs = RunJobs(
+        _of_kind(Subject, subjects),
+        _of_kind(Property, properties),
+        Sampling(resolved.examples, resolved.seed, place, scene),
+        journal or Journal(),
+        Scheduler(executor, progress),
+        known,
+    )
+    facts = partial(collect_provenance, profile=resolved.name, examples=resolved.examples, seed=resolved.seed)
+    not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
+    try:
+        jobs.work()
+    except KeyboardInterrupt:
+        raise RunStopped(jobs.result(not_loaded, facts())) from None
+    return jobs.result(not_loaded, facts())
+
+
+def judge_share(
+    subjects: Sequence[Subject],
+    questions: Sequence[Property],
+    sampling: Sampling,
+    progress: Callable[[Progress], None],
+    journal: Journal,
+    *,
+    share: tuple[int, int],
+) -> None:
+    """Judge what the journal of a share (its number from 0, the number of all shares) does not have yet."""
+    jobs = RunJobs(subjects, questions, sampling, journal, Scheduler(None, progress), {}, share)
+    jobs.work()
+    jobs.check_written()
+
+
+class RunJobs:
+    """The jobs of a run, in the order that all shares of it have in common.
+
+    The parts of a run are numbered: each witness, each chunk of a finite list, each block of drawn cases. Of `share`
+    (I, N) are every N-th of them. A share fills no rows and shrinks nothing: its outcomes are in the journal.
+    """
+
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        questions: Sequence[Property],
+        sampling: Sampling,
+        journal: Journal,
+        scheduler: Scheduler,
+        known: Mapping[str, str],
+        share: tuple[int, int] | None = None,
+    ) -> None:
+        _check_once("formulation", map(attrgetter("name"), subjects))
+        _check_once("property", map(attrgetter("id"), questions))
+        self._subjects, self._sampling, self._journal, self._scheduler = subjects, sampling, journal, scheduler
+        self._share = share
+        self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
+        self._rows = open_rows(subjects, questions, sampling, known)
+        self._opposite_signs: set[str] = set()
+
+    def work(self) -> None:
+        """Do all jobs."""
+        try:
+            self._scheduler.work(map(self._first_call, self._subjects))
+            number, count = self._share or (0, 1)
+            self._scheduler.work(chain.from_iterable(islice(self._parts(), number, None, count)))
+        finally:
+            self._journal.close()
+
+    def result(self, not_loaded: tuple[NotLoaded, ...], provenance: Mapping[str, str]) -> Run:
+        """Return the run with all rows as far as they are judged; one that is not complete says so."""
+        for row in self._open_rows:
+            if not row.complete:
+                row.stop(self._sampling.examples)
+        return Run(
+            rows=tuple(row.row if isinstance(row, OpenRow) else row for row in self._rows),
+            not_loaded=not_loaded,
+            provided={
+                subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects
+            },
+            opposite_signs=tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs),
+            provenance=provenance,
+        )
+
+    def check_written(self) -> None:
+        """Check that all outcomes are kept."""
+        if self._journal.trouble and self._journal.folder is not None:
+            found = f"{self._journal.folder.name}: {self._journal.trouble}"
+            raise MisuseError("--out", found, "a disk with room")
+
+    @property
+    def _open_rows(self) -> list[OpenRow]:
+        return _of_kind(OpenRow, self._rows)
+
+    def _first_call(self, subject: Subject) -> Job:
+        before = Progress(subject.name, "", "first call (compiles)", 0, 1)
+        self._scheduler.report(before)
+
+        def note_sign(opposite: bool) -> Iterable[Job]:
+            self._opposite_signs |= {subject.name} if opposite else set()
+            self._scheduler.report(replace(before, count=1))
+            return ()
+
+        return Job(judge.call_first, (subject, self._needs & subject.provides), note_sign)
+
+    def _parts(self) -> Iterator[Iterable[Job]]:
+        """Yield the jobs of each part; those of a part are made when they are wanted."""
+        groups: dict[tuple[str, bool], list[OpenRow]] = {}
+        for row in self._open_rows:
+            if row.witness is not None and not row.witness_is_listed:
+                yield self._judge(row, CaseChunk([row.witness], WITNESS))
+            groups.setdefault(self._sampling.group(row.question), []).append(row)
+        for group in groups.values():
+            if group[0].listed is not None:
+                for row in group:
+                    yield from self._listed(row, group[0].listed)
+            elif self._share is None:
+                yield self._blocks(group, 0)
+            else:
+                yield from (self._blocks(group, n) for n in range(draw.number_of_blocks(self._sampling.examples)))
+
+    def _listed(self, row: OpenRow, cases: tuple[Case, ...]) -> Iterator[Iterable[Job]]:
+        chunks = in_chunks(cases, LIST_CHUNK)
+        yield from [self._expect(row, chunks, len(cases), last=True)] if self._share is None else []
+        yield from (self._judge(row, chunk) for chunk in chunks)
+
+    def _blocks(self, group: Sequence[OpenRow], number: int) -> Iterator[Job]:
+        """Yield the jobs of a block and, but for a share, of all blocks behind it: the rows have the same cases."""
+        question = group[0].question
+        block = self._journal.block(self._sampling.block_name(question), number)
+        while block is not None and (known := self._known_block(group, block)) is not None:
+            yield from known
+            if block.last or self._share is not None:
+                return
+            number += 1
+            block = self._journal.block(self._sampling.block_name(question), number)
+        if block is None and number > 0 and self._share is not None and not self._draws_blocks(question):
+            return  # Where a strategy runs out of cases, the first block has all of them.
+        before = Progress(group[0].subject.name, question.id, "drawing", 0, self._sampling.examples)
+        yield Job(draw_chunks, (self._sampling, question, number), partial(self._add_drawn, group, number), before)
+
+    def _draws_blocks(self, question: Property) -> bool:
+        source, sampling = self._sampling.source(question), self._sampling
+        assert source is not None
+        return draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples)
+
+    def _known_block(self, group: Sequence[OpenRow], block: BlockRecord) -> Iterable[Job] | None:
+        """Return the jobs that follow from the outcomes of a block, if it need not be drawn.
+
+        It need not if the journal has all outcomes of all rows, and no row keeps one of these cases whole.
+        """
+        first, parts = block.number * BLOCK, []
+        for row in group:
+            earlier = self._journal.outcomes(row.subject.name, row.question.id, first, block.count)
+            if len(earlier) < block.count or (self._share is None and row.may_keep_whole(first, earlier.values())):
+                return None
+            parts.append(tuple(earlier[place] for place in range(block.count)))
+        if self._share is not None:
+            return ()
+        jobs: list[Job] = []
+        for row, outcomes in zip(group, parts, strict=True):
+            row.expect_judged(first, block.count, planned=self._count_planned(block), last=block.last)
+            jobs += self._add(row, first, JudgedCases(outcomes))
+        return jobs
+
+    def _count_planned(self, block: BlockRecord) -> int:
+        """Return the number of cases of a row, once a block is drawn."""
+        return block.number * BLOCK + block.count if block.exhausted else self._sampling.examples
+
+    def _add_drawn(self, group: Sequence[OpenRow], number: int, drawn: DrawnCases) -> Iterable[Job]:
+        """Return the jobs to judge a block, then those of the next block."""
+        if number == 0:
+            for chunk in drawn.chunks[: -(-WHOLE // CHUNK)]:
+                chunk.keep()
+        count = sum(chunk.count for chunk in drawn.chunks)
+        block = BlockRecord(self._sampling.block_name(group[0].question), number, count, drawn.exhausted, drawn.last)
+        self._journal.add_block(block)
+        judging = chain.from_iterable(self._judge(row, chunk) for row in group for chunk in drawn.chunks)
+        if self._share is not None:
+            return judging
+        planned = self._count_planned(block)
+        finished = [self._expect(row, drawn.chunks, planned, last=drawn.last) for row in group]
+        return chain(*finished, judging, () if drawn.last else self._blocks(group, number + 1))
+
+    def _expect(self, row: OpenRow, chunks: Sequence[CaseChunk], planned: int, *, last: bool) -> Iterable[Job]:
+        """Let a row expect the outcomes of chunks; one without any case is complete."""
+        row.expect(chunks, planned=planned, last=last)
+        return self._finish(row)
+
+    def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
+        """Yield the job to judge the cases of a chunk that are not judged yet."""
+        name, property_id = row.subject.name, row.question.id
+        earlier = self._journal.outcomes(name, property_id, chunk.first, chunk.count)
+        if len(earlier) == chunk.count:
+            outcomes = tuple(earlier[place] for place in range(chunk.count))
+            yield from self._add(row, chunk.first, JudgedCases(outcomes))
+            return
+        notes = self._journal.notes(name, property_id, chunk.first)
+        arguments = row.question, row.subject, chunk, notes, earlier
+        yield Job(judge_cases, arguments, partial(self._add, row, chunk.first), self._judging(row))
+
+    def _judging(self, row: OpenRow) -> Progress:
+        return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned)
+
+    def _add(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+        """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
+        self._journal.note_trouble(judged.trouble)
+        if self._share is not None:
+            self.check_written()
+            return ()
+        if first == WITNESS:
+            row.add_witness(*judged.outcomes)
+        else:
+            row.add(first, judged.outcomes)
+            self._scheduler.report(self._judging(row))
+        return self._finish(row)
+
+    def _finish(self, row: OpenRow) -> Iterable[Job]:
+        """Make the row if it is complete, and return the job to shrink what failed. Of a list nothing is smaller."""
+        if not row.complete:
+            return ()
+        row.judge(on_scene=self._sampling.scene is not None)
+        goal = row.goal()
+        if goal is None:
+            return ()
+        if row.listed is not None:
+            return self._add_shrunk(row, goal.first, row.outcomes[goal.first])
+        before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
+        arguments = self._sampling, row.question, row.subject, goal
+        return (Job(shrink_case, arguments, partial(self._add_shrunk, row, goal.first), before),)
+
+    def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
+        if smallest is None:  # The formulation answers differently each time.
+            smallest = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
+        row.row = replace(row.row, shrunk=smallest)
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnCases:
+    """A block of the cases of a strategy, in order."""
+
+    chunks: tuple[CaseChunk, ...]
+    exhausted: bool  # The strategy has no other cases.
+    last: bool  # No further block follows.
+
+
+def draw_chunks(
+    sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
+) -> DrawnCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
+    source, seed = sampling.source(question), sampling.key(question)
+    assert source is not None
+    block = draw.draw_block(source, seed=seed, examples=sampling.examples, number=number, progress=count)
+    return DrawnCases(in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
+
+
+def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
+    """Return cases, of which the first has a number in its row, in chunks of a size."""
+    return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedCases:
+    """The outcomes of some cases, in their order."""
+
+    outcomes: tuple[Outcome, ...]
+    trouble: str = ""  # What kept the process from noting them in the journal.
+
+
+def judge_cases(
+    question: Property,
+    subject: Subject,
+    chunk: CaseChunk,
+    notes: Notes,
+    earlier: Mapping[int, Outcome],
+    count: Callable[[int], None] | None = None,
+) -> JudgedCases:
+    """Judge the cases of a chunk but for those at the places of `earlier`, and note each outcome at once.
+
+    The outcomes hold summaries, because the parent has the cases.
+    """
+    outcomes: list[Outcome] = []
+    for place, case in enumerate(chunk.cases):
+        if place in earlier:
+            outcomes.append(earlier[place])
+            continue
+        outcome = judge.judge_case(question, case, subject)
+        outcomes.append(replace(outcome, case_or_summary=outcome.summary))
+        notes.add(place, outcomes[-1])
+        if count is not None:
+            count(place + 1)
+    return JudgedCases(tuple(outcomes), notes.trouble)
+
+
+def shrink_case(
+    sampling: Sampling,
+    question: Property,
+    subject: Subject,
+    goal: Shrinking,
+    count: Callable[[int], None] | None = None,
+) -> Outcome | None:
+    """Return the outcome of the smallest case that is bad enough; None if the search judged none."""
+    source = sampling.source(question)
+    assert source is not None
+    smallest: Outcome | None = None
+    calls, ended = 0, subject.n_ended
+
+    def fails(case: Case) -> bool:
+        nonlocal smallest, calls
+        if subject.n_ended - ended >= SHRINK_ENDS:
+            return False
+        calls += 1
+        if count is not None:
+            count(calls)
+        outcome = judge.judge_case(question, case, subject)
+        bad = judge.badness(question.info, outcome)
+        if bad[0] != goal.kind or bad < goal.least:
+            return False
+        smallest = outcome
+        return True
+
+    draw.shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    return smallest
+
+
+def _of_kind(kind: type[_Kind], items: Iterable[object]) -> list[_Kind]:
+    return [item for item in items if isinstance(item, kind)]
+
+
+def _check_once(argument: str, names: Iterable[str]) -> None:
+    """Check that no name stands there twice."""
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise MisuseError(argument, f"{name} {times} times", "each of them once")
+
+
+def _check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoaded]) -> None:
+    ids = [item.id if isinstance(item, Property) else item.formulation for item in properties]
+    for property_id in known:
+        if property_id not in ids:
+            raise unknown_name_error("known failure", property_id, ids)

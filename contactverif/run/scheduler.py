@@ -1,0 +1,319 @@
+"""The scheduler of a run: it does jobs in this process, in a pool of its own, or in any executor that the user has.
+
+A job is a plain function of data that can be pickled. Jobs may end in any order, with the same results.
+
+- A job that cannot be encoded, because a notebook or a function defines its formulation, runs in the parent.
+- A worker that dies ends the run with one clear line. The run never waits for a dead worker.
+- Ctrl-C goes to the parent alone, which ends the workers. If the parent is killed, they end by themselves.
+"""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from multiprocessing.process import BaseProcess
+from typing import Any, Literal
+
+import numpy as np
+
+from contactverif.contract.arrays import freeze
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContactverifError, MisuseError
+from contactverif.contract.property import Property
+from contactverif.isolation.host import last_words, note_last_words
+from contactverif.isolation.parent_death import die_with_parent
+from contactverif.run.registry import installed_properties, load_property
+
+Phase = Literal["first call (compiles)", "drawing", "judging", "shrinking"]
+CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
+# The modules that the server of processes imports once for all workers: the judge, and libraries that import slowly.
+_PRELOAD = ["contactverif.run.run", "contactverif.mechanics.accuracy", "contactverif.strategies", "numba"]
+_FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
+_NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
+
+
+class WorkerError(ContactverifError):
+    """A worker process ended before it had done its job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """The progress of a run with one property of one formulation, named as on the command line.
+
+    The first call of a formulation has no property. Shrinking may end before all planned cases.
+    """
+
+    formulation: str
+    property_id: str
+    phase: Phase
+    count: int  # The number of finished cases.
+    planned: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Job:
+    """A call of a function, and what the parent does with the result: `then` returns the jobs that follow."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    then: Callable[[Any], Iterable[Job]]
+    progress: Progress | None = None  # At its start. In the parent, the function gets `count` to report each case.
+
+
+class Scheduler:
+    """Does jobs, with the executor or in this process, and reports each step of the progress once."""
+
+    def __init__(self, executor: Executor | None = None, report: Callable[[Progress], None] | None = None) -> None:
+        if isinstance(executor, ThreadPoolExecutor):  # Hypothesis does not allow threads.
+            raise MisuseError("executor", "a ThreadPoolExecutor", "one with processes, such as ProcessPoolExecutor")
+        self._executor, self._report = executor, report
+        self._limit = 1 if executor is None else 2 * int(getattr(executor, "_max_workers", _FURTHER_WORKERS))
+        self._last: Progress | None = None
+
+    def work(self, jobs: Iterable[Job]) -> None:
+        """Do all jobs, those that follow from one before all others: so few drawn cases wait at a time."""
+        waiting, running = deque([iter(jobs)]), dict[Future[bytes], Job]()
+        while waiting or running:
+            while waiting and len(running) < self._limit:
+                job = next(waiting[0], None)
+                if job is None:
+                    waiting.popleft()
+                elif (future := self._submit(job)) is not None:
+                    running[future] = job
+                else:
+                    waiting.appendleft(iter(job.then(job.function(*job.arguments, **self._counter(job)))))
+            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
+                job = running.pop(future)
+                waiting.appendleft(iter(job.then(self._result(future, job))))
+
+    def report(self, step: Progress) -> None:
+        """Report a step, unless it was the last."""
+        if step != self._last and self._report is not None:
+            self._last = step
+            self._report(step)
+
+    def _counter(self, job: Job) -> dict[str, Callable[[int], None]]:
+        """Return the further argument of a job that the parent does."""
+        start = job.progress
+        if start is None:
+            return {}
+        return {"count": lambda count: self.report(replace(start, count=start.count + count))}
+
+    def _submit(self, job: Job) -> Future[bytes] | None:
+        """Hand a job to the executor; return None if the parent has to do it."""
+        if self._executor is None:
+            return None
+        try:
+            encoded = encode((job.function, job.arguments))
+        except Exception:  # Pickle raises errors of many kinds.
+            return None
+        try:
+            return self._executor.submit(_do, encoded)
+        except BrokenExecutor as error:
+            raise _worker_error() from error
+
+    def _result(self, future: Future[bytes], job: Job) -> Any:
+        """Return the result of a job that a worker has done; one that it could not import is done now."""
+        try:
+            answer = future.result()
+        except BrokenExecutor as error:
+            raise _worker_error() from error
+        if answer == _NOT_HERE:
+            return job.function(*job.arguments, **self._counter(job))
+        result, words = decode(answer)
+        note_last_words(words)
+        return result
+
+
+def _do(encoded: bytes) -> bytes:
+    """Do a job in a worker, and return its result with what plugins have printed there."""
+    try:
+        function, arguments = decode(encoded)
+    except Exception:  # A module, or a class in a notebook, that is not here.
+        return _NOT_HERE
+    return encode((function(*arguments), last_words()))
+
+
+def _worker_error() -> WorkerError:
+    return WorkerError(
+        "a worker process died, so the run is not complete; a plugin may have crashed or ended it. "
+        "Run again with --jobs 1 to see where"
+    )
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use, which in a container may be few."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def default_jobs(planned: int) -> int:
+    """Return the number of workers for a number of planned cases: one for each 1000, at most one for each core.
+
+    Under pytest it is 1, because pytest-xdist has started as many processes as there are cores.
+    """
+    if "PYTEST_CURRENT_TEST" in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
+        return 1
+    return max(1, min(usable_cores(), planned // CASES_A_WORKER))
+
+
+def check_jobs(jobs: int) -> int:
+    """Return the number of processes that the user wants, at least 1; too many would fill the memory."""
+    most = max(16, 4 * usable_cores())
+    if not 1 <= jobs <= most:
+        raise MisuseError("--jobs", str(jobs), f"at least 1, at most {most} on this machine")
+    return jobs
+
+
+@contextmanager
+def worker_pool(jobs: int) -> Iterator[Executor | None]:
+    """Yield an executor with so many worker processes; None for one job, which the parent does itself.
+
+    Enter it before plugins and properties are loaded: the workers import while the parent does.
+    """
+    if jobs < 1:
+        raise MisuseError("jobs", str(jobs), "at least 1")
+    if jobs == 1:
+        yield None
+        return
+    before = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin_worker)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in set(multiprocessing.active_children()) - before:
+            worker.terminate()
+        raise
+    pool.shutdown()
+
+
+def _context() -> Any:
+    """Return the way to start processes: from a server that has imported the harness, where there is one."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    from multiprocessing import forkserver  # Windows has none.
+
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(_PRELOAD)
+    with _interrupts_wait():  # The server inherits that, and hears no Ctrl-C.
+        forkserver.ensure_running()  # It imports while the parent goes on.
+    return context
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Open a block behind which Ctrl-C is heard at the latest."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin_worker() -> None:
+    """Leave interrupts to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    die_with_parent()
+    parent = multiprocessing.parent_process()
+    if parent is not None:  # The server of processes may outlive it.
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
+
+
+class CaseChunk:
+    """A few cases of a row that are judged in one job. They are encoded once, and decoded when they are wanted.
+
+    `first` is the number of the first of them in the row, and `count` is how many they are.
+    """
+
+    __slots__ = ("_cases", "_encoded", "count", "first")
+
+    def __init__(self, cases: Sequence[Case], first: int) -> None:
+        self._cases: tuple[Case, ...] | None = tuple(cases)
+        self._encoded: bytes | None = None
+        self.first, self.count = first, len(cases)
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The cases; of a chunk that came from another process they are made anew at every call."""
+        if self._cases is not None:
+            return self._cases
+        assert self._encoded is not None
+        cases: tuple[Case, ...] = decode(self._encoded)
+        return cases
+
+    def keep(self) -> None:
+        """Keep the cases in memory, for several rows that hold them."""
+        self._cases = self.cases
+
+    def __getstate__(self) -> tuple[bytes, int, int]:
+        return encode(self._cases) if self._encoded is None else self._encoded, self.first, self.count
+
+    def __setstate__(self, state: tuple[bytes, int, int]) -> None:
+        self._cases = None
+        self._encoded, self.first, self.count = state
+
+
+def encode(item: Any) -> bytes:
+    """Return an object as bytes, or raise any error if it cannot be pickled, such as a class that a function defines.
+
+    What comes out again is what went in, bit by bit. A read-only array stays read-only, or a plugin could change in a
+    worker what it cannot change in the parent. A registered property travels as its id.
+    """
+    buffer = io.BytesIO()
+    _Pickler(buffer, protocol=pickle.HIGHEST_PROTOCOL).dump(item)
+    return buffer.getvalue()
+
+
+def decode(data: bytes) -> Any:
+    """Return what `encode` made bytes of, or raise any error if this process cannot import what it refers to."""
+    return pickle.loads(data)
+
+
+class _Pickler(pickle.Pickler):
+    def reducer_override(self, item: Any) -> Any:
+        if type(item) is np.ndarray and not item.flags.writeable and not item.dtype.hasobject:
+            return _read_only, (item.tobytes(), item.dtype.str, item.shape)
+        if isinstance(item, Property) and _find_registered(item.id) is item:
+            return _find_registered, (item.id,)
+        return NotImplemented
+
+
+def _read_only(data: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
+    if not data:
+        return freeze(np.empty(shape, dtype), np.dtype(dtype).type)
+    return np.frombuffer(data, dtype=dtype).reshape(shape)
+
+
+@cache
+def _find_registered(property_id: str) -> Any:
+    """Return the installed property of that id, or None."""
+    installed = _read_installed()
+    return load_property(property_id, installed) if property_id in installed else None
+
+
+_read_installed = cache(installed_properties)
