@@ -181,7 +181,7 @@ def wrong_names(text: str, module: str) -> list[Finding]:
     excepted = {
         line
         for node in ast.walk(tree)
-        if isinstance(node, ast.ClassDef) and node.name == "MisuseError"
+        if isinstance(node, ast.ClassDef) and node.name in ("MisuseError", "Finding")
         for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
     }
     wrong = []
@@ -255,7 +255,7 @@ def wrong_comments(text: str, module: str) -> list[Finding]:
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Assign | ast.AnnAssign)
         for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
-        if isinstance(target, ast.Name)
+        if isinstance(target, ast.Name) and target.id.isupper()  # The comment of a field may say where it is known.
     }
     wrong = []
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
@@ -270,12 +270,23 @@ def wrong_comments(text: str, module: str) -> list[Finding]:
 
 
 # --------------------------------------------------------------------------------------------------------------
+# Sentences
+
+
+def wrong_sentences(text: str, module: str) -> list[Finding]:
+    """Return the sentences that hide their actor behind the word."""
+    lines = enumerate(text.splitlines(), start=1)
+    return [Finding(number, "name the actor") for number, line in lines if re.search(r"\bWho[e]ver\b", line)]
+
+
+# --------------------------------------------------------------------------------------------------------------
 # The rules, folder by folder
 
 RULES: dict[str, Callable[[str, str], list[Finding]]] = {
     "names": wrong_names,
     "docstrings": wrong_docstrings,
     "comments": wrong_comments,
+    "sentences": wrong_sentences,
 }
 
 
@@ -356,9 +367,15 @@ def test_a_docstring_that_says_what_the_thing_is_passes(text: str) -> None:
     assert not wrong_docstrings(text, "module")
 
 
+def test_a_sentence_without_an_actor_is_seen() -> None:
+    text = "x = 1\n# {}ever has none lacks nothing.\n".format("Who")
+    assert wrong_sentences(text, "module") == [(2, "name the actor")]
+    assert not wrong_sentences("# The author, whoever that is.", "module")
+
+
 def test_a_comment_that_continues_the_name_is_seen() -> None:
     (finding,) = wrong_comments("GONE = 1e8  # times the first residual\n", "module")
     assert "'times'" in finding.message
     assert not wrong_comments(
-        "FACTOR = 1e8  # Divergence factor of the first residual\nx = (\n  1  # of them\n)\n", "m"
+        "FACTOR = 1e8  # Divergence factor of the first residual\nX = (\n  1  # of them\n)\n", "m"
     )

@@ -193,7 +193,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """What a report stores of a case in place of the case itself; two with equal summaries are taken for the same."""
+    """A case without its meshes, as a report stores it; two with equal summaries are taken for the same case."""
 
     n_slave_segments: int  # Numbers of segments.
     n_master_segments: int

@@ -23,7 +23,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
-FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. Whoever has none lacks nothing.
+FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. They are optional.
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.

@@ -13,7 +13,7 @@ import sys
 from contextlib import suppress
 from time import perf_counter
 
-_QUESTIONS_FIRST = 32  # Whoever asks less is not held.
+_QUESTIONS_FIRST = 32  # The judge is not held to one core before so many questions.
 _SECONDS_ON_A_CORE = 0.5  # The judge waits so long at most for a core that another program took.
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 

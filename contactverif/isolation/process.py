@@ -73,7 +73,7 @@ class PluginProcess:
             | {MARK: _run, "TMPDIR": _folder(), **_NO_TRACES}
             | (_OTHER_SETTINGS if second else {})
         )
-        JUDGE.let_go()  # Whoever is started while the judge is held is held, too.
+        JUDGE.let_go()  # A process that starts while the judge is held to one core is held, too.
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.DEVNULL,

@@ -1,7 +1,7 @@
 """A formulation in another process, with the methods of a formulation.
 
 Rule for the next editor: who asks does not notice where the formulation is, but for what cannot be told apart inline: a
-process that dies or hangs. Whoever holds a formulation of a process that ended has the same one in the next process.
+process that dies or hangs. A formulation of a process that ended is the same one in the next process.
 """
 
 from __future__ import annotations

@@ -74,10 +74,11 @@ def continuity(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The forces are computed after each of 12 steps of the way. The step that differs most from its
     neighbours is halved 20 times, always towards the larger change. A continuous force then changes by about 2^-20 of
     the step's change, and a jump is left as it is. The first number is the largest change of a force that is left, over
-    Σ|R| of the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). Whoever
-    promises C1 is asked the same about the derivative along the way, a central difference on the frozen pairing: the
-    step is halved 16 times, the tolerance is 2^-10 of the largest change plus 2^26 times that roundoff, and the unit is
-    the largest derivative. The details say where the largest jump is (0 to 1), and how many were found, at most 3.
+    Σ|R| of the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). A
+    formulation that promises C1 is asked the same about the derivative along the way, a central difference on the
+    frozen pairing: the step is halved 16 times, the tolerance is 2^-10 of the largest change plus 2^26 times that
+    roundoff, and the unit is the largest derivative. The details say where the largest jump is (0 to 1), and how many
+    were found, at most 3.
 
     **Undecided.** Never. The slave stays inside the master, far from its free ends.
     """

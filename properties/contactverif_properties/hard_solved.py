@@ -127,8 +127,8 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     **Question.** An interface of length 12 has a segment of 1.2e-5 on the slave, on the master, on both facing each
     other, or at the end. Are forces and stresses still those of a uniform pressure, at ε̂ = 1, 1e4 and 1e8?
 
-    **Why it matters.** Meshes that were cut or merged have slivers. Whoever divides by a length, or compares it with an
-    absolute number, finds out there.
+    **Why it matters.** Meshes that were cut or merged have slivers. A formulation fails there if it divides by a
+    length, or compares it with an absolute number.
 
     **How it is judged.** As states, with the penalties as they are: as in `hard.offset`. Solved, with E = 1 in both
     blocks: as in `patch.flat.solve`, whose tolerances have the term 5e-15/r for the ratio r = 4e-6 of the shortest to
