@@ -67,7 +67,7 @@ ROOMS = {
     "meshes": Room(("contract", "foreign_files"), ("numpy", "meshio", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
-    # Its worker calls the registry by a name that the registry gives it, and imports nothing of `run`.
+    # `run` holds the program of a plugin's process, which calls the worker here.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil")),
     "run": Room(
         ("contract", "problems", "strategies", "isolation"),

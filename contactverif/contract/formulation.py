@@ -37,7 +37,7 @@ forces in the residual: −area · gap where a constraint is active, area · λ 
 decision λ − c gap ≥ 0; no solution may depend on it.
 
 Rules for the next editor: a `Pairing` holds integers and booleans only, so that the residual is a smooth function of
-the positions on a frozen pairing. One `Handle` is the exception, and nobody trusts such a pairing.
+the positions on a frozen pairing. One `Handle` is the exception, and the harness does not use such a pairing.
 Signs and words change here first, or not at all.
 """
 
@@ -190,8 +190,8 @@ class Pairing(Mapping[str, NDArray[Any]]):
         """Return whether names, shapes and all values agree; what is in handles is not compared."""
         return (
             self.opaque is other.opaque
-            and self._arrays.keys() == other._arrays.keys()
-            and all(np.array_equal(values, other._arrays[name]) for name, values in self._arrays.items())
+            and self.keys() == other.keys()
+            and all(np.array_equal(values, other[name]) for name, values in self.items())
         )
 
 

@@ -1,15 +1,15 @@
 """A formulation as the harness sees it: `Subject`, as it was loaded, and `CheckedFormulation`, every answer checked.
 
-Rules for the next editor: nobody in the house calls a plugin except through a `CheckedFormulation`. (The exception is
-whoever times a plugin; see `CheckedFormulation.plugin`.) A part that a plugin leaves out is filled in here: no pairing,
-a loop instead of a batch. A part that breaks the contract raises a `ContractError` here. To judge is left to the
-properties.
+Rule: the harness calls a plugin through a `CheckedFormulation` only, except to time it. A part that a plugin leaves out
+is filled in here; a part that breaks the contract raises a `ContractError` here.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any
+from contextlib import AbstractContextManager
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
@@ -23,13 +23,30 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
-FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time. They are optional.
+FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time, so none is missing without them.
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
-COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
+STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
-_ENTRIES = (np.float64, np.int32, np.int64)
-STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there; whoever leaves out another breaks no promise.
+
+
+class Prefetching(ABC):
+    """A plugin to which questions are better put together, because each way to it and back costs time.
+
+    Its ``residual`` takes any batch of states; without a pairing it pairs anew at each of them.
+    """
+
+    @abstractmethod
+    def prefetch(self, calls: Sequence[Call]) -> AbstractContextManager[None]:
+        """Open a block in which exactly these methods are called, in this order."""
+
+
+@runtime_checkable
+class Restartable(Protocol):
+    """A subject that can be started a second time under other conditions, such as another seed of hashes."""
+
+    def restart(self) -> Subject:
+        """Return the same formulation, started once more, beside this one."""
 
 
 class Subject:
@@ -91,54 +108,6 @@ class Subject:
         if "residual_and_tangent" in self.provides and "tangent" not in self.provides:
             raise ContractError("residual_and_tangent: the plugin has no `tangent`; needed both")
 
-    @classmethod
-    def of_parts(cls, name: str, make: Callable[..., Any], traits: Traits, provides: frozenset[str]) -> Subject:
-        """Return a formulation of which somebody else has asked what it promises and which optional parts it has."""
-        subject = object.__new__(cls)
-        subject.name, subject._make, subject.traits = name, make, traits
-        subject.provides = provides & frozenset(OPTIONAL_PARTS + FAST_PARTS)
-        subject.counts_multipliers = "n_multipliers" in provides
-        return subject
-
-    @property
-    def n_ended(self) -> int:
-        """The number of times that the process of the plugin has ended; 0 if it has none of its own."""
-        return int(getattr(self._make, "n_ended", 0))
-
-    def in_second_process(self) -> Subject | None:
-        """Return the same formulation in another process than this one's; None if it has no process of its own."""
-        make = getattr(self._make, "second_factory", None)
-        return None if make is None else Subject.of_parts(self.name, make, self.traits, self._parts)
-
-    def run_there(self, verb: str, function: str, words: bytes) -> bytes | None:
-        """Call a function of the harness in this formulation's process; return None if it has none of its own.
-
-        Parameters
-        ----------
-        verb : str
-            The word for the call in messages.
-        function : str
-            The function, ``"module:function"``. It gets the formulation as it is there, and the words.
-        words : bytes
-            What it has to know.
-
-        Returns
-        -------
-        bytes | None
-            What it returned. The plugin may have changed it, as it likes.
-
-        Raises
-        ------
-        ContractError
-            If the plugin made an error, or its process ended.
-        """
-        run = getattr(self._make, "run", None)
-        return None if run is None else run(verb, function, words)
-
-    @property
-    def _parts(self) -> frozenset[str]:
-        return self.provides | ({"n_multipliers"} if self.counts_multipliers else frozenset())
-
     def penalty(self, case: Case) -> float:
         """Return the penalty of a case in the unit that the formulation takes.
 
@@ -180,11 +149,11 @@ class CheckedFormulation:
     Attributes
     ----------
     plugin : Any
-        The plugin itself, for whoever times it: nothing that it answers is checked.
+        The plugin itself, to time it: nothing that it answers is checked.
     provides : frozenset[str]
         The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
-    passes_on : bool
-        A csr or csc matrix is returned as the plugin made it, for another process that looks into it. False by default.
+    copy_matrix : Callable[[str, Any], Any]
+        The function that checks and copies a sparse tangent; its first argument is the name of the method.
 
     Raises
     ------
@@ -202,20 +171,15 @@ class CheckedFormulation:
         self.plugin = plugin
         self._traits = traits
         self.provides = provides
-        # A plugin in a process of its own gets a whole batch, and the loop is there; new pairings are made there, too.
-        self._remote = getattr(plugin, "loops", False) is True
-        self.passes_on = False
-        self._counts_there = self._remote and traits.enforcement != "multiplier"
+        self.copy_matrix = copy_entries
+        self._prefetching = plugin if isinstance(plugin, Prefetching) else None
         self._counts: dict[int, tuple[Interface, int]] = {}  # It holds the interfaces, so that no id is used again.
 
     def n_multipliers(self, interface: Interface) -> int:
         """Return the number of multipliers behind the positions in z; 0 if the plugin does not mention any.
 
-        The plugin is called once for each interface: one that counts differently later breaks its own shapes. In a
-        process of its own, one that promises none is called with the first question, and fails there if it has any.
+        The plugin is called once for each interface: one that counts differently later breaks its own shapes.
         """
-        if self._counts_there:
-            return 0
         if id(interface) not in self._counts:
             self._counts[id(interface)] = interface, self._count_multipliers(interface)
         return self._counts[id(interface)][1]
@@ -262,20 +226,21 @@ class CheckedFormulation:
         return pairing
 
     def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
-        return self.own_pairing(interface, z.real) if self.decides_anew(pairing) and not self._remote else pairing
+        return self.own_pairing(interface, z.real) if self.decides_anew(pairing) else pairing
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
-        if z.ndim == 1 or self._remote or (self._traits.batched and not self.decides_anew(pairing)):
+        if z.ndim == 1:
+            return self._residual(interface, self._pairing_at(interface, pairing, z), z)
+        if self._prefetching is not None or (self._traits.batched and not self.decides_anew(pairing)):
             return self._residual(interface, pairing, z)
         forces = np.empty_like(z)
         for index in np.ndindex(z.shape[:-1]):
-            forces[index] = self._residual(interface, pairing, z[index])
+            forces[index] = self._residual(interface, self._pairing_at(interface, pairing, z[index]), z[index])
         return forces
 
     def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
-        pairing = self._pairing_at(interface, pairing, z)
         forces = _call_plugin("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
         return _check_forces("residual", forces, z)
 
@@ -325,25 +290,21 @@ class CheckedFormulation:
     def answers(self, calls: Sequence[Call]) -> list[Any]:
         """Return the answers of methods that are called one after another; `pair` is none of them.
 
-        A plugin in a process of its own gets all calls in one message. So whoever knows its questions asks them here.
+        Some plugins answer them faster than one by one, see `Prefetching`.
         """
-        if not self._remote:
+        if self._prefetching is None:
             return [getattr(self, verb)(*arguments) for verb, *arguments in calls]
-        for _, interface, _, z in calls:
+        paired = []
+        for verb, interface, pairing, z in calls:
             self._check_size(interface, z)
-        with self.plugin.foresee(calls):
-            return [getattr(self, verb)(*arguments) for verb, *arguments in calls]
+            paired.append((verb, interface, self._pairing_at(interface, pairing, z) if z.ndim == 1 else pairing, z))
+        with self._prefetching.prefetch(paired):
+            return [getattr(self, verb)(*arguments) for verb, *arguments in paired]
 
     def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
-        """Return a copy of the tangent (size, size), dense or a coo array, or raise an error that begins with the verb.
-
-        What came from another process is a copy already.
-        """
+        """Return a copy of the tangent (size, size), dense or coo; an error begins with the verb."""
         _check_matrix(verb, tangent, size)
-        if self.passes_on and compressed_parts(tangent):
-            return tangent
-        if not self._remote or getattr(tangent, "format", "") in ("csr", "csc"):
-            tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else _copy_entries(verb, tangent)
+        tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else self.copy_matrix(verb, tangent)
         entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
         if not np.isfinite(entries).all():
             raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
@@ -393,15 +354,7 @@ def _check_matrix(verb: str, tangent: Any, size: int) -> None:
         raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
 
 
-def compressed_parts(matrix: Any) -> dict[str, Array]:
-    """Return the arrays of a csr or csc matrix as a plugin made it; none for another matrix, or if one is unusual."""
-    names = COMPRESSED if getattr(matrix, "format", "") in ("csr", "csc") else ()
-    parts = {name: getattr(matrix, name) for name in names}
-    usual = all(type(part) is np.ndarray and part.dtype in _ENTRIES for part in parts.values())
-    return parts if usual else {}
-
-
-def _copy_entries(verb: str, tangent: Any) -> Any:
+def copy_entries(verb: str, tangent: Any) -> Any:
     """Return a copy of a sparse matrix as a coo array. Numbers of rows and columns are checked, as scipy does not.
 
     A plugin that fills the arrays of a compressed matrix itself may number a row or a column that is not there. scipy

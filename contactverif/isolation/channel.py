@@ -1,7 +1,7 @@
-"""Frames of bytes over a socket: eight bytes of length, then the bytes.
+"""Frames of bytes over a socket: eight bytes of length, little-endian, then the bytes.
 
-Rule for the next editor: the other end may send anything, or nothing, or a byte now and then. So a frame has a deadline
-for all of it, and no memory is taken before its bytes have come.
+Rule: the other end may send anything, or nothing, or a byte now and then. So a frame has a deadline for all of it, and
+no memory is taken before its bytes have come.
 """
 
 from __future__ import annotations
@@ -31,15 +31,7 @@ class TooLargeError(Exception):
 
 
 class Channel:
-    """One end of a socket.
-
-    Parameters
-    ----------
-    end : socket.socket
-        The end, which belongs to the channel.
-    largest : int
-        The largest number of bytes of a frame that comes in.
-    """
+    """One end of a socket, which takes frames of at most `largest` bytes."""
 
     def __init__(self, end: socket.socket, largest: int = 1 << 62) -> None:
         end.setblocking(False)
@@ -51,15 +43,7 @@ class Channel:
             poll.register(self._file, event)
 
     def send(self, frame: bytes, seconds: float = inf) -> None:
-        """Send a frame.
-
-        Raises
-        ------
-        ClosedError
-            If the other end is closed.
-        TooLateError
-            If the other end does not read all of it within so many seconds.
-        """
+        """Send a frame, or raise a ClosedError, or a TooLateError if the other end does not read all of it in time."""
         data = memoryview(_LENGTH.pack(len(frame)) + frame)
         deadline = perf_counter() + seconds
         while data:
@@ -71,34 +55,19 @@ class Channel:
                 raise ClosedError from None
 
     def receive(self, seconds: float = inf) -> bytes:
-        """Return the next frame.
-
-        Raises
-        ------
-        ClosedError
-            If the other end is closed.
-        TooLateError
-            If the whole frame is not there within so many seconds. What has come is kept for the next call.
-        TooLargeError
-            If the frame is too long.
-        """
+        """Return the next frame, or raise one of the errors above. What has come too late is kept for the next call."""
         deadline = perf_counter() + seconds
         data = self._rest or self._read(_PIECE, deadline)
         end = _LENGTH.size + _LENGTH.unpack_from(data)[0] if len(data) >= _LENGTH.size else 1 << 63
         if end > len(data):
-            return self._receive_in_pieces(data, deadline)
-        self._rest = data[end:]  # All of it came at once, as nearly always.
+            head = self._gather(data, _LENGTH.size, deadline)
+            length = int(_LENGTH.unpack_from(head)[0])
+            if length > self._largest:
+                raise TooLargeError(f"{length} bytes")
+            end = _LENGTH.size + length
+            data = self._gather(head, end, deadline)
+        self._rest = data[end:]
         return data[_LENGTH.size : end]
-
-    def _receive_in_pieces(self, data: bytes, deadline: float) -> bytes:
-        head = self._gather(data, _LENGTH.size, deadline)
-        length = int(_LENGTH.unpack_from(head)[0])
-        if length > self._largest:
-            raise TooLargeError(f"{length} bytes")
-        whole = _LENGTH.size + length
-        together = self._gather(head, whole, deadline)
-        self._rest = together[whole:]
-        return together[_LENGTH.size : whole]
 
     def _gather(self, data: bytes, size: int, deadline: float) -> bytes:
         """Return the data and what follows it, so many bytes at least."""

@@ -1,14 +1,14 @@
 """The host of one formulation: the process that it lives in, and what the judge has sent there.
 
-Rules for the next editor: a question waits in a queue until its answer is needed, so that a pairing and the forces on
-it take one way there and back. What the judge has sent stays there until it is pushed out. A process that ended is
-started anew at the next question.
+Rules: a question waits in a queue until its answer is needed, so that a pairing and the forces on it take one round
+trip. What the judge has sent stays there until it is pushed out. A process that ended is started anew at the next
+question.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from time import monotonic
 from typing import Any
 
@@ -30,15 +30,13 @@ from contactverif.isolation.messages import (
     Make,
     Reply,
     Request,
-    Run,
-    Share,
+    ShareInterface,
     SharePairing,
-    Words,
     encode,
-    pack_array,
 )
 from contactverif.isolation.one_core import JUDGE
-from contactverif.isolation.process import PluginProcess, end_marked
+from contactverif.isolation.packed import PackedArray
+from contactverif.isolation.process import PluginProcess, Question, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
 _MOST_HANGS = 5  # After so many calls without an answer neither.
@@ -49,116 +47,53 @@ _QUEUE = 16  # The number of questions that wait.
 _TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
 
 
-class Question:
-    """A question that was asked, and its answer once it is there."""
-
-    __slots__ = ("answer", "verb")
-
-    def __init__(self, verb: str) -> None:
-        self.verb = verb
-        self.answer: Reply | PluginError | None = None
-
-    def result(self) -> Answer:
-        """Return the answer.
-
-        Raises
-        ------
-        ContractError
-            If the plugin made an error, or its process ended.
-        """
-        match self.answer:
-            case Answer() as answer:
-                return answer
-            case PluginError() as error:
-                raise PluginError(str(error), error.cause, ended=error.ended)
-            case Failure() as failure:
-                raise_failure(failure)
-        raise PluginError(f"{self.verb}: a {type(self.answer).__name__} where an answer was needed", "channel")
-
-
 class Host:
-    """The process of one formulation, started when it is needed, and again when it has ended.
+    """The process of one formulation, started when it is needed, and again when it has ended."""
 
-    Parameters
-    ----------
-    loader : str
-        The function that loads a formulation of a name there, as ``"module:function"``.
-    name : str
-        The name of the formulation.
-    limits : Limits
-        The limits of the process.
-    second : bool
-        The process differs from the first one in its hash seed and its number of threads.
-
-    Attributes
-    ----------
-    methods : frozenset[str]
-        The optional methods that the formulation has, once it is loaded.
-    n_ended, n_hangs : int
-        The number of times that the process ended before it was told to, and of those because no answer came.
-    n_started : int
-        The number of times that it was started.
-    opaque : bool | None
-        Pairings have a handle, which stays in the process; None until the first one is known.
-    last_question : float
-        The time of the last question, by the clock of `time.monotonic`.
-    """
-
-    def __init__(self, loader: str, name: str, limits: Limits, *, second: bool) -> None:
-        self._load = Load(loader, name)
-        self._limits, self._second = limits, second
+    def __init__(self, command: tuple[str, ...], name: str, limits: Limits, *, second: bool) -> None:
+        self._command, self._name, self._limits, self._second = command, name, limits, second
         self._process: PluginProcess | None = None
         self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
         self._queue: list[Request] = []
         self._questions: list[Question] = []
         self._forgotten: list[int] = []
         self._number = 0
-        self.methods: frozenset[str] = frozenset()
-        self.opaque: bool | None = None
-        self.n_ended = self.n_hangs = self.n_started = 0
         self._last_words = b""
-        self.last_question = 0.0
+        self.opaque: bool | None = None  # Pairings have a handle, which stays there; None until the first one is known.
+        self.n_ended = self.n_hangs = 0  # Ends before it was told to, and those of them because no answer came.
+        self.n_started = 0
+        self.last_question = 0.0  # By the clock of `time.monotonic`.
 
     def load(self) -> Reply:
-        """Start the process anew, and return what loading the formulation gave."""
+        """Start the process anew, load the formulation, and return what that gave."""
         self.end()
-        return self._start()
-
-    def _start(self) -> Reply:
-        """Start the process, load the formulation, and return what that gave."""
         if self.n_ended >= _MOST_ENDS or self.n_hangs >= _MOST_HANGS:
             words = f"no answer came {self.n_hangs} times" if self.n_hangs >= _MOST_HANGS else ""
             raise PluginError(words or f"its process ended {self.n_ended} times", "not asked")
-        _make_room(self._load.name)
-        self._process = PluginProcess(self._limits, second=self._second)
+        _make_room(self._name)
+        self._process = PluginProcess(self._command, self._limits, second=self._second)
         self.n_started += 1
         for store in (self._shelf, self._queue, self._questions, self._forgotten):
             store.clear()
-        question = Question("import")
-        self._queue.append(self._load)
-        self._questions.append(question)
+        question = self._put("import", Load(self._next_number(), self._name))
         self.flush()
-        if isinstance(question.answer, Failure):
-            raise_failure(question.answer, loading=True)
-        if isinstance(question.answer, PluginError):
-            question.result()
-        assert question.answer is not None
-        assert not isinstance(question.answer, PluginError)
-        if isinstance(question.answer, Loaded):
-            self.methods = frozenset(question.answer.provides)
-        return question.answer
+        return raise_failure(question.answer, loading=True)
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
-        if self._process is None:
-            self._start_again()
-        self._number += 1
-        self._queue.append(Make(self._number, penalty))
+        if self._process is None and not isinstance(self.load(), Loaded):
+            raise PluginError("import: it loaded before, and does not any more", "channel")
+        self._queue.append(Make(self._next_number(), penalty))
         return self._number, self.n_started
 
-    def _start_again(self) -> None:
-        if not isinstance(self._start(), Loaded):
-            raise PluginError("import: it loaded before, and does not any more", "channel")
+    def _next_number(self) -> int:
+        self._number += 1
+        return self._number
+
+    def _put(self, verb: str, request: Load | Ask) -> Question:
+        self._queue.append(request)
+        self._questions.append(Question(request.question, verb))
+        return self._questions[-1]
 
     @property
     def has_process(self) -> bool:
@@ -175,44 +110,22 @@ class Host:
             self._forgotten.append(number)
 
     def ask(
-        self, verb: str, formulation: int, interface: Interface, pairing: Pairing | None, z: Array | None
-    ) -> tuple[Question, int]:
-        """Put a question into the queue; return it, and the number under which the process keeps its answer.
-
-        Only pairings are kept.
-        """
+        self,
+        verb: str,
+        formulation: int,
+        interface: Interface,
+        pairing: Pairing | None,
+        z: Array | None,
+        *,
+        warm: bool = False,
+    ) -> Question:
+        """Put a question into the queue and return it. `warm`: a short call is timed when it is repeated."""
         if len(self._questions) >= _QUEUE:
             self.flush()
         of_interface = self._share(interface)
         of_pairing = None if pairing is None else self._share(pairing)
-        self._number += 1
-        question = Question(verb)
-        packed = None if z is None else pack_array(z)
-        self._queue.append(Ask(verb, formulation, of_interface, of_pairing, packed, self._number))
-        self._questions.append(question)
-        return question, self._number
-
-    def run(self, verb: str, function: str, words: bytes) -> bytes:
-        """Call a function of the harness (``"module:function"``) there, and return its words.
-
-        The function gets the formulation and `words`. The call has the time limit of one call, and `verb` names it.
-
-        Raises
-        ------
-        ContractError
-            If the plugin made an error, or its process ended.
-        """
-        if self._process is None:
-            self._start_again()
-        self.flush()
-        question = Question(verb)
-        self._queue.append(Run(function, words))
-        self._questions.append(question)
-        self.flush()
-        if isinstance(question.answer, Words):
-            return question.answer.words
-        question.result()
-        raise PluginError(f"{verb}: an answer to another question", "channel")
+        packed = None if z is None else PackedArray.pack(z)
+        return self._put(verb, Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, warm))
 
     def keep(self, item: Interface | Pairing, number: int) -> None:
         """Note that the process keeps something under a number."""
@@ -226,17 +139,14 @@ class Host:
         if id(item) in self._shelf:
             self._shelf.move_to_end(id(item))
             return self._shelf[id(item)][1]
-        arrays = dict(item) if isinstance(item, Pairing) else None  # This may ask, so it comes before the number.
-        self._number += 1
-        number = self._number
-        if arrays is not None:
-            self._queue.append(SharePairing(number, {name: pack_array(array) for name, array in arrays.items()}))
+        if isinstance(item, Pairing):
+            arrays = {name: PackedArray.pack(array) for name, array in item.items()}  # This may ask, so it comes first.
+            self._queue.append(SharePairing(self._next_number(), arrays))
         else:
-            assert isinstance(item, Interface)
             meshes = item.nodes, item.slave.segments, item.master.segments
-            self._queue.append(Share(number, *map(pack_array, meshes)))
-        self.keep(item, number)
-        return number
+            self._queue.append(ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)))
+        self.keep(item, self._number)
+        return self._number
 
     def flush(self) -> None:
         """Send what waits in the queue, and give each question its answer."""
@@ -247,12 +157,11 @@ class Host:
             requests.append(Forget(self._forgotten))  # At the end, for a question that waits may need it.
             self._forgotten = []
         if self._process is None:
-            ended = PluginError(f"{questions[0].verb}: its process has ended", "channel") if questions else None
             for question in questions:
-                question.answer = ended
+                question.answer = PluginError(f"{questions[0].verb}: its process has ended", "channel")
             return
         try:
-            self._exchange(requests, questions)
+            _exchange(self._process, requests, questions)
         except PluginError as error:
             for question in questions:
                 question.answer = error if question.answer is None else question.answer
@@ -260,23 +169,6 @@ class Host:
             self.n_hangs += error.cause == "hang"
             self.read_last_words()
             self._process = None
-
-    def _exchange(self, requests: Sequence[Request], questions: Sequence[Question]) -> None:
-        """Send requests and receive the answers: all together if they are small, else each answer before the next."""
-        assert self._process is not None
-        frame = encode(requests)
-        if len(frame) <= _TOGETHER:
-            self._answer(questions, self._process.ask(frame, [question.verb for question in questions]))
-            return
-        unanswered = iter(questions)
-        for request in requests:
-            waiting = [next(unanswered)] if isinstance(request, Ask | Load | Run) else []
-            self._answer(waiting, self._process.ask(encode([request]), [question.verb for question in waiting]))
-
-    @staticmethod
-    def _answer(questions: Sequence[Question], replies: Sequence[Reply]) -> None:
-        for question, reply in zip(questions, replies, strict=True):
-            question.answer = reply
 
     def read_last_words(self) -> bytes:
         """Return the end of what the process has printed, or the one before it."""
@@ -292,27 +184,49 @@ class Host:
             self._process = None
 
 
-def raise_failure(failure: Failure, *, loading: bool = False) -> None:
-    """Raise the error that a plugin's process has told of. Only while it loads may it blame the user."""
-    words = [one_line(text) for text in failure.words[:3]] or ["no words"]
-    if failure.kind == "misuse" and loading and len(words) == 3:
+def _exchange(process: PluginProcess, requests: list[Request], questions: list[Question]) -> None:
+    """Send requests and receive the answers: all together if they are small, else each answer before the next."""
+    frame = encode(requests)
+    if len(frame) <= _TOGETHER:
+        process.ask(frame, questions)
+        return
+    unanswered = iter(questions)
+    for request in requests:
+        process.ask(encode([request]), [next(unanswered)] if isinstance(request, Ask | Load) else [])
+
+
+def answer_of(question: Question) -> Answer:
+    """Return the answer to a question, or raise the ContractError that came instead of it."""
+    answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.answer)
+    if not isinstance(answer, Answer):
+        raise PluginError(f"{question.verb}: a {type(answer).__name__} where an answer was needed", "channel")
+    return answer
+
+
+def raise_failure(reply: Reply | PluginError | None, *, loading: bool = False) -> Reply:
+    """Return a reply, or raise the error that it tells of. Only while it loads may a plugin blame the user."""
+    assert reply is not None
+    if isinstance(reply, PluginError):
+        raise PluginError(str(reply), reply.cause, ended=reply.ended)
+    if not isinstance(reply, Failure):
+        return reply
+    words = [one_line(text) for text in reply.words[:3]] or ["no words"]
+    if reply.kind == "misuse" and loading and len(words) == 3:
         raise MisuseError(*words)
-    if failure.kind == "plugin":
-        raise PluginError(words[0], failure.cause if failure.cause in ("memory", "exit") else "exception")
-    if failure.kind == "not finite":
-        raise NonFiniteError(words[0])
-    raise ContractError(words[0])
+    if reply.kind == "plugin":
+        raise PluginError(words[0], reply.cause if reply.cause in ("memory", "exit") else "exception")
+    raise (NonFiniteError if reply.kind == "not finite" else ContractError)(words[0])
 
 
-_HOSTS: dict[tuple[str, str, Limits, bool], Host] = {}
+_HOSTS: dict[tuple[tuple[str, ...], str, Limits, bool], Host] = {}
 _foreign_words: dict[str, bytes] = {}
 
 
-def host_of(loader: str, name: str, limits: Limits, *, second: bool = False) -> Host:
+def host_of(command: tuple[str, ...], name: str, limits: Limits, *, second: bool = False) -> Host:
     """Return the host of a formulation in this process of the judge."""
-    key = loader, name, limits, second
+    key = command, name, limits, second
     if key not in _HOSTS:
-        _HOSTS[key] = Host(loader, name, limits, second=second)
+        _HOSTS[key] = Host(command, name, limits, second=second)
     return _HOSTS[key]
 
 

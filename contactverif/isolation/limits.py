@@ -1,4 +1,4 @@
-"""The limits of a plugin's process."""
+"""The limits of a child process."""
 
 from __future__ import annotations
 
@@ -13,23 +13,12 @@ _START_FACTOR = 5.0  # Import, first calls and compilation take longer than what
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The limits of a plugin's process.
+    """The limits of a child process. They are positive and finite."""
 
-    Attributes
-    ----------
-    seconds : float
-        The longest time that a call may take. The import and the first call of each method may take five times as
-        long, because they compile.
-    memory : int
-        The address space, in megabytes, that the process may take beyond what it has at its start.
-
-    Raises
-    ------
-    MisuseError
-        If a limit is not positive and finite.
-    """
-
+    # The longest time that a call may take. The import of a plugin and the first call of each of its methods may take
+    # five times as long, because they compile.
     seconds: float = 60.0
+    # The address space, in megabytes, that the process may take beyond what it has at its start.
     memory: int = 4096
 
     def __post_init__(self) -> None:

@@ -1,95 +1,66 @@
 """Formulations that are loaded in processes of their own, and a survey of what is installed.
 
-Rule for the next editor: nothing of a plugin is imported here, and what its process states is checked like an answer.
+Rule: nothing of a plugin is imported here, and what its process states is checked like an answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from contactverif.contract.errors import ContractError, PluginError
 from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.isolation.host import raise_failure
+from contactverif.isolation.host import host_of, raise_failure
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.messages import Failure, Loaded, Reply, Survey, Unloaded, Wraps, encode
-from contactverif.isolation.process import PluginProcess
-from contactverif.isolation.remote_formulation import RemoteFactory
+from contactverif.isolation.messages import Load, Loaded, Reply, Unloaded, Wraps, encode
+from contactverif.isolation.process import PluginProcess, Question
+from contactverif.isolation.remote_formulation import RemoteFactory, RemoteSubject
 
 
 @dataclass(frozen=True, slots=True)
 class Wrapper:
-    """A formulation that works only around another one, `name/NAME`.
-
-    Attributes
-    ----------
-    name : str
-        The name of the entry point.
-    summary : str
-        The first line of the factory's docstring.
-    """
+    """A formulation that works only around another one, `name/NAME`."""
 
     name: str
-    summary: str
+    summary: str  # The first line of the factory's docstring.
 
 
-def load_remote(loader: str, name: str, limits: Limits) -> Subject | NotLoaded:
-    """Load a formulation in a process of its own.
+def python_program(file: str) -> tuple[str, ...]:
+    """Return the command that runs a file, with the folders of this process's modules as its arguments."""
+    return sys.executable, file, *filter(None, sys.path)
 
-    Parameters
-    ----------
-    loader : str
-        The function that loads a name there, as ``"module:function"``; it returns a `Subject` or a `NotLoaded`.
-    name : str
-        The name as on the command line.
-    limits : Limits
-        The limits of the process.
 
-    Returns
-    -------
-    Subject | NotLoaded
-        The formulation, or the reason why it does not load.
+def load_remote(command: tuple[str, ...], name: str, limits: Limits) -> Subject | NotLoaded:
+    """Load a formulation in a process of its own: a program that speaks the protocol and knows formulations by name.
 
-    Raises
-    ------
-    MisuseError
-        If the name or its options are wrong.
+    A wrong name or option is a MisuseError.
     """
-    factory = RemoteFactory(loader, name, limits)
     try:
-        item = _read_finding(name, factory, factory.host.load())
+        item = _read_reply(command, name, limits, host_of(command, name, limits).load())
     except ContractError as error:
         return _not_loaded(name, error)
     assert not isinstance(item, Wrapper)
     return item
 
 
-def survey(loader: str, names: Iterable[str], limits: Limits) -> Iterator[Subject | Wrapper | NotLoaded]:
-    """Yield what is installed under each name. One process loads them all; one that ends is followed by another.
-
-    Parameters
-    ----------
-    loader : str
-        The function that loads a name there, as ``"module:function"``; it returns a `Wrapper`, too.
-    names : Iterable[str]
-        The names of entry points.
-    limits : Limits
-        The limits of the process.
-    """
+def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> Iterator[Subject | Wrapper | NotLoaded]:
+    """Yield what is installed under each name. One process loads them all; one that ends is followed by another."""
     process: PluginProcess | None = None
     for name in names:
-        process = process or PluginProcess(limits)
+        question = Question(0, "import")
         try:
-            (reply,) = process.ask(encode([Survey(loader, name)]), ["import"])
-            yield _read_finding(name, RemoteFactory("", name, limits), reply)
-        except PluginError as error:
-            process = None if error.ended else process
-            yield _not_loaded(name, error)
+            process = process or PluginProcess(command, limits)
+            process.ask(encode([Load(0, name, survey=True)]), [question])
+            yield _read_reply(command, name, limits, raise_failure(question.answer, loading=True))
         except ContractError as error:
+            process = None if isinstance(error, PluginError) and error.ended else process
             yield _not_loaded(name, error)
     if process is not None:
         process.end()
@@ -100,26 +71,23 @@ def _not_loaded(name: str, error: ContractError) -> NotLoaded:
     return NotLoaded(name, f"{error.cause}: {error}" if ended else str(error))  # type: ignore[attr-defined]
 
 
-def _read_finding(name: str, factory: RemoteFactory, reply: Reply) -> Subject | Wrapper | NotLoaded:
+def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Reply) -> Subject | Wrapper | NotLoaded:
     """Return what a process says that a name is."""
     match reply:
-        case Unloaded(reason):
+        case Unloaded(_, reason):
             return NotLoaded(name, one_line(reason))
-        case Wraps(summary):
+        case Wraps(_, summary):
             return Wrapper(name, one_line(summary))
-        case Loaded(words, provides):
-            return Subject.of_parts(name, factory, _traits(words), frozenset(provides))
-        case Failure():
-            raise_failure(reply, loading=True)
+        case Loaded(_, traits, provides):
+            return RemoteSubject(RemoteFactory(command, name, limits, _traits(traits), frozenset(provides)))
     raise PluginError(f"import: a {type(reply).__name__} where a formulation was needed", "channel")
 
 
-def _traits(words: Mapping[str, Any]) -> Traits:
+def _traits(words: dict[str, Any]) -> Traits:
     """Return the traits that a plugin's process states, checked."""
-    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}
-    if isinstance(values.get("source"), str):
-        values["source"] = one_line(values["source"])
+    if isinstance(words.get("source"), str):
+        words["source"] = one_line(words["source"])
     try:
-        return Traits(**values)
-    except TypeError as error:
-        raise ContractError(f"traits: {error}") from None
+        return msgspec.convert(words, Traits)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise ContractError(f"traits: {one_line(str(error))}") from None

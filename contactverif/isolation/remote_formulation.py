@@ -1,154 +1,151 @@
-"""A formulation in another process, with the methods of a formulation.
+"""A formulation in another process, with the methods of a plugin, and the subject that makes it.
 
-Rule for the next editor: who asks does not notice where the formulation is, but for what cannot be told apart inline: a
-process that dies or hangs. A formulation of a process that ended is the same one in the next process.
+Rule: it answers as the same plugin does in this process, but for a process that dies or hangs. A formulation whose
+process ended is the same one in the next process.
 """
 
 from __future__ import annotations
 
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
-from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.errors import ContractError, MisuseError, PluginError
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.subject import COMPRESSED, Call
-from contactverif.isolation.host import Host, Question, host_of
+from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
+from contactverif.contract.traits import Traits
+from contactverif.isolation.host import Host, answer_of, host_of
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.messages import Answer, MessageError, unpack_array
+from contactverif.isolation.messages import Answer
+from contactverif.isolation.process import Question
 
 _COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
+_MOST_SECONDS = 1e9
 
 
-class RemoteFactory:
-    """A factory ``make(*, penalty)`` of a formulation that lives in a process of its own. It can be pickled.
+class RemoteSubject(Subject):
+    """A formulation that lives in a process of its own. It can be pickled."""
 
-    Parameters
-    ----------
-    loader, name, limits, second : str, str, Limits or bool
-        The arguments of `Host`.
-    """
-
-    def __init__(self, loader: str, name: str, limits: Limits, *, second: bool = False) -> None:
-        self._key = loader, name, limits
-        self._second = second
+    def __init__(self, make: RemoteFactory) -> None:
+        super().__init__(make.name, make)
+        self._remote = make
 
     @property
     def host(self) -> Host:
         """The host in this process of the judge."""
-        return host_of(*self._key, second=self._second)
+        return self._remote.host
+
+    def restart(self) -> Subject:
+        """Return the same formulation in a second process."""
+        return RemoteSubject(replace(self._remote, second=True))
+
+
+def count_ends(subject: Subject) -> int:
+    """Return how often the process of a formulation has ended before it was told to; 0 if it has none of its own."""
+    return subject.host.n_ended if isinstance(subject, RemoteSubject) else 0
+
+
+@dataclass(frozen=True)
+class RemoteFactory:
+    """A factory ``make(*, penalty)`` of a formulation that a program, `command`, has loaded by its name."""
+
+    command: tuple[str, ...]
+    name: str
+    limits: Limits
+    traits: Traits
+    provides: frozenset[str]  # The optional methods that the plugin has.
+    second: bool = False
 
     @property
-    def n_ended(self) -> int:
-        """The number of times that the process ended before it was told to."""
-        return self.host.n_ended
-
-    @property
-    def second_factory(self) -> RemoteFactory | None:
-        """The factory of the same formulation in a second process."""
-        return None if self._second else RemoteFactory(*self._key, second=True)
-
-    def run(self, verb: str, function: str, words: bytes) -> bytes:
-        """Call a function of the harness in the formulation's process, see `Host.run`."""
-        return self.host.run(verb, function, words)
+    def host(self) -> Host:
+        """The host in this process of the judge."""
+        return host_of(self.command, self.name, self.limits, second=self.second)
 
     def __call__(self, *, penalty: float) -> RemoteFormulation:
         """Return the formulation with a penalty."""
-        return RemoteFormulation(self.host, penalty)
+        return RemoteFormulation(self, penalty)
 
 
-class RemoteFormulation:
-    """A formulation with one penalty in another process. A checked formulation stands before it, which checks answers.
+class RemoteFormulation(Prefetching):
+    """A formulation with one penalty in another process. Nothing that it answers is checked but its kind."""
 
-    Parameters
-    ----------
-    host : Host
-        The host of the process.
-    penalty : float
-        The penalty.
-
-    Attributes
-    ----------
-    loops : bool
-        It takes a batch of states, also where the formulation itself does not.
-    """
-
-    loops = True
-
-    def __init__(self, host: Host, penalty: float) -> None:
-        self._host, self._penalty = host, penalty
+    def __init__(self, make: RemoteFactory, penalty: float) -> None:
+        self._make, self._penalty, self.traits = make, penalty, make.traits
+        for part in (*OPTIONAL_PARTS, *FAST_PARTS, "n_multipliers"):
+            if part not in make.provides:
+                setattr(self, part, None)
+        self.warm = False  # True: what short calls take is measured when they are repeated.
+        self._number, self._started = 0, -1
         self._last: Question | None = None
-        self._foreseen: deque[tuple[Call, Question]] = deque()
-        self._make()
+        self._prefetched: deque[tuple[Call, Question]] = deque()
 
-    def _make(self) -> None:
-        self._number, self._started = self._host.make(self._penalty)
-        weakref.finalize(self, self._host.forget, self._number, self._started)
-
-    def _ask(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array | None) -> tuple[Question, int]:
-        if not self._host.is_alive(self._started):
-            self._make()
-        self._last, number = self._host.ask(verb, self._number, interface, pairing, z)
-        return self._last, number
+    def _ask(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array | None) -> Question:
+        host = self._make.host
+        if not host.is_alive(self._started):
+            self._number, self._started = host.make(self._penalty)
+            weakref.finalize(self, host.forget, self._number, self._started)
+        self._last = host.ask(verb, self._number, interface, pairing, z, warm=self.warm)
+        return self._last
 
     def _answer(
         self, verb: str, interface: Interface, pairing: Pairing | None = None, z: Array | None = None
     ) -> Answer:
-        question = self._take_foreseen(verb, interface, pairing) or self._ask(verb, interface, pairing, z)[0]
+        question = self._take_prefetched(verb, interface, pairing) or self._ask(verb, interface, pairing, z)
         if question.answer is None:
-            self._host.flush()
+            self._make.host.flush()
         if isinstance(pairing, RemotePairing):
             pairing.check()
-        return question.result()
+        return answer_of(question)
 
     @contextmanager
-    def foresee(self, calls: Sequence[Call]) -> Iterator[None]:
+    def prefetch(self, calls: Sequence[Call]) -> Iterator[None]:
         """Open a block in which these methods are called, in this order: they go to the process in one message."""
         try:
             for verb, interface, pairing, z in calls:
-                if verb in self._host.methods or verb == "residual":
-                    self._foreseen.append(((verb, interface, pairing, z), self._ask(verb, interface, pairing, z)[0]))
+                if verb in self._make.provides or verb == "residual":
+                    self._prefetched.append(((verb, interface, pairing, z), self._ask(verb, interface, pairing, z)))
             yield
         finally:
-            self._foreseen.clear()
+            self._prefetched.clear()
 
-    def _take_foreseen(self, verb: str, interface: Interface, pairing: Pairing | None) -> Question | None:
+    def _take_prefetched(self, verb: str, interface: Interface, pairing: Pairing | None) -> Question | None:
         """Return the question that was asked ahead, if this is the next one of those."""
-        if not self._foreseen:
+        if not self._prefetched:
             return None
-        (foreseen, of_interface, of_pairing, _), question = self._foreseen[0]
-        if foreseen != verb or of_interface is not interface or of_pairing is not pairing:
+        (next_verb, of_interface, of_pairing, _), question = self._prefetched[0]
+        if next_verb != verb or of_interface is not interface or of_pairing is not pairing:
             return None
-        self._foreseen.popleft()
         self._last = question
-        return question
+        return self._prefetched.popleft()[1]
 
-    @property
-    def seconds(self) -> float:
-        """The seconds that the last call took there, without the way and without any check."""
+    def seconds(self) -> tuple[float, float]:
+        """Return the seconds that the last call took there, by the wall clock and of the processor.
+
+        They hold neither the round trip nor any check. A plugin may say what it likes, within reason.
+        """
         assert self._last is not None
-        self._host.flush()
-        return self._last.result().seconds
+        self._make.host.flush()
+        answer = answer_of(self._last)
+        if not (0 <= answer.seconds <= _MOST_SECONDS and 0 <= answer.processor_seconds <= _MOST_SECONDS):
+            raise PluginError(f"{self._last.verb}: times that cannot be", "channel")
+        return answer.seconds, answer.processor_seconds
 
-    @property
-    def n_multipliers(self) -> Callable[[Interface], int] | None:
-        """The method that returns the number of multipliers, if the plugin has it."""
-        return self._count if "n_multipliers" in self._host.methods else None
-
-    def _count(self, interface: Interface) -> int:
-        return self._answer("n_multipliers", interface).number
+    def n_multipliers(self, interface: Interface) -> int:
+        """Return the number of multipliers."""
+        return self._answer("n_multipliers", interface).count
 
     def pair(self, interface: Interface, z: FloatArray) -> Pairing:
         """Return the pairing at one state z (n_unknowns,). It is asked for together with the next question."""
-        question, number = self._ask("pair", interface, None, z)
-        pairing = RemotePairing(self._host, question, interface)
-        self._host.keep(pairing, number)
+        question = self._ask("pair", interface, None, z)
+        pairing = RemotePairing(self._make.host, question, interface)
+        self._make.host.keep(pairing, question.number)
         return pairing
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
@@ -176,40 +173,39 @@ class RemoteFormulation:
 
 
 class RemotePairing(Pairing):
-    """A pairing that the process of a plugin keeps. It comes here, and is checked, when somebody looks into it.
-
-    Parameters
-    ----------
-    host : Host
-        The host of the process.
-    question : Question
-        The question whose answer it is.
-    interface : Interface
-        The interface that it belongs to.
-    """
+    """A pairing that the process of a plugin keeps. It comes here, and is checked, when it is looked into."""
 
     __slots__ = ("_content", "_host", "_interface", "_question")
 
     def __init__(self, host: Host, question: Question, interface: Interface) -> None:
         self._host, self._question, self._interface = host, question, interface
-        self._content: dict[str, Array] | None = None
+        self._content: Pairing | None = None
 
     @property
-    def _arrays(self) -> dict[str, Array]:  # type: ignore[override]
+    def _whole(self) -> Pairing:
         if self._content is None:
             if self._question.answer is None:
                 self._host.flush()
-            whole = Pairing(_unpack("pair", self._question.result()))
+            whole = Pairing(_unpack("pair", answer_of(self._question)))
             whole.check_bounds(self._interface)
             self.check()
-            self._content = dict(whole)
+            self._content = whole
         return self._content
+
+    def __getitem__(self, name: str) -> Array:
+        return self._whole[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._whole)
+
+    def __len__(self) -> int:
+        return len(self._whole)
 
     @property
     def opaque(self) -> bool:
         """Return whether pairings of the plugin have a handle, which stay in its process."""
         if self._host.opaque is None:
-            _ = self._arrays
+            _ = self._whole
         return bool(self._host.opaque)
 
     @property
@@ -218,22 +214,20 @@ class RemotePairing(Pairing):
 
     def check(self) -> None:
         """Raise the error of the plugin, if it made one when it paired."""
-        answer = self._question.answer
-        if not isinstance(answer, Answer):
-            answer = self._question.result()
+        answer = answer_of(self._question)
         if self._host.opaque is None:
-            self._host.opaque = answer.opaque
-        elif self._host.opaque is not answer.opaque:
+            self._host.opaque = answer.handle
+        elif self._host.opaque is not answer.handle:
             raise ContractError("pair: returned a handle in some states, and none in others")
 
     def check_bounds(self, interface: Interface) -> None:
-        """Do nothing: the bounds are checked where the plugin is, and once more when somebody looks into it."""
+        """Do nothing: the bounds are checked where the plugin is, and once more when the pairing is looked into."""
 
 
 def _unpack(verb: str, answer: Answer) -> dict[str, Array]:
     try:
-        return {name: unpack_array(array) for name, array in answer.arrays.items()}
-    except MessageError as error:
+        return {name: array.unpack() for name, array in answer.arrays.items()}
+    except ValueError as error:
         raise ContractError(f"{verb}: {error}") from None
 
 
@@ -244,7 +238,7 @@ def _pick(arrays: dict[str, Array], verb: str, name: str) -> Array:
 
 
 def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
-    """Return the tangent (size, size): dense, or a matrix in the format in which it came, with no entry checked."""
+    """Return the tangent (size, size), dense or in the format in which it came, with no entry checked."""
     if "dense" in arrays:
         return arrays["dense"]
     kind = next((kind for kind in _COMPRESSED if f"{kind} data" in arrays), "coo")
@@ -252,7 +246,7 @@ def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
         if kind == "coo":
             data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
             return sparse.coo_array((data, (row, col)), shape=(size, size))
-        parts = tuple(_pick(arrays, verb, f"{kind} {name}") for name in COMPRESSED)
+        parts = tuple(_pick(arrays, verb, f"{kind} {name}") for name in ("data", "indices", "indptr"))
         return _COMPRESSED[kind](parts, shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:
         raise ContractError(f"{verb}: returned a broken {kind} matrix: {error}") from None

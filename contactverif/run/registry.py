@@ -17,6 +17,7 @@ from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from math import inf
+from pathlib import Path
 from typing import Any, Literal
 
 from contactverif.contract.errors import ContractError, MisuseError
@@ -26,7 +27,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import Wrapper, load_remote, survey
+from contactverif.isolation.loading import Wrapper, load_remote, python_program, survey
 from contactverif.problems.problem import Problem
 
 FORMULATIONS = "contactverif.formulations"
@@ -43,8 +44,9 @@ _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
 
-_LOADER = f"{__name__}:load_formulation"  # A plugin's own process loads a name by it.
-_SURVEYOR = f"{__name__}:load_with_defaults"
+def _worker() -> tuple[str, ...]:
+    """Return the command that starts the process of a plugin."""
+    return python_program(str(Path(__file__).with_name("plugin_worker.py")))
 
 
 def formulation_names() -> tuple[str, ...]:
@@ -64,7 +66,7 @@ def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
         installed = _entries_by_name(FORMULATIONS)
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
     names = formulation_names()
-    items = survey(_SURVEYOR, names, limits)
+    items = survey(_worker(), names, limits)
     return tuple(name for name, item in zip(names, items, strict=True) if not isinstance(item, Wrapper))
 
 
@@ -94,7 +96,7 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
         If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
     if limits is not None:
-        return load_remote(_LOADER, text, limits)
+        return load_remote(_worker(), text, limits)
     make = _load_factory(text)
     return make if isinstance(make, NotLoaded) else subject_of(text, make)
 
@@ -138,7 +140,7 @@ def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper |
     """
     if limits is None:
         return tuple(map(load_with_defaults, formulation_names()))
-    return tuple(survey(_SURVEYOR, formulation_names(), limits))
+    return tuple(survey(_worker(), formulation_names(), limits))
 
 
 def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded, ...]:

@@ -9,7 +9,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.interleaved_calls import Question, compare_two_pairings, count_changes, renumber
 from contactverif_properties.shared.roundoff import ratio
@@ -132,8 +132,8 @@ def purity(case: Case, subject: Subject) -> Measurement:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         values[BATCHED] = compare_batch(state, near, forces, batch)
         tolerances[BATCHED] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
-    if (there := subject.in_second_process()) is not None:
-        far = there.with_penalty(penalty)
+    if isinstance(subject, Restartable):
+        far = subject.restart().with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")

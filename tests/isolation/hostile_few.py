@@ -1,18 +1,26 @@
-"""A few plugins that a test asks in a process of their own, and the loader that finds them there."""
+"""A few plugins that a test asks in a process of their own, which this file is the program of."""
 
 from __future__ import annotations
+
+import sys
+
+if __name__ == "__main__":
+    sys.path[:], sys.argv[1:] = sys.argv[1:], []
 
 import contextlib
 import os
 import signal
-import sys
 import time
 
 import numpy as np
 from scipy import sparse
 
 from contactverif import Handle, Subject
+from contactverif.isolation.loading import python_program
+from contactverif.isolation.worker import main
 from contactverif.run.registry import subject_of
+
+PROGRAM = python_program(__file__)
 
 
 class Springs:
@@ -243,3 +251,7 @@ class LeavesChildren(Springs):
 def load(name: str) -> Subject:
     """Return the formulation of a class above."""
     return subject_of(name, globals()[name])
+
+
+if __name__ == "__main__":
+    main(load, load)

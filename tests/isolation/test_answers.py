@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pytest
+from isolation import hostile_few
 
 from contactverif import load_formulation, named_case
 from contactverif.contract.arrays import dense
@@ -32,9 +32,9 @@ def messages(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     verbs_of_messages: list[tuple[str, ...]] = []
     ask = process.PluginProcess.ask
 
-    def note(self: process.PluginProcess, frame: bytes, verbs: Sequence[str]) -> Any:
-        verbs_of_messages.append(tuple(verbs))
-        return ask(self, frame, verbs)
+    def note(self: process.PluginProcess, frame: bytes, questions: Sequence[process.Question]) -> None:
+        verbs_of_messages.append(tuple(question.verb for question in questions))
+        ask(self, frame, questions)
 
     monkeypatch.setattr(process.PluginProcess, "ask", note)
     return verbs_of_messages
@@ -62,7 +62,7 @@ def test_answers_are_those_of_the_questions_one_by_one(name: str, messages: list
 
 
 def test_the_first_error_is_raised_and_the_rest_is_forgotten(messages: list[tuple[str, ...]]) -> None:
-    subject = load_remote("isolation.hostile_few:load", "NoNumberTangent", Limits())
+    subject = load_remote(hostile_few.PROGRAM, "NoNumberTangent", Limits())
     assert isinstance(subject, Subject)
     formulation = subject.for_case(CASE)
     calls = calls_of(formulation, CASE.z, "residual", "tangent", "residual")

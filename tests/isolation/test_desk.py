@@ -15,46 +15,49 @@ from contactverif.isolation.messages import (
     Make,
     MessageError,
     Request,
-    Share,
+    ShareInterface,
     SharePairing,
     decode_replies,
     encode,
-    pack_array,
-    unpack_array,
 )
+from contactverif.isolation.packed import PackedArray
 from contactverif.isolation.worker import Desk
+from contactverif.run.registry import load_formulation
 
 INTERFACE = named_case("c").interface
 Z = named_case("c").z
-LOAD = Load("contactverif.run.registry:load_formulation", "vts-ppt")
+LOAD = Load(1, "vts-ppt")
+CUT = PackedArray("<f8", (3,), b"12345")
 
 
-def share(nodes: np.ndarray) -> Share:
-    return Share(2, pack_array(nodes), pack_array(INTERFACE.slave.segments), pack_array(INTERFACE.master.segments))
+def share(nodes: PackedArray) -> ShareInterface:
+    return ShareInterface(2, nodes, *(PackedArray.pack(side.segments) for side in (INTERFACE.slave, INTERFACE.master)))
 
 
 @pytest.mark.parametrize(
     "request_",
     [
         Make(1, float("nan")),
-        Share(2, ("<f8", (3,), b"12345"), ("<i8", (1,), b"1"), ("no", (), b"")),
-        SharePairing(3, {"a": ("<f8", (1,), b"12345678")}),
+        share(CUT),
+        SharePairing(3, {"a": PackedArray("<f8", (1,), b"12345678")}),
         Forget([1, 2, 3]),
     ],
 )
 def test_what_has_no_reply_never_gets_one_even_if_it_fails(request_: Request) -> None:
-    assert Desk().reply(request_) is None
+    assert Desk(load_formulation, load_formulation).reply(request_) is None
 
 
 def test_an_error_waits_for_the_question_that_needs_what_is_missing() -> None:
-    desk = Desk()
+    desk = Desk(load_formulation, load_formulation)
     desk.reply(LOAD)
     desk.reply(Make(1, 10.0))
-    desk.reply(Share(2, ("<f8", (3,), b"12345"), ("<i8", (1,), b"1"), ("no", (), b"")))
-    reply = desk.reply(Ask("pair", 1, 2, None, pack_array(Z), 3))
+    desk.reply(share(CUT))
+    ask = Ask(3, "pair", 1, 2, None, PackedArray.pack(Z))
+    reply = desk.reply(ask)
     assert isinstance(reply, Failure)
-    desk.reply(share(INTERFACE.nodes))
-    assert isinstance(desk.reply(Ask("pair", 1, 2, None, pack_array(Z), 3)), Answer)
+    assert reply.question == 3
+    desk.reply(share(PackedArray.pack(INTERFACE.nodes)))
+    assert isinstance(desk.reply(ask), Answer)
 
 
 @pytest.mark.parametrize(
@@ -67,18 +70,22 @@ def test_an_error_waits_for_the_question_that_needs_what_is_missing() -> None:
         ("<f8", (10**12,), b""),
         ("<f8", (0,) * 9, b""),
         ("<f8", (-1, 0), b""),
+        ("<f8", (0, 2**62), b""),
+        ("<f8", (2**62, 2**62), bytes(16)),
+        ("nonsense", (2,), b""),
+        ("<f3", (1,), b"123"),
     ],
 )
 def test_an_array_that_lies_is_no_array(packed: tuple[str, tuple[int, ...], bytes]) -> None:
-    with pytest.raises(MessageError):
-        unpack_array(packed)
+    with pytest.raises(ValueError, match=r"array"):
+        PackedArray(*packed).unpack()
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.complex128, np.longdouble, np.clongdouble, np.int64, np.int32, bool])
 @pytest.mark.parametrize("shape", [(), (0,), (3, 0), (2, 3)])
 def test_an_array_that_travels_is_what_it_was(dtype: type, shape: tuple[int, ...]) -> None:
     array = np.ones(shape, dtype)
-    there = unpack_array(pack_array(array))
+    there = PackedArray.pack(array).unpack()
     assert (there.dtype, there.shape) == (array.dtype, array.shape)
     assert np.array_equal(there, array)
     assert not there.flags.writeable

@@ -18,8 +18,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
+from contactverif.isolation.remote_formulation import count_ends
 
-LOADER = "isolation.hostile_few:load"
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)
 
@@ -59,7 +59,7 @@ def test_promises_and_parts_are_those_of_this_process() -> None:
 
 
 def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
-    formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
+    formulation = load_remote(hostile_few.PROGRAM, "Springs", QUICK).for_case(CASE)
     pairing = formulation.pair(CASE.interface, CASE.z)
     batch = np.array([CASE.z, 2 * CASE.z])
     forces = formulation.residual(CASE.interface, pairing, batch)
@@ -74,7 +74,7 @@ def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
     ],
 )
 def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes(name: str) -> None:
-    far = load_remote(LOADER, name, QUICK).for_case(CASE)
+    far = load_remote(hostile_few.PROGRAM, name, QUICK).for_case(CASE)
     near = Subject(name, getattr(hostile_few, name)).for_case(CASE)
     answers = []
     for formulation in (near, far):
@@ -89,13 +89,15 @@ def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes(name: str) 
 
 
 def test_multipliers_that_nobody_promised_are_found_at_the_first_question() -> None:
-    for subject in (load_remote(LOADER, "Counts", QUICK), Subject("Counts", hostile_few.Counts)):
+    for subject in (load_remote(hostile_few.PROGRAM, "Counts", QUICK), Subject("Counts", hostile_few.Counts)):
         with pytest.raises(ContractError, match="n_multipliers: 3 of them, with the trait enforcement 'penalty'"):
             ask(subject)
 
 
 def test_a_handle_stays_in_its_process() -> None:
-    handled, plain = (load_remote(LOADER, name, QUICK).for_case(CASE) for name in ("HandledSprings", "Springs"))
+    handled, plain = (
+        load_remote(hostile_few.PROGRAM, name, QUICK).for_case(CASE) for name in ("HandledSprings", "Springs")
+    )
     interface = CASE.interface
     assert handled.pair(interface, CASE.z) is None
     pairing = handled.own_pairing(interface, CASE.z)
@@ -110,7 +112,7 @@ def test_a_handle_stays_in_its_process() -> None:
 
 
 def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
-    formulation = load_remote(LOADER, "HandledAtTimes", QUICK).for_case(CASE)
+    formulation = load_remote(hostile_few.PROGRAM, "HandledAtTimes", QUICK).for_case(CASE)
     assert formulation.pair(CASE.interface, CASE.z) is None
     far = CASE.z + 2000
     with pytest.raises(ContractError, match="pair: returned a handle in some states, and none in others"):
@@ -136,9 +138,9 @@ def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
     ],
 )
 def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words: str) -> None:
-    subject = load_remote(LOADER, name, QUICK)
+    subject = load_remote(hostile_few.PROGRAM, name, QUICK)
     if name in ("Hangs", "HangsInPair", "Cuts", "TooLong"):  # The import takes longer than such a limit.
-        subject._make.host._process._limits = Limits(seconds=0.1)
+        subject.host._process._limits = Limits(seconds=0.1)
     with pytest.raises(PluginError, match=words) as caught:
         ask(subject)
     assert caught.value.cause == cause
@@ -146,11 +148,11 @@ def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words:
 
 
 def test_a_process_that_ended_is_started_again() -> None:
-    subject = load_remote(LOADER, "Kills", QUICK)
+    subject = load_remote(hostile_few.PROGRAM, "Kills", QUICK)
     for times in (1, 2):
         with pytest.raises(PluginError, match="SIGSEGV"):
             ask(subject)
-        assert subject.n_ended == times
+        assert count_ends(subject) == times
     pairing = subject.for_case(CASE).pair(CASE.interface, CASE.z)
     assert pairing["active"].dtype == np.bool_
 
@@ -158,7 +160,7 @@ def test_a_process_that_ended_is_started_again() -> None:
 def test_one_that_always_ends_its_process_is_not_asked_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(host, "_MOST_ENDS", 2)
     (question,) = load_properties(["patch.flat.transmission"])
-    (row,) = verify([load_remote(LOADER, "Kills", QUICK)], [question], examples=20, seed=1).rows
+    (row,) = verify([load_remote(hostile_few.PROGRAM, "Kills", QUICK)], [question], examples=20, seed=1).rows
     reasons = [outcome.reason for outcome in row.outcomes]
     assert row.verdict is Verdict.CRASHED
     assert sum("SIGSEGV" in reason for reason in reasons) <= 2
@@ -178,25 +180,25 @@ def test_purity_asks_a_second_process(name: str, words: str | None, monkeypatch:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     (question,) = load_properties(["purity"])
     (here,) = verify([Subject(name, getattr(hostile_few, name))], [question], examples=4, seed=1).rows
-    (there,) = verify([load_remote(LOADER, name, QUICK)], [question], examples=4, seed=1).rows
+    (there,) = verify([load_remote(hostile_few.PROGRAM, name, QUICK)], [question], examples=4, seed=1).rows
     assert here.verdict is Verdict.PASS
     assert there.verdict is (Verdict.FAIL if words else Verdict.PASS), there.reason
     assert words is None or words in there.reason
 
 
 def test_processes_make_room_where_memory_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    first, second = (load_remote(LOADER, name, QUICK) for name in ("Springs", "HandledSprings"))
+    first, second = (load_remote(hostile_few.PROGRAM, name, QUICK) for name in ("Springs", "HandledSprings"))
     ask(first)
     monkeypatch.setattr(host, "_LEAST_MEMORY", 1 << 60)
     ask(second)
-    third = load_remote(LOADER, "RaisesInMake", QUICK)
-    assert [subject._make.host.has_process for subject in (first, second, third)] == [False, False, True]
+    third = load_remote(hostile_few.PROGRAM, "RaisesInMake", QUICK)
+    assert [subject.host.has_process for subject in (first, second, third)] == [False, False, True]
     ask(first)  # It starts again, and that is no mistake of the plugin.
-    assert first.n_ended == 0
+    assert count_ends(first) == 0
 
 
 def test_a_damaged_pairing_of_the_judge_is_refused_there_as_here() -> None:
-    formulation = load_remote(LOADER, "Springs", QUICK).for_case(CASE)
+    formulation = load_remote(hostile_few.PROGRAM, "Springs", QUICK).for_case(CASE)
     pairing = Pairing({"other": np.zeros(3, np.int64)})
     with pytest.raises(PluginError, match="residual: KeyError: 'active'"):
         formulation.residual(CASE.interface, pairing, CASE.z)
@@ -210,18 +212,18 @@ def test_a_wrong_option_is_a_mistake_of_the_user() -> None:
 
 
 def test_a_formulation_that_cannot_be_imported_is_not_loaded() -> None:
-    assert isinstance(load_remote("isolation.hostile_few:load", "no_such_class", QUICK), NotLoaded)
+    assert isinstance(load_remote(hostile_few.PROGRAM, "no_such_class", QUICK), NotLoaded)
 
 
 def test_what_it_prints_is_kept_wherever_its_process_is() -> None:
-    ask(load_remote(LOADER, "Prints", QUICK))
+    ask(load_remote(hostile_few.PROGRAM, "Prints", QUICK))
     host.note_last_words({"Other": b"in a worker"})
     assert host.end_all() == {"Prints": b"printed\nand written\n", "Other": b"in a worker"}
     assert host.end_all() == {}
 
 
 def test_nothing_it_started_is_left_behind() -> None:
-    ask(load_remote(LOADER, "LeavesChildren", QUICK))
+    ask(load_remote(hostile_few.PROGRAM, "LeavesChildren", QUICK))
     for _ in range(500):
         marked = [p.pid for p in psutil.process_iter() if _is_marked(p)]
         if len(marked) > 1:

@@ -20,10 +20,9 @@ import numpy as np
 
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.accuracy import solution_of, solve_in_tries
-from contactverif.mechanics.trace import Trace
+from contactverif.mechanics.accuracy import solution_of
 from contactverif.studies.bench.bench_plan import is_solved, largest_errors, pose
-from contactverif.studies.bench.timed_solution import solve_there, solve_with_clock, without_collector
+from contactverif.studies.bench.timed_solution import solve_with_clock, without_collector
 from contactverif_reports.bench.results import PARTS, Cell, Outcome
 
 
@@ -57,7 +56,7 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -
     for runner in runners:
         runner.warm_up()
     yardstick = []
-    gc.collect()  # In a plugin's process garbage is collected between its turns.
+    gc.collect()
     with without_collector():
         for turn in range(repeats):
             yardstick.append(time_yardstick())
@@ -81,17 +80,12 @@ class _Runner:
     """One formulation in one cell, with its record so far."""
 
     def __init__(self, subject: Subject, cell: Cell, seed: int) -> None:
-        self.subject, self.cell, self.seed = subject, cell, seed
-        self.posed, self.record = pose(cell, subject, seed), RunRecord()
+        self.subject, self.posed, self.record = subject, pose(cell, subject, seed), RunRecord()
 
     def warm_up(self) -> None:
         """Solve once without the clock, and record outcome, errors and counts."""
         try:
-            timed = solve_there(self.subject, self.cell, self.seed)
-            if timed is None:
-                timed, tries = solve_with_clock(self.subject, self.posed)
-            else:
-                tries = self._solve_by_questions()
+            timed, tries = solve_with_clock(self.subject, self.posed)
             formulation = self.subject.for_case(self.posed.first_guess)
             solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
             solved = is_solved(solution)
@@ -109,17 +103,10 @@ class _Runner:
         if self.record.outcome == Outcome.CRASHED:
             return
         try:
-            timed = solve_there(self.subject, self.cell, self.seed) or solve_with_clock(self.subject, self.posed)[0]
+            timed, _ = solve_with_clock(self.subject, self.posed)
         except ContractError as error:  # A plugin with a memory may fail later.
             self.record = RunRecord(remark=str(error))
             return
         for part, seconds in timed.seconds.items():
             self.record.seconds[part].append(seconds)
         self.record.wall.append(timed.wall)
-
-    def _solve_by_questions(self) -> tuple[Trace, ...]:
-        """Solve here, with a formulation in another process."""
-        with np.errstate(all="ignore"):
-            return solve_in_tries(
-                self.posed.scene, self.subject.for_case(self.posed.first_guess), self.posed.start, self.posed.step
-            )
