@@ -62,20 +62,19 @@ ROOMS = {
     "kernel_store": Room((), ("numba",)),
     "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
     "oracle": Room(("contract",), ("numpy",), QUIET),
-    "foreign_files": Room(("contract",), ("numpy", "msgspec", "psutil")),
-    "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
-    "meshes": Room(("contract", "foreign_files"), ("numpy", "meshio", "msgspec")),
-    "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
-    "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     # `run` holds the program of a plugin's process, which calls the worker here.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil")),
+    "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
+    "meshes": Room(("contract", "isolation"), ("numpy", "meshio", "msgspec")),
+    "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
+    "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "run": Room(
         ("contract", "problems", "strategies", "isolation"),
         ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec"),
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
-        (*BELOW_RUN, "foreign_files", "geometry", "isolation", "run", *REPORTS),
+        (*BELOW_RUN, "geometry", "isolation", "run", *REPORTS),
         ("numpy", "scipy", "hypothesis", "msgspec"),
     ),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
@@ -99,7 +98,7 @@ ROOMS = {
     "reports": Room(("contract",), ("numpy",)),
     "reports.bench": Room(("contract", "reports"), ("numpy",)),
     "reports.netcdf": Room(
-        ("contract", "foreign_files", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")
+        ("contract", "isolation", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")
     ),
     "reports.draw": Room(
         ("contract", "reports", "reports.stability", "reports.bench"), ("numpy", "matplotlib", "meshio")

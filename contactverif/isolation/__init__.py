@@ -1,5 +1,5 @@
-"""A plugin in a process of its own: the judge sends arrays and gets arrays, and nothing else goes either way.
+"""Child processes for what strangers wrote: plugins, which are asked by messages, and files, which are read there.
 
-`remote` is what the judge calls. It asks a `process`, whose other end is `worker`. Both speak the `messages`, which go
-through a `channel`. `hosts` keeps the processes of a run and ends them.
+`child` starts, limits and ends a process and has a `channel` to it. On it stand `process`, the process of a plugin as
+the judge sees it, whose other end is `worker` or any program that speaks the protocol, and `file_reader`.
 """

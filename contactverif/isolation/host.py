@@ -77,7 +77,7 @@ class Host:
             store.clear()
         question = self._put("import", Load(self._next_number(), self._name))
         self.flush()
-        return raise_failure(question.answer, loading=True)
+        return raise_failure(question.result, loading=True)
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
@@ -197,25 +197,27 @@ def _exchange(process: PluginProcess, requests: list[Request], questions: list[Q
 
 def answer_of(question: Question) -> Answer:
     """Return the answer to a question, or raise the ContractError that came instead of it."""
-    answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.answer)
+    answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.result)
     if not isinstance(answer, Answer):
         raise PluginError(f"{question.verb}: a {type(answer).__name__} where an answer was needed", "channel")
     return answer
 
 
-def raise_failure(reply: Reply | PluginError | None, *, loading: bool = False) -> Reply:
+def raise_failure(reply: Reply | PluginError, *, loading: bool = False) -> Reply:
     """Return a reply, or raise the error that it tells of. Only while it loads may a plugin blame the user."""
-    assert reply is not None
     if isinstance(reply, PluginError):
         raise PluginError(str(reply), reply.cause, ended=reply.ended)
     if not isinstance(reply, Failure):
         return reply
     words = [one_line(text) for text in reply.words[:3]] or ["no words"]
-    if reply.kind == "misuse" and loading and len(words) == 3:
-        raise MisuseError(*words)
-    if reply.kind == "plugin":
-        raise PluginError(words[0], reply.cause if reply.cause in ("memory", "exit") else "exception")
-    raise (NonFiniteError if reply.kind == "not finite" else ContractError)(words[0])
+    match reply.kind:
+        case "misuse" if loading and len(words) == 3:
+            raise MisuseError(*words)
+        case "plugin":
+            raise PluginError(words[0], reply.cause if reply.cause in ("memory", "exit") else "exception")
+        case "not finite":
+            raise NonFiniteError(words[0])
+    raise ContractError(words[0])
 
 
 _HOSTS: dict[tuple[tuple[str, ...], str, Limits, bool], Host] = {}

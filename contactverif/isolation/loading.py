@@ -58,7 +58,7 @@ def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> It
         try:
             process = process or PluginProcess(command, limits)
             process.ask(encode([Load(0, name, survey=True)]), [question])
-            yield _read_reply(command, name, limits, raise_failure(question.answer, loading=True))
+            yield _read_reply(command, name, limits, raise_failure(question.result, loading=True))
         except ContractError as error:
             process = None if isinstance(error, PluginError) and error.ended else process
             yield _not_loaded(name, error)

@@ -56,6 +56,12 @@ class Question:
         self.number, self.verb = number, verb
         self.answer: Reply | PluginError | None = None
 
+    @property
+    def result(self) -> Reply | PluginError:
+        """Return the answer, which must be there."""
+        assert self.answer is not None
+        return self.answer
+
 
 class PluginProcess:
     """A process that may hold one plugin: any program that speaks the protocol.
@@ -96,11 +102,7 @@ class PluginProcess:
             self._child.channel.send(frame, seconds=self._limits.start_seconds)
             if not questions:
                 return
-            replies = decode_replies(self._receive(questions))
-            if len(replies) != len(questions):
-                raise MessageError(f"{len(replies)} answers to {len(questions)} questions")
-            if any(reply.question != question.number for reply, question in zip(replies, questions, strict=True)):
-                raise MessageError("an answer to another question")
+            replies = _read_replies(self._receive(questions), questions)
         except TooLateError:
             raise self._end_with(f"{self._last_verb(questions)}: its process does not listen", "hang") from None
         except ClosedError:
@@ -159,6 +161,16 @@ class PluginProcess:
         self._child.end()
         self.output.wait()
         self._progress.close()
+
+
+def _read_replies(data: bytes, questions: Sequence[Question]) -> list[Reply]:
+    """Return one reply to each question, in their order."""
+    replies = decode_replies(data)
+    if len(replies) != len(questions):
+        raise MessageError(f"{len(replies)} answers to {len(questions)} questions")
+    if [reply.question for reply in replies] != [question.number for question in questions]:
+        raise MessageError("an answer to another question")
+    return replies
 
 
 class Output:

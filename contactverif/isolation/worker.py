@@ -17,7 +17,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from scipy import sparse
 
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import describe_error
@@ -146,12 +145,13 @@ class Desk:
         for _ in range(2):
             watch.seconds = watch.processor_seconds = 0.0
             if ask.method == "pair":
-                answer = self._store[ask.question] = formulation.own_pairing(interface, arguments[2])
+                answer: Any = formulation.own_pairing(interface, arguments[2])
+                self._store[ask.question] = answer
             else:
                 answer = getattr(formulation, ask.method)(*arguments)
             if not ask.warm or watch.seconds > _SHORT:
                 break
-        handle = isinstance(answer, Pairing) and answer.opaque
+        handle = ask.method == "pair" and answer.opaque
         return Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.processor_seconds, handle=handle)
 
 
@@ -184,24 +184,28 @@ class Stopwatch:
 
 def _pack(method: str, answer: Any) -> dict[str, PackedArray]:
     """Return the arrays of an answer by name."""
-    arrays: dict[str, np.ndarray[Any, Any]]
-    match answer:
-        case Pairing():
-            arrays = dict(answer)
-        case ContactPoints():
-            arrays = {entry.name: getattr(answer, entry.name) for entry in fields(ContactPoints)}
-        case (residual, tangent):
-            return _pack("residual", residual) | _pack("tangent", tangent)
-        case np.ndarray():
-            arrays = {"residual" if method == "residual" else "dense": answer}
-        case sparse.coo_array():
-            arrays = {name: getattr(answer, name) for name in ("row", "col", "data")}
-        case _:
-            arrays = {f"{answer.format} {name}": getattr(answer, name) for name in COMPRESSED}
     try:
-        return {name: PackedArray.pack(array) for name, array in arrays.items()}
+        return {name: PackedArray.pack(array) for name, array in _ARRAYS[method](answer).items()}
     except ValueError as error:
         raise ContractError(f"{method}: returned {error}") from None
+
+
+def _tangent_arrays(tangent: Any) -> dict[str, Any]:
+    if isinstance(tangent, np.ndarray):
+        return {"dense": tangent}
+    if tangent.format == "coo":
+        return {name: getattr(tangent, name) for name in ("row", "col", "data")}
+    return {f"{tangent.format} {name}": getattr(tangent, name) for name in COMPRESSED}
+
+
+_POINTS = [entry.name for entry in fields(ContactPoints)]
+_ARRAYS: dict[str, Callable[[Any], dict[str, Any]]] = {
+    "pair": dict,
+    "residual": lambda forces: {"residual": forces},
+    "tangent": _tangent_arrays,
+    "residual_and_tangent": lambda both: {"residual": both[0]} | _tangent_arrays(both[1]),
+    "contact_points": lambda points: {name: getattr(points, name) for name in _POINTS},
+}
 
 
 def _keep_compressed(verb: str, tangent: Any) -> Any:

@@ -24,6 +24,7 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.isolation.remote_formulation import count_ends
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.profiles import Profile, profile_named
@@ -417,11 +418,11 @@ def shrink_case(
     source = sampling.source(question)
     assert source is not None
     smallest: Outcome | None = None
-    calls, ended = 0, subject.n_ended
+    calls, ended = 0, count_ends(subject)
 
     def fails(case: Case) -> bool:
         nonlocal smallest, calls
-        if subject.n_ended - ended >= SHRINK_ENDS:
+        if count_ends(subject) - ended >= SHRINK_ENDS:
             return False
         calls += 1
         if count is not None:

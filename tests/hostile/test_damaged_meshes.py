@@ -13,7 +13,7 @@ import pytest
 from damaged_meshes import FORMATS, KINDS, NAMES, strange_files, write_meshes
 
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.child import Limits
+from contactverif.isolation.limits import Limits
 from contactverif.meshes import plain_mesh
 from contactverif.meshes.mesh_file import read_interface
 from contactverif.meshes.plain_mesh import read_mesh

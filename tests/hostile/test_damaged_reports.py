@@ -15,7 +15,7 @@ from damaged_reports import TREES, Campaign, lie_about_sizes, write_report, writ
 
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.child import Limits
+from contactverif.isolation.limits import Limits
 from contactverif.problems.catalogue import load_scene
 from contactverif_reports.netcdf import bench_file, stored_groups
 from contactverif_reports.netcdf.bench_file import read_bench

@@ -74,6 +74,7 @@ def test_an_error_waits_for_the_question_that_needs_what_is_missing() -> None:
         ("<f8", (2**62, 2**62), bytes(16)),
         ("nonsense", (2,), b""),
         ("<f3", (1,), b"123"),
+        ("<f8", (-1, -2), bytes(16)),
     ],
 )
 def test_an_array_that_lies_is_no_array(packed: tuple[str, tuple[int, ...], bytes]) -> None:

@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.ordinary import check_ordinary
+from contactverif.isolation.ordinary import check_ordinary
 
 MOST_BYTES = 1 << 30  # A million queries have 100 MB.
 _LONGEST = 60  # The number of characters of a line that an error shows.

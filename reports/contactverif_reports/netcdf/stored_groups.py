@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files.child import ReadError, limits_for, read_in_child
-from contactverif.foreign_files.ordinary import check_ordinary
-from contactverif.foreign_files.packed import PackedArray
+from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
+from contactverif.isolation.ordinary import check_ordinary
+from contactverif.isolation.packed import PackedArray
 
 # zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from contactverif.contract.errors import MisuseError
-from contactverif.foreign_files import child
-from contactverif.foreign_files.child import Limits, ReadError, read_in_child
-from contactverif.foreign_files.ordinary import check_ordinary
-from contactverif.foreign_files.packed import PackedArray
+from contactverif.isolation import child
+from contactverif.isolation.file_reader import ReadError, read_in_child
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.ordinary import check_ordinary
 
 HERE = Path(__file__).parent
 
@@ -50,21 +50,6 @@ def test_a_child_that_ends_badly_is_one_line(reader: str, words: str) -> None:
     assert "\n" not in str(caught.value)
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)  # No child is left behind.
-
-
-@pytest.mark.parametrize(
-    "packed",
-    [
-        PackedArray("<f8", (3,), memoryview(bytes(16))),
-        PackedArray("<f8", (2**62, 2**62), memoryview(bytes(16))),
-        PackedArray("<f8", (-1, -2), memoryview(bytes(16))),
-        PackedArray("|O", (2,), memoryview(bytes(16))),
-        PackedArray("nonsense", (2,), memoryview(bytes(16))),
-    ],
-)
-def test_an_array_that_does_not_fit_its_bytes_is_refused(packed: PackedArray) -> None:
-    with pytest.raises((ValueError, TypeError)):
-        packed.unpack()
 
 
 def test_only_an_ordinary_file_is_opened(tmp_path: Path) -> None:

@@ -17,27 +17,7 @@ _KINDS = {
 
 
 def check_ordinary(path: str | os.PathLike[str], argument: str, needed: str) -> os.stat_result:
-    """Check that there is an ordinary file that may be read.
-
-    Parameters
-    ----------
-    path : str | os.PathLike[str]
-        The file.
-    argument : str
-        The argument of the command line that named it.
-    needed : str
-        The file that is needed, in words.
-
-    Returns
-    -------
-    os.stat_result
-        What the operating system says of it, such as its size.
-
-    Raises
-    ------
-    MisuseError
-        If it is no such file.
-    """
+    """Check that there is an ordinary file that may be read."""
     name = os.fspath(path)
     try:
         status = os.stat(path)

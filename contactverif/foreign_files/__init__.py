@@ -1,1 +1,0 @@
-"""Files that others wrote: what they may be, and how they are read so that a damaged one harms nobody."""
