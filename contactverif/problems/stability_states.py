@@ -18,6 +18,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
@@ -45,6 +46,7 @@ _PRESSURE = 2.0**-10  # The pressure on the solved blocks, whose modulus E is 1.
 
 
 @cache
+@random_source("contactverif_properties.stability_sweep.sweep_cases")
 def stability_states() -> tuple[Case, ...]:
     """Return the states of an interface alone, with names (``"gap-1e-9-a"``), whose kind is one of `SWEEPS`.
 
@@ -55,6 +57,7 @@ def stability_states() -> tuple[Case, ...]:
 
 
 @cache
+@random_source("contactverif_properties.stability_stiffness.stiffness_cases")
 def stability_scenes() -> tuple[Case, ...]:
     """Return two blocks at penalties from soft springs to far beyond what doubles can carry."""
     slave_x, master_x = _places(np.random.default_rng(3), _MOST_BITS, 1.0)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
 import re
-import textwrap
 from collections.abc import Iterable, Sequence
 
 
@@ -21,19 +19,6 @@ def sentence(text: str) -> str:
         return ""
     first = text[0].upper() if re.match(r"[a-z]{2}|a ", text) else text[0]
     return first + text[1:] + ("" if text[-1] in ".!?…" else ".")
-
-
-def docstring_parts(thing: object) -> dict[str, str]:
-    """Return {title of a numpydoc section: its text} of a docstring; what stands first has the title "".
-
-    Text is dedented, so that it can stand in a page as it is.
-    """
-    text = inspect.getdoc(thing) or ""
-    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", text, flags=re.MULTILINE)
-    parts = {"": pieces[0].strip()}
-    for title, body in zip(pieces[1::2], pieces[2::2], strict=True):
-        parts[title] = textwrap.dedent(body).strip()
-    return parts
 
 
 def plain(text: str) -> str:

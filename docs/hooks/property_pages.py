@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Iterable
 from dataclasses import fields
-from functools import partial
-from importlib import import_module
-from importlib.metadata import entry_points
 from itertools import combinations
 from pathlib import Path
 
-from page_text import docstring_parts, plain, sentence, table
+from page_text import plain, sentence, table
 
 from contactverif import Property, Quantity, Traits
 
@@ -63,8 +59,6 @@ def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
 
 def property_page(question: Property) -> str:
     """Return the page of one property."""
-    measure = question.measure.func if isinstance(question.measure, partial) else question.measure
-    parts = {"": ""} if question.question else docstring_parts(measure)
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     facts = [
@@ -83,7 +77,6 @@ def property_page(question: Property) -> str:
     if question.series:
         names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
         text.append(f"The report also keeps, for each iterate: {names}.\n")
-    text += _method(parts)
     text += [
         "## See also\n",
         "- [Where tolerances come from](../../concepts/tolerances.md), with all symbols\n"
@@ -95,12 +88,8 @@ def property_page(question: Property) -> str:
 
 def _answers(question: Property) -> list[str]:
     """Return the paragraphs about question, reason, judgement and undecided cases."""
-    entry, *_ = entry_points(group="contactverif.properties", name=question.id)
-    text = question.question or inspect.getdoc(import_module(entry.module)) or ""
-    if "**Question.**" not in text:
-        return []
     answers = []
-    for paragraph in text.split("\n\n")[1:]:
+    for paragraph in question.question.split("\n\n")[1:]:
         title, body = re.fullmatch(r"(?:\*\*([^*]+)\.\*\* )?(.*)", paragraph, re.DOTALL).groups()  # type: ignore[union-attr]
         answers.append((f"**{title}.** " if title else "") + plain(body) + "\n")
     return answers
@@ -136,25 +125,6 @@ def _clauses(reason: str) -> list[str]:
 
 def _unit(unit: str) -> str:
     return "ratio" if unit == "1" else unit
-
-
-def _method(parts: dict[str, str]) -> list[str]:
-    text = []
-    if parts[""]:
-        text += ["## How it is measured\n", plain(parts[""]) + "\n"]
-    if "Returns" in parts:
-        text += [_describe_result(parts["Returns"]) + "\n"]
-    for title in ("Notes", "References"):
-        if title in parts:
-            text += [f"## {title}\n", plain(parts[title]) + "\n"]
-    return text
-
-
-def _describe_result(section: str) -> str:
-    """Return what a Returns section says, without its line that names the type."""
-    lines = section.splitlines()
-    body = [line.strip() for line in lines if line.startswith(" ")] or lines
-    return sentence(plain("\n".join(body)))
 
 
 def property_index(properties: list[Property], root: Path) -> str:

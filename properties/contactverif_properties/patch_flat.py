@@ -23,8 +23,8 @@ from contactverif.oracle import nodal_spring_weights
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
 from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.patch_errors import point_errors
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
+from contactverif_properties.shared.solved_patch import point_errors
 from contactverif_properties.shared.uniform_pressure import (
     consistent_forces,
     forces_of_multiplier,

@@ -23,8 +23,7 @@ from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif.strategies.solids import dead_zone_cases
 from contactverif_properties.patch_solved import patch_dead_zone, patch_flat_solve, patch_variants
-from contactverif_properties.shared.patch_errors import gap_error
-from contactverif_properties.shared.solved_patch import measure_once
+from contactverif_properties.shared.solved_patch import gap_error, measure_once
 from contactverif_properties.shared.uniform_pressure import consistent_forces
 
 RIGHT = ("sts", "mortar", "mortar-dual", "mortar-lm", "mortar-dual-lm", "vts-ppt-balanced", "vts-ppt:free_end=cover")

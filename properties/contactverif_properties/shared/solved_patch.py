@@ -2,9 +2,6 @@
 
 The patch test asks about the residual alone, so Newton's method differentiates the residual by itself, and the
 formulation's own tangent plays no part. The question is whether the exact solution is a solution of the formulation.
-
-Rule for the next editor: exact stress and tolerances come from `contactverif.problems.uniform_stress`, the errors
-from `patch_errors`; this file solves, and puts numbers and tolerances together.
 """
 
 from __future__ import annotations
@@ -13,15 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.interface import Surface
 from contactverif.contract.property import Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
-from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.problems.uniform_stress import (
     PRESSURE_TOLERANCE,
     STRESS_TOLERANCE,
@@ -29,8 +27,13 @@ from contactverif.problems.uniform_stress import (
     uniform_tolerances,
 )
 from contactverif_properties.shared.newton_solution import end_details
-from contactverif_properties.shared.patch_errors import force_errors, gap_error, point_errors
-from contactverif_properties.shared.uniform_pressure import consistent_forces, exact_multipliers, nearest_multipliers
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.shared.uniform_pressure import (
+    consistent_forces,
+    exact_multipliers,
+    nearest_multipliers,
+    normal_of,
+)
 
 ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
 SAME_SOLUTION = 2.0**-10  # A solution this close to the exact one, over the penetration, counts as the same one.
@@ -217,3 +220,88 @@ def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> tu
 def forces_to_draw(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) at the penalty of the case, for pictures."""
     return consistent_forces(case, pressure_of(case, case.penalty))
+
+
+def force_errors(case: Case, scene: Scene, forces: FloatArray, q: FloatArray, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a nodal force on the slave and on the master, over p L.
+
+    Forces are judged twice: those that the bodies need to be in balance with the unknowns q (n_free,), and those that
+    the formulation gives (n_unknowns + n_multipliers,). They differ where the formulation found no balance, and at
+    rollers, which take what the bodies do not need.
+    """
+    by_bodies = scene.nodal_forces(q)
+    by_contact = -forces[: case.interface.n_unknowns].reshape(-1, 2)
+    first = 0
+    for index in scene.bodies_in_reach:
+        last = first + len(scene.bodies[index].contact_nodes)
+        if scene.bodies[index].rigid:
+            by_bodies[first:last] = by_contact[first:last]
+        first = last
+    exact = consistent_forces(case, pressure)
+    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
+    errors /= pressure * case.slave_length
+    n_slave = case.interface.n_slave_nodes
+    return float(errors[:n_slave].max()), float(errors[n_slave:].max())
+
+
+def gap_error(case: Case, penetration: float, size: float) -> float:
+    """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
+
+    A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
+    """
+    heights = case.positions @ normal_of(case)
+    n_slave = case.interface.n_slave_nodes
+    slave, master = np.split(case.parameters["along"], [n_slave])
+    order = np.argsort(slave)
+    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
+    level = heights[n_slave:].mean()
+    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
+    return float(errors.max() / size)
+
+
+def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a reported gap over p/ε̂, and of a reported pressure over p.
+
+    Idle points do not count if they have no weight, no master segment, or lie beside the master. The error of the
+    pressure is infinite if no point counts.
+    """
+    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(case, points)
+    counted = (points.weight != 0) & in_contact
+    gaps = np.where(counted, points.gap, -pressure / penalty)  # A gap is NaN where it is meaningless.
+    gap = float(np.nanmax(np.abs(gaps * penalty / pressure + 1), initial=0.0))
+    pressures = np.where(points.active, points.pressure, 0.0)[counted]
+    if not len(pressures):
+        return gap, np.inf
+    return gap, float(np.abs(pressures - pressure).max(initial=0.0) / pressure)
+
+
+def beside_master(case: Case, points: ContactPoints) -> BoolArray:
+    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end.
+
+    A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no
+    point of the slave does. A point of a second pass lies on the master, and the other surface is the slave.
+    """
+    beside = np.zeros(len(points.c), bool)
+    covered = not overhangs(case)
+    rounding = COORDINATE_ROUNDING * case.largest_coordinate
+    interface, along = case.interface, case.parameters["along"]
+    for surface, other, second in (
+        (interface.slave, interface.master, False),
+        (interface.master, interface.slave, True),
+    ):
+        here = (points.on_master == second) & (points.slave_segment >= 0)
+        if here.any() and (second or not covered):
+            ends, c = along[surface.segments[points.slave_segment[here]]], points.c[here]
+            place = (1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1]
+            beside[here] = ~_faces(place, other, along, rounding)
+    return beside
+
+
+def _faces(place: FloatArray, surface: Surface, along: FloatArray, rounding: float) -> BoolArray:
+    """Return which places (n,) along the interface a surface covers, up to `rounding` from its free ends."""
+    ends = along[surface.segments]  # (n_segments, 2)
+    inwards = np.sign(ends[:, ::-1] - ends)
+    ends = ends + np.where(surface.neighbours < 0, rounding, -rounding) * inwards
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    covered: BoolArray = ((place[:, None] >= low) & (place[:, None] <= high)).any(axis=1)
+    return covered
