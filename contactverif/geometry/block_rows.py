@@ -1,19 +1,12 @@
 """A sparse tangent made of small dense blocks, written straight into compressed rows (CSR) by compiled loops.
 
-A kernel makes a tangent in three steps:
-
-1. It lists the `Couplings` of the interface: which nodes feel which nodes. No real number is needed for that.
-2. `zero_matrix` makes the pattern, the union of all couplings, with zeros as entries.
-3. For each coupling and pair of nodes the kernel calls `add_block`; for a multiplier `add_row`, `add_column` and
-   `add_entry`. They find the place by bisection and add to it. Nothing is allocated, nothing is sorted afterwards.
+A kernel lists the `Couplings` of the interface: which nodes feel which, by integers and booleans alone. `zero_matrix`
+makes the pattern, the union of all couplings. For each coupling and pair of nodes the kernel calls `add_block`; for a
+multiplier `add_row`, `add_column` and `add_entry`. They find the place by bisection. Nothing is allocated, nothing is
+sorted afterwards, and the sums have a fixed order.
 
 A node has two unknowns, 2 v and 2 v + 1. A multiplier stands behind the nodes: the number n_nodes + i in a coupling is
 the multiplier i, whose unknown is 2 n_nodes + i.
-
-Rules for the next editor:
-
-1. The pattern depends on integers and booleans alone. An entry may be zero at one state, and still be there.
-2. Columns are ascending in each row, no place occurs twice, and the sums have a fixed order.
 """
 
 from __future__ import annotations

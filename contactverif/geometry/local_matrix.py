@@ -1,16 +1,9 @@
 """A small dense matrix of the nodes of one coupling, added to compressed rows as a whole.
 
-A kernel that lists a `Couplings` fills for each coupling a dense matrix `local` over its unknowns, in the order of its
-nodes: node q of the coupling has the rows and columns 2 q and 2 q + 1, a multiplier behind the nodes has the last one.
-`add_local_matrix` then adds it to the matrix that `zero_matrix` made of these couplings.
-
-Nodes of a coupling are ascending. Where their numbers follow each other, so do their columns in each row. So the place
-in a row is looked for once for each run of numbers, and not for each block.
-
-Rules for the next editor:
-
-1. The kernel that calls makes the work arrays, once. Nothing is allocated here.
-2. Only rows whose node has the owner `part` are written: threads share a matrix, and no row.
+A kernel fills for each coupling a dense matrix `local`: node q of the coupling has the rows and columns 2 q and 2 q +
+1, a multiplier behind the nodes has the last one. Where numbers of nodes, which ascend, follow each other, so do their
+columns in each row. So a place in a row is looked for once for each run of numbers. Only rows whose node has the owner
+`part` are written: threads share a matrix, and no row.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Work on parts of a range in threads, with the same bits as in one.
 
-Compiled kernels release Python's lock (`compiled.compile_kernel`). A kernel that takes a range writes only what belongs
-to that range. So parts may run side by side, and each number is computed by one thread in the order of the whole loop.
-
-Plain threads are used, not numba's `prange`: no kernel is compiled a second time, a process may be forked, two Python
-threads may call at once, and NUMBA_NUM_THREADS sets no limit. Nothing is kept between calls.
+A kernel that takes a range writes only what belongs to it, each number in the order of the whole loop. Plain threads
+are used, not numba's `prange`: no kernel is compiled a second time, a process may be forked, two Python threads may
+call at once, and NUMBA_NUM_THREADS sets no limit. Nothing is kept between calls.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A scene: elastic bodies around an interface, and how a `Case` stores it.
+"""A scene: elastic bodies around an interface.
 
 Symbols: q are the unknowns of a scene, the free components of the nodes on the contact boundaries; S is the stiffness
 and g the load of the bodies, condensed onto q; z are the positions of the interface's nodes.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -32,6 +32,7 @@ from contactverif.mechanics.bulk import (
     free_on_contact,
     loose_modes,
 )
+from contactverif.mechanics.packed_bodies import body_name, pack_bodies, unpack_bodies
 
 _BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodies.
 
@@ -308,11 +309,10 @@ class Scene:
         Case
             The case holds the whole scene; `scene_of` gives it back.
         """
-        arrays = {_BODIES + name: values for name, values in _pack(self).items()}
+        arrays = {_BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
         z = self.positions(self.start)
         case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
-        is_slave = np.array([index in self.slave for index in range(len(self.bodies))], dtype=np.float64)
-        if all(body.name == _body_name(is_slave, index) for index, body in enumerate(self.bodies)):
+        if all(body.name == body_name(arrays[_BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
             _ORIGINS.remember(case, self)
         return case
 
@@ -358,7 +358,7 @@ _ORIGINS = _Origins()
 
 
 def forget_bodies() -> None:
-    """Let go of all scenes and condensed bodies, for whoever times how long they take."""
+    """Let go of all scenes and condensed bodies, before the time that they take is measured."""
     _ORIGINS.forget()
     forget_condensed()
 
@@ -377,7 +377,7 @@ def scene_of(case: Case) -> Scene:
         name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
     }
     facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
-    bodies, slave, master = _unpack(packed)
+    bodies, slave, master = unpack_bodies(packed)
     scene = Scene(bodies, slave, master, case.penalty, facts, case.name)
     _ORIGINS.remember(case, scene)
     return scene
@@ -403,70 +403,3 @@ def _solve_alone(condensed: CondensedBody, factor: float) -> FloatArray:
         raise MisuseError(f"supports of {condensed.body.name}", actual, "supports against every motion")
     alone: FloatArray = modes @ (modes.T @ (factor * condensed.load) / stiffnesses)
     return alone
-
-
-def _pack(scene: Scene) -> dict[str, FloatArray]:
-    """Return all bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
-    bodies = scene.bodies
-    counts = [len(body.nodes) for body in bodies]
-    first = np.cumsum([0, *counts[:-1]]).tolist()
-    contact = [body.contact + start for body, start in zip(bodies, first, strict=True)]
-    stacks = {name: np.vstack([getattr(body, name) for body in bodies]) for name in ("nodes", "imposed", "load")}
-    rows = {name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")}
-    return {
-        "nodes": stacks["nodes"],
-        "cells": _pack_cells(bodies, first),
-        "contact": np.vstack(contact).astype(np.float64),
-        "fixed": np.vstack([body.fixed for body in bodies]).astype(np.float64),
-        "imposed": stacks["imposed"],
-        "load": stacks["load"],
-        "count": np.array(counts, dtype=np.float64),
-        "is_slave": np.array([index in scene.slave for index in range(len(bodies))], dtype=np.float64),
-        **rows,
-    }
-
-
-def _pack_cells(bodies: Sequence[Body], first: Sequence[int]) -> FloatArray:
-    """Return the cells of all bodies (n_cells, 4), each body's nodes numbered from its first."""
-    cells = np.full((sum(len(body.cells) for body in bodies), 4), -1.0)
-    row = 0
-    for body, start in zip(bodies, first, strict=True):
-        n_cells, n_corners = body.cells.shape
-        cells[row : row + n_cells, :n_corners] = body.cells + start
-        row += n_cells
-    return cells
-
-
-def _unpack(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], tuple[int, ...], tuple[int, ...]]:
-    """Return bodies, slave indices and master indices from the arrays that `_pack` made."""
-    count = packed["count"].astype(np.int64)
-    ends = np.cumsum(count).tolist()
-    cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
-    bodies = []
-    for index, (start, end) in enumerate(zip([0, *ends], ends, strict=False)):
-        corners = cells[(cells[:, 0] >= start) & (cells[:, 0] < end)] if len(cells) else cells.reshape(0, 4)
-        corners = corners[:, :3] if len(corners) and (corners[:, 3] < 0).all() else corners
-        bodies.append(
-            Body(
-                nodes=packed["nodes"][start:end],
-                cells=corners - start,
-                contact=contact[(contact[:, 0] >= start) & (contact[:, 0] < end)] - start,
-                young=float(packed["young"][index]),
-                poisson=float(packed["poisson"][index]),
-                fixed=packed["fixed"][start:end] != 0,
-                imposed=packed["imposed"][start:end],
-                load=packed["load"][start:end],
-                axis=packed["axis"][index],
-                start=packed["start"][index],
-                name=_body_name(packed["is_slave"], index),
-            )
-        )
-    slave = np.flatnonzero(packed["is_slave"] != 0)
-    master = np.flatnonzero(packed["is_slave"] == 0)
-    return tuple(bodies), tuple(slave.tolist()), tuple(master.tolist())
-
-
-def _body_name(is_slave: FloatArray, index: int) -> str:
-    same = np.flatnonzero(is_slave == is_slave[index])
-    side = "slave" if is_slave[index] else "master"
-    return side if len(same) == 1 else f"{side} {int(np.searchsorted(same, index)) + 1}"

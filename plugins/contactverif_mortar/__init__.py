@@ -1,15 +1,13 @@
 """Segment-to-segment and mortar contact on exactly cut cells, with exact tangents. Frictionless, two-dimensional.
 
-`cell_search` finds which pairs of segments make a cell. `cell_geometry` computes a point of a cell and its Δ,
-`integration_cells` the points of all cells. `cell_forces` turns pressures at points into forces. A method is a rule for
+`cell_search` finds which pairs of segments make a cell, `integration_cells` has their points. A method is a rule for
 the pressures: at the points themselves (`segment_to_segment`), at slave nodes from node gaps (`chen_hisada_method`), or
-at slave nodes from weighted gaps (`mortar_methods`, with `weighted_gaps` and `pressure_shapes`). `two_half_passes`
-weighs gaps on both surfaces, at points of `covered_ranges`, and hands no force from one body to the other.
+at slave nodes from weighted gaps (`mortar_methods`); `two_half_passes` weighs gaps on both surfaces and hands no force
+from one body to the other.
 
-Tangents are written straight into compressed rows. `cell_frame` has the Δ of points of slaves that look along their own
-normal: `cell_tangent` makes the tangent of springs at points of it, and `node_rows` that of all mortar methods. For
-averaged normals and half passes `shape_rows` does so with the Δ of `cell_geometry`. Tests hold all of them against
-triplets and sparse products (`tests/plugins/readable_mortar.py`).
+There are two writers of tangents. `cell_tangent` and `node_rows` add up twelve numbers a row in the frame of a slave
+that looks along its own normal (`cell_frame`). `shape_rows` takes any directions and half passes, in the global frame,
+at 0.64 of that speed. Tests hold both against sparse products (`tests/plugins/readable_mortar.py`).
 """
 
 from contactverif_mortar.chen_hisada_method import chen_hisada

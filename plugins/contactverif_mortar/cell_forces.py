@@ -4,8 +4,7 @@ With F = w p, w the weight (a length) of a point, p its pressure and n out of th
 
     R_A = (1−c)/2 F n    R_B = (1+c)/2 F n    R_1 = −(1−ξ) F n    R_2 = −ξ F n
 
-What must stay true: forces and moments balance point by point, whatever the pressures are. They do because x_m − x_s
-is along n. `cell_tangent`, `node_rows` and `shape_rows` compute the same forces of one state with their tangent.
+Forces and moments balance point by point, whatever the pressures are, because x_m − x_s is along n.
 """
 
 from __future__ import annotations

@@ -1,14 +1,10 @@
 """The cells of a pairing, and the quadrature points on them with their Δ.
 
 `Cells` are decisions: they come from `cell_search` and are stored in a pairing. `Quadrature` puts points on them and
-computes every real number from the positions. `cell_forces` turns pressures at the points into nodal forces.
+computes every real number from the positions: `points` of many states, real or complex, `gains` of one real state.
 
-Rules for the next editor:
-
-1. `Quadrature.points` takes float64 and complex128, for many states; `Quadrature.gains` takes one real state.
-2. A kernel gets the fields of `Segments`, `CellArrays` and `Rule` as plain tuples and unpacks them in its first lines.
-   numba reads a plain tuple in half the time of a named one, and an array that is read through a tuple inside a loop
-   costs two atomic operations each time. Named tuples of numbers, such as `SlaveView`, are free.
+A kernel gets the fields of a named tuple of arrays as a plain tuple and unpacks them first: numba reads that in half
+the time, and an array that is read through a tuple inside a loop costs two atomic operations each time.
 """
 
 from __future__ import annotations

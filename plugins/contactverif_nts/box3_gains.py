@@ -1,15 +1,10 @@
 """Appendix A of the paper: what the numbers of a virtual slave node gain when nodes are displaced.
 
 Displacements have their components along n and t of the master segment of the virtual slave node: Δω, Δg and many more
-are zero along t. So a Δ is one number, for one node and one direction (`Gain`).
+are zero along t. So a Δ is one number, for one node and one direction (`Gain`). What is frozen in the pairing has no Δ.
 
 Ends of areas that master nodes cut are moved by further nodes. By the chain rule a force F then gains ∂F/∂c Δc, too,
 and ∂F/∂c is the gain of one more direction: c grows, and no node moves.
-
-Rules for the next editor:
-
-1. What is frozen in the pairing has no Δ.
-2. All here are named tuples of numbers and functions of them. No array is read but positions.
 
 Source: Zavarise & De Lorenzis (2009), Eqs. 8–11, A1–A28.
 """

@@ -1,13 +1,8 @@
 """The exact tangent of Eq. 6: the derivative of `eq6.residual` for one point against one master segment.
 
 A Δ of a number belongs to one node at a time, a column of the tangent: it is the vector of what the number gains for a
-displacement of that node along x and along y.
-
-Rules for the next editor:
-
-1. `list_couplings` says which nodes feel which. `add_tangent` writes no other block.
-2. A kernel gets the fields of `Surfaces`, `Points` and `Options` as plain tuples, for a reason that `eq6` gives.
-3. Nothing is allocated for a point: vectors and named tuples of numbers are free, arrays are not.
+displacement of that node along x and along y. Nothing is allocated for a point, and `add_tangent` writes no block that
+`list_couplings` does not list.
 
 Source: Zavarise & De Lorenzis (2009), Eqs. A1–A12.
 """
