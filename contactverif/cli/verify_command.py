@@ -154,6 +154,8 @@ def _show_results(
     from contactverif.cli.run_tables import RunTable, summary
 
     show(RunTable(result))
+    if remark := result.provenance.get("drawing"):
+        show(f"{remark}.")
     _show_counterexamples(result, subjects, questions, files, folder)
     show_what_plugins_printed()
     files.announce()

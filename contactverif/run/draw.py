@@ -101,6 +101,12 @@ def draw_cases(
     return PlannedCases(tuple(cases), block.exhausted)
 
 
+def why_the_engine_draws() -> str:
+    """Return why hypothesis' engine draws all cases, or an empty string: usually it draws those of few strategies."""
+    difference = find_difference()
+    return f"{difference}, so its engine drew all cases" if difference else ""
+
+
 def number_of_blocks(examples: int) -> int:
     """Return the number of blocks of so many examples, at least one."""
     return max(1, -(-examples // BLOCK))

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
@@ -114,22 +115,18 @@ def run(
     _check_known(known, properties)
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
-    place = interface if scene is None else scene.interface
-    jobs = RunJobs(
-        _of_kind(Subject, subjects),
-        _of_kind(Property, properties),
-        Sampling(resolved.examples, resolved.seed, place, scene),
-        journal or Journal(),
-        Scheduler(executor, progress),
-        known,
-    )
-    facts = partial(collect_provenance, profile=resolved.name, examples=resolved.examples, seed=resolved.seed)
+    scheduler, journal = Scheduler(executor, progress), journal or Journal()
+    loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
+    sampling = Sampling(resolved.examples, resolved.seed, interface if scene is None else scene.interface, scene)
+    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known)
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
-    try:
-        jobs.work()
-    except KeyboardInterrupt:
-        raise RunStopped(jobs.result(not_loaded, facts())) from None
-    return jobs.result(not_loaded, facts())
+    with closing(journal):
+        try:
+            scheduler.work(jobs.first_calls())
+            scheduler.work(jobs)
+        except KeyboardInterrupt:
+            raise RunStopped(jobs.result(not_loaded, resolved.name)) from None
+    return jobs.result(not_loaded, resolved.name)
 
 
 def judge_share(
@@ -142,8 +139,11 @@ def judge_share(
     share: tuple[int, int],
 ) -> None:
     """Judge what the journal of a share (its number from 0, the number of all shares) does not have yet."""
-    jobs = RunJobs(subjects, questions, sampling, journal, Scheduler(None, progress), {}, share)
-    jobs.work()
+    scheduler = Scheduler(None, progress)
+    jobs = RunJobs(subjects, questions, sampling, journal, scheduler.report, {}, share)
+    with closing(journal):
+        scheduler.work(jobs.first_calls())
+        scheduler.work(jobs)
     jobs.check_written()
 
 
@@ -160,29 +160,40 @@ class RunJobs:
         questions: Sequence[Property],
         sampling: Sampling,
         journal: Journal,
-        scheduler: Scheduler,
+        report: Callable[[Progress], None],
         known: Mapping[str, str],
         share: tuple[int, int] | None = None,
     ) -> None:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
-        self._subjects, self._sampling, self._journal, self._scheduler = subjects, sampling, journal, scheduler
+        self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
         self._share = share
         self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
         self._rows = open_rows(subjects, questions, sampling, known)
         self._opposite_signs: set[str] = set()
 
-    def work(self) -> None:
-        """Do all jobs."""
-        try:
-            self._scheduler.work(map(self._first_call, self._subjects))
-            number, count = self._share or (0, 1)
-            self._scheduler.work(chain.from_iterable(islice(self._parts(), number, None, count)))
-        finally:
-            self._journal.close()
+    def first_calls(self) -> Iterator[Job]:
+        """Yield the jobs to call each formulation for the first time."""
+        for subject in self._subjects:
+            before = Progress(subject.name, "", "first call (compiles)", 0, 1)
+            self._report(before)
+            yield Job(judge.call_first, (subject, self._needs & subject.provides), partial(self._note_sign, before))
 
-    def result(self, not_loaded: tuple[NotLoaded, ...], provenance: Mapping[str, str]) -> Run:
+    def _note_sign(self, before: Progress, opposite: bool) -> Iterable[Job]:
+        self._opposite_signs |= {before.formulation} if opposite else set()
+        self._report(replace(before, count=1))
+        return ()
+
+    def __iter__(self) -> Iterator[Job]:
+        number, count = self._share or (0, 1)
+        return chain.from_iterable(islice(self._parts(), number, None, count))
+
+    def result(self, not_loaded: tuple[NotLoaded, ...], profile: str) -> Run:
         """Return the run with all rows as far as they are judged; one that is not complete says so."""
+        sampling = self._sampling
+        provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
+        if reason := draw.why_the_engine_draws():
+            provenance["drawing"] = reason
         for row in self._open_rows:
             if not row.complete:
                 row.stop(self._sampling.examples)
@@ -205,17 +216,6 @@ class RunJobs:
     @property
     def _open_rows(self) -> list[OpenRow]:
         return _of_kind(OpenRow, self._rows)
-
-    def _first_call(self, subject: Subject) -> Job:
-        before = Progress(subject.name, "", "first call (compiles)", 0, 1)
-        self._scheduler.report(before)
-
-        def note_sign(opposite: bool) -> Iterable[Job]:
-            self._opposite_signs |= {subject.name} if opposite else set()
-            self._scheduler.report(replace(before, count=1))
-            return ()
-
-        return Job(judge.call_first, (subject, self._needs & subject.provides), note_sign)
 
     def _parts(self) -> Iterator[Iterable[Job]]:
         """Yield the jobs of each part; those of a part are made when they are wanted."""
@@ -326,7 +326,7 @@ class RunJobs:
             row.add_witness(*judged.outcomes)
         else:
             row.add(first, judged.outcomes)
-            self._scheduler.report(self._judging(row))
+            self._report(self._judging(row))
         return self._finish(row)
 
     def _finish(self, row: OpenRow) -> Iterable[Job]:

@@ -541,3 +541,10 @@ def test_a_stored_case_is_judged_again() -> None:
     assert row.shrunk is not None
     again = judge_case(ZERO, Case.from_arrays(row.shrunk.case.to_arrays()), subject(from_size(5)))
     assert (again.verdict, again.reason, again.measurement) == (Verdict.FAIL, row.shrunk.reason, row.shrunk.measurement)
+
+
+def test_a_run_says_where_the_engine_of_hypothesis_drew_all_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "drawing" not in run([subject()], [ZERO], examples=2, seed=1).provenance
+    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "hypothesis 7 draws otherwise")
+    facts = run([subject()], [ZERO], examples=2, seed=1).provenance
+    assert facts["drawing"] == "hypothesis 7 draws otherwise, so its engine drew all cases"
