@@ -14,7 +14,6 @@ from contactverif.contract.property import Measurement, Property, Quantity, chec
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases
-from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.roundoff import ratio, rounding_distance, segment_tolerance, sum_larger_forces
 
 N_STEPS = 12  # The steps of the way that are looked at first.
@@ -47,9 +46,7 @@ def refuse_unstated_continuity(traits: Traits) -> str:
     """Return why the question makes no sense for a formulation, or an empty string if it does."""
     if traits.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
-    if traits.continuity is None:
-        return "the trait `continuity` is not stated"
-    return refuse_barrier(traits)
+    return "the trait `continuity` is not stated" if traits.continuity is None else ""
 
 
 @Property.define(

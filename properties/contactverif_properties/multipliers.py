@@ -11,13 +11,12 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases, solid_cases
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_without_multipliers
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.newton_solution import (
     find_solution,
     is_untouched,
@@ -51,19 +50,17 @@ REDUNDANT = Quantity(
 )
 
 
-def refuse_undefined_solution(traits: Traits) -> str:
-    """Return why there are no multipliers or no unique solution to look at, or an empty string."""
-    return refuse_without_multipliers(traits) or refuse_dependent_multipliers(traits)
-
-
 @Property.define(
     id="complementarity",
     family="multipliers",
     summary="All multipliers of a solution press, and the scale of the contact decision does not change the solution.",
     quantities=(TENSION, CHANGE),
     cases=Cases.random(solid_cases),
-    promise=lambda traits: None if refuse_undefined_solution(traits) else True,
-    applicable=refuse_undefined_solution,
+    promise=lambda traits: (
+        True if traits.enforcement == "multiplier" and not refuse_dependent_multipliers(traits) else None
+    ),
+    asks=frozenset({"multiplier"}),
+    applicable=refuse_dependent_multipliers,
     bodies=True,
 )
 def complementarity(case: Case, subject: Subject) -> Measurement:
@@ -112,7 +109,7 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     quantities=(REDUNDANT,),
     cases=Cases.random(block_cases),
     promise=lambda traits: traits.independent_multipliers,
-    applicable=refuse_without_multipliers,
+    asks=frozenset({"multiplier"}),
     bodies=True,
 )
 def multiplier_rank(case: Case, subject: Subject) -> Measurement:

@@ -21,7 +21,6 @@ from contactverif.problems.stability_states import stability_states
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties.shared.any_state import ask_forces_and_tangents, move_state, prepare_state
-from contactverif_properties.shared.applicability import refuse_barrier
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
     Conditioning,
@@ -103,7 +102,7 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
 def refuse_unknown_forces(traits: Traits) -> str:
     """Return why no exact force is known, or an empty string if one is."""
     if knows_forces(traits) or knows_total(traits) or traits.takes_longdouble:
-        return refuse_barrier(traits)
+        return ""
     return "no exact force is known: the traits promise no patch test, no area and no long double"
 
 

@@ -25,7 +25,6 @@ from contactverif.problems.wave_blocks import SOFT, WaveAnswer, matching_answer,
 from contactverif_properties.shared.applicability import (
     refuse_dependent_multipliers,
     refuse_unstated_penalty,
-    refuse_without_multipliers,
 )
 from contactverif_properties.shared.conditioning import (
     Conditioning,
@@ -239,11 +238,6 @@ def _conditioning(state: Case, system: System, pairing: Pairing | None, forces: 
     return replace(conditioning, reach=reach)
 
 
-def refuse_without_pressures(traits: Traits) -> str:
-    """Return why there are no multipliers, or none whose unit is known, or an empty string."""
-    return refuse_without_multipliers(traits) or refuse_unstated_penalty(traits)
-
-
 @Property.define(
     id="stability.inf-sup",
     family="stability",
@@ -252,7 +246,8 @@ def refuse_without_pressures(traits: Traits) -> str:
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
     cases=Cases.from_list(refinement_cases),
     promise=lambda traits: traits.inf_sup,
-    applicable=refuse_without_pressures,
+    asks=frozenset({"multiplier"}),
+    applicable=refuse_unstated_penalty,
     bodies=True,
 )
 def inf_sup(case: Case, subject: Subject) -> Measurement:

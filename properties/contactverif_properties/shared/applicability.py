@@ -8,31 +8,17 @@ from __future__ import annotations
 from contactverif.contract.traits import Traits
 
 
-def refuse_barrier(traits: Traits) -> str:
-    """Return why a barrier method cannot be judged on states that penetrate, or an empty string for other methods."""
-    if traits.enforcement != "barrier":
-        return ""
-    return "the states penetrate, where a barrier is not defined"
-
-
-def refuse_without_multipliers(traits: Traits) -> str:
-    """Return why a formulation without multipliers is not asked about them, or an empty string if it has some."""
-    return "" if traits.enforcement == "multiplier" else f"the enforcement is by a {traits.enforcement}"
-
-
 def refuse_dependent_multipliers(traits: Traits) -> str:
     """Return why no scene is solved, or an empty string if a solution can be expected.
 
     Constraints that depend on one another contradict each other on bent surfaces, so Newton's method has nothing to
     converge to.
     """
-    if traits.independent_multipliers is False:
-        return "the multipliers are not independent, so there need be no solution, nor one alone"
-    return refuse_barrier(traits)
+    dependent = traits.independent_multipliers is False
+    return "the multipliers are not independent, so there need be no solution, nor one alone" if dependent else ""
 
 
 def refuse_unstated_penalty(traits: Traits) -> str:
     """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
-    if traits.penalty is None:
-        return "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
-    return refuse_barrier(traits)
+    known = traits.penalty is not None
+    return "" if known else "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
