@@ -44,6 +44,7 @@ class PosedProblem:
     motions: tuple[Field, ...] = ()  # Exact displacements at reference places of the slave, and of the master if known
     pressure: Field  # The exact pressure at current places of the slave
     pressure_scale: float  # The pressure that errors of pressures are divided by
+    parts: int = 1  # The number of equal parts of a segment, in each of which displacements are smooth
     deformed: bool = True  # Forces are distributed over current lengths, not over those of the reference.
     further: Callable[[Solution], Errors] = _no_errors  # Further kinds of error
     start: FloatArray | None = None  # (n_free,): the first iterate; None for the first guess of the scene
@@ -68,7 +69,8 @@ class PosedProblem:
         for kind, surface in zip(FORCES, surfaces, strict=True):
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
-            errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, motion)
+            moves = solution.displacements
+            errors[kind] = displacement_error(surface, interface.nodes, moves, motion, self.parts)
         pressure = pressure_error(solution, self.pressure, self.pressure_scale)
         if pressure is not None:
             errors[PRESSURE] = pressure

@@ -20,13 +20,13 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.property import WITHOUT_BARRIER, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
+from contactverif.problems.flat_states import touching_states
 from contactverif.problems.hard_corner_states import (
     concave_corner_states,
     convex_kink_states,
     free_end_states,
     steep_slave_states,
 )
-from contactverif.problems.touching_states import touching_states
 from contactverif_properties.hard_flat import knows_total
 from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
 from contactverif_properties.shared.uniform_pressure import uniform_forces

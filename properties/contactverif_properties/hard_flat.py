@@ -18,7 +18,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.problems.hard_flat_states import deep_states, node_hit_states, offset_states, search_states
+from contactverif.problems.flat_states import deep_states, node_hit_states, offset_states, search_states
 from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
 from contactverif_properties.shared.uniform_pressure import (
     forces_of_gap,

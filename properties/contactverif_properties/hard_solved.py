@@ -17,9 +17,7 @@ from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import has_bodies, scene_of
 from contactverif.mechanics.system import System
-from contactverif.problems.blocks import exact_unknowns, pressure_of
-from contactverif.problems.hard_flat_states import tiny_segment_states
-from contactverif.problems.hard_scenes import (
+from contactverif.problems.block_scenes import (
     case_c,
     contrast_scenes,
     stiff_scenes,
@@ -27,6 +25,8 @@ from contactverif.problems.hard_scenes import (
     unloaded_scenes,
     vanishing_overlap_scenes,
 )
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.flat_states import tiny_segment_states
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_properties.hard_flat import FLAT_QUANTITIES, exact_forces, measure_flat
 from contactverif_properties.patch_solved import patch_dead_zone

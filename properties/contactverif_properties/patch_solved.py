@@ -14,7 +14,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.oracle import is_of_class
-from contactverif.problems.class_scenes import normal_scenes, single_scenes
+from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.strategies.solids import block_cases, dead_zone_cases, variant_cases
 from contactverif_properties.patch_flat import promise_normal, promise_single
 from contactverif_properties.shared.solved_patch import (

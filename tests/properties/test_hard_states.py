@@ -11,16 +11,19 @@ from subjects import load_subject
 
 from contactverif.contract.case import Case
 from contactverif.oracle import project_point
-from contactverif.problems.flat_states import STEEP, TURNED, UPRIGHT, read_frame
-from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
-from contactverif.problems.hard_flat_states import (
+from contactverif.problems.flat_states import (
+    STEEP,
+    TURNED,
+    UPRIGHT,
     deep_states,
     node_hit_states,
     offset_states,
+    read_frame,
     search_states,
     tiny_segment_states,
+    touching_states,
 )
-from contactverif.problems.touching_states import touching_states
+from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
 from contactverif_properties.hard_flat import exact_forces, knows_total
 
 TURNS = (UPRIGHT, TURNED, STEEP)

@@ -1,12 +1,18 @@
-"""Hard cases of two blocks: tiny segments, contrasts of stiffness and mesh, overlaps that vanish, and no load at all.
+"""Two blocks in lists: meshes on which simple formulations pass the patch test, and hard cases.
 
-In all but the last the pressure is uniform and known exactly. With no load, nothing is strained.
+`contactverif.oracle.flat_answers` says what the classes of meshes are. Hard are tiny segments, contrasts of stiffness
+and mesh, overlaps that vanish, and no load at all. In all but the last the pressure is uniform and known exactly.
+
+Roundoff decides nothing on the meshes of a class. In the paper's scenes, where both surfaces end together, coordinates
+along the interface are exact. In ours the master goes beyond the slave, so that no slave node faces a free end.
+
+Source: Zavarise & De Lorenzis (2009), Sections 4, 5.1.2 and 7.1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from math import cos, radians, sin
@@ -16,11 +22,77 @@ import numpy as np
 from contactverif.contract.case import Case
 from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle
 from contactverif.problems.blocks import two_blocks
-from contactverif.problems.catalogue import load_scene_case
-from contactverif.problems.hard_flat_states import TINY_MESHES, TINY_PENALTIES
+from contactverif.problems.catalogue import MODERATE_PENALTY, load_scene_case
+from contactverif.problems.flat_states import TINY_MESHES, TINY_PENALTIES
 from contactverif.problems.named_states import named_case
 
+_BESIDE = 0.5  # The length by which the master goes beyond the slave on either side.
 _STRAIN = 2.0**-6  # The pressure over the softer body's E.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _ClassMesh:
+    """Two blocks under a uniform pressure; all lengths are those of segments from left to right."""
+
+    slave: Sequence[float]
+    master: Sequence[float]
+    ratio: float = 1.0  # E of the master over E of the slave, which is 1.
+    degrees: float = 0.0
+    scale: float = 1.0
+
+
+_NORMAL = {
+    "one segment on one": _ClassMesh(slave=[1], master=[2]),
+    "node on node, E ratio 1000": _ClassMesh(slave=[1, 2, 4, 1], master=[1.5, 2, 4, 1.5], ratio=1e3),
+    "some nodes on nodes, inclined by 17.3°": _ClassMesh(
+        slave=[1, 3, 0.5, 2, 1.5, 4], master=[4.5, 2.5, 6.5], ratio=3.0, degrees=17.3
+    ),
+    "nine segments on two": _ClassMesh(
+        slave=[1, 1, 2, 1, 0.25, 0.25, 0.5, 3, 3], master=[4.5, 8.5], ratio=1 / 8, scale=2e-3
+    ),
+}
+_SINGLE = {
+    "one segment on two": _ClassMesh(slave=[2], master=[1.5, 1.5]),
+    "each midpoint, E ratio 1000": _ClassMesh(slave=[2, 4, 1], master=[1.5, 3, 2.5, 1], ratio=1e3),
+    "nodes and midpoints, inclined by 17.3°": _ClassMesh(
+        slave=[1, 3, 0.5, 2, 1.5, 4], master=[3, 1.5, 1.5, 2.5, 2, 2.5], ratio=3.0, degrees=17.3
+    ),
+    "two of four parts": _ClassMesh(slave=[4, 0.5, 3, 4.5], master=[4.75, 0.25, 8], ratio=1 / 8, scale=2e-3),
+}
+
+
+@cache
+def normal_scenes() -> tuple[Case, ...]:
+    """Return the paper's A1 and A2, and scenes of ours whose inner master nodes all lie on slave nodes."""
+    return (*map(load_scene_case, ("a1", "a2-uniform", "a2-graded")), *_class_cases(_NORMAL))
+
+
+@cache
+def single_scenes() -> tuple[Case, ...]:
+    """Return the paper's B and Example 1, and scenes of ours with master nodes in the middle of slave segments."""
+    return (*map(load_scene_case, ("b", "example-1")), *_class_cases(_SINGLE))
+
+
+def _class_cases(drawings: dict[str, _ClassMesh]) -> list[Case]:
+    return [replace(_class_case(drawing), name=name) for name, drawing in drawings.items()]
+
+
+def _class_case(drawing: _ClassMesh) -> Case:
+    """Return the scene: three layers of cells above, two below, the interface on y = 0."""
+    slave, master = (np.append(0.0, np.cumsum(lengths)) for lengths in (drawing.slave, drawing.master))
+    master -= _BESIDE
+    height, softer = float(slave[-1]) / 2, min(1.0, drawing.ratio)
+    angle = radians(drawing.degrees)
+    axis = (cos(angle), sin(angle)) if drawing.degrees else UPRIGHT.axis
+    return two_blocks(
+        Rectangle(slave, np.linspace(0.0, height, 4), young=1.0, poisson=0.3),
+        Rectangle(master, np.linspace(-0.75 * height, 0.0, 3), young=drawing.ratio, poisson=0.2),
+        penalty=MODERATE_PENALTY * softer / float(np.diff(slave).mean()) / drawing.scale,
+        pressure=_STRAIN * softer,
+        placing=Placing(axis, scale=drawing.scale),
+    ).case()
+
+
 _HEIGHT = 6.0
 _POISSON = (0.3, 0.2)
 _UNITS = ("1e-6", "1", "1e6")  # E of the master over E of the slave.
@@ -41,7 +113,7 @@ def case_c() -> tuple[Case, ...]:
 def tiny_segment_scenes() -> tuple[Case, ...]:
     """Return blocks with a segment of 1.2e-5 in an interface of 12, pressed together at three penalties."""
     return tuple(
-        _blocks(f"{side} solved, ε̂ = {penalty:g}", *mesh, penalty=penalty)
+        _hard_case(f"{side} solved, ε̂ = {penalty:g}", *mesh, penalty=penalty)
         for (side, mesh), penalty in product(TINY_MESHES.items(), TINY_PENALTIES)
     )
 
@@ -53,7 +125,7 @@ def stiff_scenes() -> tuple[Case, ...]:
     cases = []
     for stiff, ratio in product(("1e4", "1e10"), _UNITS):
         penalty = float(stiff) * min(1.0, float(ratio)) / 4
-        cases.append(_blocks(f"ε̂h/E = {stiff}, E ratio {ratio}", *mesh, ratio=float(ratio), penalty=penalty))
+        cases.append(_hard_case(f"ε̂h/E = {stiff}, E ratio {ratio}", *mesh, ratio=float(ratio), penalty=penalty))
     return tuple(cases)
 
 
@@ -66,7 +138,7 @@ def contrast_scenes() -> tuple[Case, ...]:
         {"8 on 2": (fine, coarse), "2 on 8": (coarse, fine)}.items(), _UNITS, (("10 E/h", 10.0), ("1e5 E/h", 1e5))
     ):
         penalty = stiff * min(1.0, float(ratio)) * (len(slave) - 1) / 12
-        cases.append(_blocks(f"{mesh}, E ratio {ratio}, ε̂ = {label}", slave, master, float(ratio), penalty=penalty))
+        cases.append(_hard_case(f"{mesh}, E ratio {ratio}, ε̂ = {label}", slave, master, float(ratio), penalty=penalty))
     return tuple(cases)
 
 
@@ -77,7 +149,7 @@ def vanishing_overlap_scenes() -> tuple[Case, ...]:
     places = [("", UPRIGHT, exponent) for exponent in range(1, 13)]
     places += [(", inclined", inclined, exponent) for exponent in (2, 6, 10, 12)]
     return tuple(
-        _blocks(
+        _hard_case(
             f"overlap 1e-{exponent}{label}",
             [0.0, 2.0, 5.0, 8.0],
             [-1.0, 1.5, 3.0, 5.0 + 3 * 10.0**-exponent],
@@ -109,7 +181,7 @@ def unloaded_scenes() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _blocks(
+def _hard_case(
     name: str,
     slave: Sequence[float],
     master: Sequence[float],
