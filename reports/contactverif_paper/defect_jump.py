@@ -17,7 +17,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.defect_tilt import DEPTH, TILTS, nodal_forces
 from contactverif_paper.figure_style import (
     REFERENCE_LINE,
@@ -29,11 +28,11 @@ from contactverif_paper.figure_style import (
     use_round_ticks,
 )
 from contactverif_paper.paper_columns import Column, Formulations, axis_column, values_column
-from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_formulations import BALANCED, STS, VTS_PPT, PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 
-FORMULATIONS = (formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
+FORMULATIONS = (VTS_PPT, BALANCED, STS)
 SLIDING_TILT = 0.3  # Radians: the tilt at which the area slides past the node.
 SHIFTS = np.linspace(-0.06, 0.06, 121) + 2.0**-12  # The end of the area past the node over the slave's length.
 _NEAR = 2.0**-40  # The distance to either side of the jump over the slave's length.
@@ -90,7 +89,7 @@ def jump_by_formula(theta: float) -> float:
 
 def statements(result: Jump) -> tuple[Statement, ...]:
     """Say how large the jump is."""
-    jumps = [result.jump.near(formulations.VTS_PPT, theta) for theta in (0.1, 0.3)]
+    jumps = [result.jump.near(VTS_PPT, theta) for theta in (0.1, 0.3)]
     return (
         Statement(
             "Eq. 6 and Box 3",

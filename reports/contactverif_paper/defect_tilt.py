@@ -18,17 +18,16 @@ from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, axis_column, values_column
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import BALANCED, STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 
 TILTS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])  # Radians.
 DEPTH = 1.0 / 8  # The penetration of the slave's first node over its length.
 _PENALTY = 8.0
-FORMULATIONS = (formulations.VTS_ME, formulations.VTS_PPT, formulations.BALANCED, formulations.STS)
+FORMULATIONS = (VTS_ME, VTS_PPT, BALANCED, STS)
 _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses a node, up to θ = 0.5.
 
 
@@ -76,7 +75,7 @@ def compute(report_progress: Progress) -> Imbalance:
 
 def statements(imbalance: Imbalance) -> tuple[Statement, ...]:
     """Say how much is lost."""
-    losses = [imbalance.force.near(formulations.VTS_PPT, theta) for theta in (0.1, 0.3)]
+    losses = [imbalance.force.near(VTS_PPT, theta) for theta in (0.1, 0.3)]
     return (
         Statement(
             "Section 5.1.1, Boxes 1–3",

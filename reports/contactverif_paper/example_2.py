@@ -20,15 +20,15 @@ from matplotlib.path import Path
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.problems import hertz
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_round_ticks
 from contactverif_paper.paper_columns import Column, Formulations, variables_of
+from contactverif_paper.paper_formulations import NTS_AR, VTS_G, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
 
-FORMULATIONS = (formulations.NTS_AR, formulations.VTS_G, formulations.VTS_ME, formulations.VTS_PPT)
+FORMULATIONS = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
 PRINTED_PEAK, PRINTED_ITERATIONS = 1.61e6, 4
 PEAK_TOLERANCE = 0.03
 TOUCHING = 1e-2  # The depth of the disk in the other first guess, over what is about right.

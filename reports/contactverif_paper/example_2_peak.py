@@ -18,15 +18,15 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, flatter, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_series, use_round_ticks
 from contactverif_paper.paper_columns import Column, Formulations, variables_of
+from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.netcdf import schema
 
-FORMULATIONS = (formulations.VTS_ME, formulations.VTS_PPT, formulations.REFERENCE_AREAS)
-EXPLAINED = (formulations.VTS_ME, formulations.REFERENCE_AREAS)
+FORMULATIONS = (VTS_ME, VTS_PPT, REFERENCE_AREAS)
+EXPLAINED = (VTS_ME, REFERENCE_AREAS)
 REFINE = (1, 2, 3)
 SLOPES, SIZES = (1.0, 0.5, 0.25), (0.5, 1.0, 2.0)
 _MEGA = 1e6
@@ -127,7 +127,7 @@ def datasets(study: PeakStudy) -> dict[str, xr.Dataset]:
 
 def _solve_size(factor: float) -> DiskSolution:
     """Solve with a smaller or larger foundation."""
-    return solve_disk(formulations.VTS_ME, replace(PAPER, width=PAPER.width * factor, depth=PAPER.depth * factor))
+    return solve_disk(VTS_ME, replace(PAPER, width=PAPER.width * factor, depth=PAPER.depth * factor))
 
 
 def _element_size(refine: int) -> float:

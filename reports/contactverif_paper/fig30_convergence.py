@@ -25,15 +25,14 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_decades
 from contactverif_paper.paper_columns import WORDS, Column, Formulations, variables_of
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import BASIC, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
 
-FORMULATIONS = (formulations.VTS_ME, formulations.BASIC, formulations.VTS_PPT)
+FORMULATIONS = (VTS_ME, BASIC, VTS_PPT)
 YOUNG, PRESSURE = 1e4, 100.0
 RATIOS = (1.0, 0.5)  # E of the master over E of the slave.
 MATERIALS = ("equal materials", "master half as stiff as the slave")
@@ -157,10 +156,10 @@ def _history(formulation: PaperFormulation, ratio: float) -> History:
 
 def _rate(stiffness: float) -> tuple[float, float]:
     """Return (spectral radius, observed rate) of the basic version."""
-    trace = solve(formulations.BASIC, 1.0, stiffness)
+    trace = solve(BASIC, 1.0, stiffness)
     q, case = trace.solution, trace.scene.case()
     matrices = []
-    for formulation in (formulations.BASIC, formulations.VTS_PPT):
+    for formulation in (BASIC, VTS_PPT):
         system = System(trace.scene, subject_of(formulation).for_case(case))
         matrices.append(dense(system.matrix(q, system.pair(q))[0]))
     basic, consistent = matrices
@@ -175,9 +174,9 @@ def statements(convergence: Convergence) -> tuple[Statement, ...]:
 
 
 def _basic_statement(convergence: Convergence) -> Statement:
-    counts = convergence.counts(formulations.BASIC)
+    counts = convergence.counts(BASIC)
     by_rule = "; ".join(f"{rule}: {', '.join(map(str, row))}" for rule, row in zip(RULES, counts.tolist(), strict=True))
-    bounds = [_bounds(row[FORMULATIONS.index(formulations.BASIC)]) for row in convergence.histories]
+    bounds = [_bounds(row[FORMULATIONS.index(BASIC)]) for row in convergence.histories]
     possible = all(low < high for low, high in bounds)
     words_ = " or ".join(
         f"from {number(low, 2)} to {number(high, 2)} ({material})"
@@ -201,9 +200,9 @@ def _bounds(history: History) -> tuple[float, float]:
 
 
 def _quick_statement(convergence: Convergence) -> Statement:
-    quick = (formulations.VTS_ME, formulations.VTS_PPT)
+    quick = (VTS_ME, VTS_PPT)
     counts = {row.legend: convergence.counts(row)[0].tolist() for row in quick}
-    slow = convergence.counts(formulations.BASIC)[0]
+    slow = convergence.counts(BASIC)[0]
     words_ = "; ".join(f"{legend} {', '.join(map(str, row))}" for legend, row in counts.items())
     return Statement(
         "Fig. 30",
@@ -216,7 +215,7 @@ def _quick_statement(convergence: Convergence) -> Statement:
 
 
 def _rate_statement(convergence: Convergence) -> Statement:
-    basic = convergence.histories[0][FORMULATIONS.index(formulations.BASIC)]
+    basic = convergence.histories[0][FORMULATIONS.index(BASIC)]
     apart = float(np.nanmax(np.abs(convergence.rate / convergence.radius - 1)))
     radius = convergence.radius
     return Statement(
@@ -261,7 +260,7 @@ def plot(convergence: Convergence) -> Figure:
     panels[0].set_ylabel("largest residual (force)")
     rates = panels[2]
     rates.plot(STIFFNESS, convergence.radius, **REFERENCE_LINE)
-    rates.plot(STIFFNESS, convergence.rate, **line_style(formulations.BASIC, 1) | {"linestyle": "none"})
+    rates.plot(STIFFNESS, convergence.rate, **line_style(BASIC, 1) | {"linestyle": "none"})
     rates.set_xscale("log")
     rates.xaxis.set_minor_locator(NullLocator())
     rates.set_ylim(0, None)

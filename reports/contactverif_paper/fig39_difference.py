@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from contactverif.contract.arrays import FloatArray
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.disk_solutions import difference, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, new_panels, use_round_ticks
 from contactverif_paper.paper_columns import Column, to_dataset
+from contactverif_paper.paper_formulations import VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
@@ -55,7 +55,7 @@ def compute(report_progress: Progress) -> tuple[Difference, ...]:
     differences = []
     for refine, mesh in zip(REFINE, MESHES, strict=True):
         report_progress(f"Fig. 39, {mesh}")
-        pair = (solve_disk(row, refine=refine) for row in (formulations.VTS_PPT, formulations.VTS_ME))
+        pair = (solve_disk(row, refine=refine) for row in (VTS_PPT, VTS_ME))
         differences.append(Difference(*difference(*pair)))
     return tuple(differences)
 

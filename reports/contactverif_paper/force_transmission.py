@@ -21,21 +21,23 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import Column, name_columns, variables_of
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import (
+    BALANCED,
+    MORTAR,
+    NTS,
+    NTS_AR,
+    STS,
+    VIRTUAL,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+    subject_of,
+)
 from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
 from contactverif_reports.netcdf import schema
 
-FORMULATIONS = (
-    formulations.NTS,
-    formulations.NTS_AR,
-    formulations.VTS_ME,
-    formulations.VTS_PPT,
-    formulations.BALANCED,
-    formulations.STS,
-    formulations.MORTAR,
-)
+FORMULATIONS = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 EXACT = PaperFormulation("exact", "")
 _LARGEST_DENOMINATOR = 60
 Fractions = tuple[Fraction, ...]
@@ -164,7 +166,7 @@ def _forces(case: Case, formulation: PaperFormulation, slave: IntArray, master: 
     on_slave, slave_rounding = rationals(forces[slave, 1], scale)
     on_master, master_rounding = rationals(-forces[master, 1], scale)
     at_points = np.zeros(0)
-    if formulation in formulations.VIRTUAL:
+    if formulation in VIRTUAL:
         points = plugin.contact_points(case.interface, pairing, case.z)
         at_points = (points.pressure * points.weight)[np.argsort(points.position[:, 0])]
     on_points, point_rounding = rationals(at_points, scale)

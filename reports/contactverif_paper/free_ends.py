@@ -19,20 +19,21 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.problems.uniform_stress import stress_error
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import Series, add_legend, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, axis_column, values_column
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import (
+    BALANCED,
+    MORTAR,
+    NTS_AR,
+    STS,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+    subject_of,
+)
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 
-FORMULATIONS = (
-    formulations.NTS_AR,
-    formulations.VTS_ME,
-    formulations.VTS_PPT,
-    formulations.BALANCED,
-    formulations.STS,
-    formulations.MORTAR,
-)
+FORMULATIONS = (NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 OVERHANGS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])  # Parts of a slave segment.
 _YOUNG, _POISSON, _PRESSURE = 1e4, 0.3, 100.0
 _SEGMENT = 2.0  # The length of a slave segment.
@@ -90,8 +91,8 @@ def overhanging(part: float) -> Scene:
 
 def statements(result: FreeEnds) -> tuple[Statement, ...]:
     """Say what our reading leads to."""
-    largest = float(np.nanmax(result.stress_error.row(formulations.VTS_PPT)))
-    balanced = float(np.nanmax(result.stress_error.row(formulations.BALANCED)))
+    largest = float(np.nanmax(result.stress_error.row(VTS_PPT)))
+    balanced = float(np.nanmax(result.stress_error.row(BALANCED)))
     return (
         Statement(
             "Boxes 2, 3",

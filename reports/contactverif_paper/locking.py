@@ -26,20 +26,22 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.figure_style import add_legend, line_style, new_panels
 from contactverif_paper.paper_columns import Column, Formulations, to_dataset
-from contactverif_paper.paper_formulations import PaperFormulation, measure, subject_of
+from contactverif_paper.paper_formulations import (
+    MORTAR,
+    NTS_AR,
+    STS,
+    TWO_PASS,
+    VTS_PPT,
+    PaperFormulation,
+    measure,
+    subject_of,
+)
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 
-FORMULATIONS = (
-    formulations.VTS_PPT,
-    formulations.TWO_PASS,
-    formulations.STS,
-    formulations.NTS_AR,
-    formulations.MORTAR,
-)
-WITH_PRESSURES = (formulations.STS, formulations.MORTAR)  # Their pressures in real contact are drawn.
+FORMULATIONS = (VTS_PPT, TWO_PASS, STS, NTS_AR, MORTAR)
+WITH_PRESSURES = (STS, MORTAR)  # Their pressures in real contact are drawn.
 FINER = COLUMNS[1]  # 12 slave segments on 8 master segments: every formulation that locks does so there.
 REAL = COLUMNS[0]
 STEPS = 10.0 ** np.arange(1, 7)  # Penalties ε̂ h/E of real contact; each starts from the solution before.
@@ -106,9 +108,9 @@ def statements(result: Locking) -> tuple[Statement, ...]:
             "Section 6.3",
             "what a high penalty does to VTS-PPT and to segment-to-segment is not said",
             f"both lock. From ε̂ = 10 to 1e8 E/h an interface of {FINER[0]} on {FINER[1]} segments loses "
-            f"{drift[formulations.VTS_PPT]:.0%} (VTS-PPT), {drift[formulations.STS]:.0%} (segment-to-segment) and "
-            f"{drift[formulations.TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
-            f"{abs(drift[formulations.MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
+            f"{drift[VTS_PPT]:.0%} (VTS-PPT), {drift[STS]:.0%} (segment-to-segment) and "
+            f"{drift[TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
+            f"{abs(drift[MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
             f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
             Agreement.SILENT,
             "locking-stiff",

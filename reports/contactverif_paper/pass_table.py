@@ -14,9 +14,22 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import WORDS, Column, Formulations
-from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_formulations import (
+    BALANCED,
+    BASIC,
+    CHEN_HISADA,
+    DUAL,
+    MORTAR,
+    NTS,
+    NTS_AR,
+    STS,
+    TWO_PASS,
+    VTS_G,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+)
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.patch_solutions import (
     FAILS,
@@ -29,20 +42,7 @@ from contactverif_paper.patch_solutions import (
 )
 from contactverif_reports.html.pages import number
 
-FORMULATIONS = (
-    formulations.NTS,
-    formulations.NTS_AR,
-    formulations.TWO_PASS,
-    formulations.VTS_G,
-    formulations.VTS_ME,
-    formulations.BASIC,
-    formulations.VTS_PPT,
-    formulations.BALANCED,
-    formulations.CHEN_HISADA,
-    formulations.STS,
-    formulations.MORTAR,
-    formulations.DUAL,
-)
+FORMULATIONS = (NTS, NTS_AR, TWO_PASS, VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED, CHEN_HISADA, STS, MORTAR, DUAL)
 SCENES: Mapping[str, str] = {  # {scene: head of its column}
     "a1": "A1",
     "a2-uniform": "A2, uniform mesh",
@@ -55,12 +55,12 @@ SCENES: Mapping[str, str] = {  # {scene: head of its column}
 }
 _NORMAL, _NON_MATCHING = ("a1", "a2-uniform", "a2-graded"), ("b", "c", "example-1", "example-1bis")
 PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says, by scene; else it is silent.
-    formulations.NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
-    formulations.NTS_AR: dict.fromkeys(_NORMAL, PASSES) | dict.fromkeys(_NON_MATCHING, FAILURE),
-    formulations.TWO_PASS: dict.fromkeys(_NON_MATCHING, FAILURE),
-    formulations.VTS_ME: dict.fromkeys(("b", "example-1"), PASSES) | dict.fromkeys(("c", "example-1bis"), FAILURE),
-    formulations.VTS_PPT: dict.fromkeys(("c", "example-1bis"), PASSES),
-    formulations.BASIC: {"c": PASSES},
+    NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
+    NTS_AR: dict.fromkeys(_NORMAL, PASSES) | dict.fromkeys(_NON_MATCHING, FAILURE),
+    TWO_PASS: dict.fromkeys(_NON_MATCHING, FAILURE),
+    VTS_ME: dict.fromkeys(("b", "example-1"), PASSES) | dict.fromkeys(("c", "example-1bis"), FAILURE),
+    VTS_PPT: dict.fromkeys(("c", "example-1bis"), PASSES),
+    BASIC: {"c": PASSES},
 }
 
 

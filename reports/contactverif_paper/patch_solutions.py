@@ -23,9 +23,17 @@ from contactverif.mechanics import newton
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import WORDS, Column
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import (
+    NTS,
+    NTS_AR,
+    TWO_PASS,
+    VIRTUAL,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+    subject_of,
+)
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene
 from contactverif_reports.netcdf import schema
 
@@ -34,9 +42,9 @@ FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 STRESS_ERROR = "largest error of a stress at a Gauss point over the pressure"
 _STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffness_limit` searches.
 
-TWO = (formulations.NTS, formulations.NTS_AR)
-FOUR = (*TWO, formulations.TWO_PASS, formulations.VTS_ME)
-FIVE = (*FOUR, formulations.VTS_PPT)
+TWO = (NTS, NTS_AR)
+FOUR = (*TWO, TWO_PASS, VTS_ME)
+FIVE = (*FOUR, VTS_PPT)
 
 
 def _some(dims: str, units: str, meaning: str) -> Column:
@@ -203,7 +211,7 @@ def _solution(setup: PatchSetup, stiffness: float) -> PatchSolution:
 
 def _curve(formulation: PaperFormulation, solved: SolvedScene, solution: Solution, origin: float) -> Curve:
     """Take pressures at the virtual slave nodes if there are any, else nodal forces over the nodes' shares (Eq. 3)."""
-    at_points = solution.points is not None and formulation in formulations.VIRTUAL
+    at_points = solution.points is not None and formulation in VIRTUAL
     if solution.points is not None and at_points:
         x, _ = solved.points_along(solution.points)
         pressure = solution.points.pressure

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from contactverif_paper import case_b
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import Column
-from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_formulations import NTS_AR, TWO_PASS, PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
 from contactverif_paper.patch_solutions import moderate_error, patch_solution, stiffness_limit
 
@@ -32,7 +31,7 @@ def compute(report_progress: Progress) -> TwoPasses:
     """Compute the errors, and the penalty up to which the claim holds."""
     report_progress("Section 5.1.3, over the penalty")
     patch = patch_solution(case_b.PATCH)
-    passes = (formulations.NTS_AR, formulations.TWO_PASS)
+    passes = (NTS_AR, TWO_PASS)
     one, two = (patch.curve(row).departure for row in passes)
     moderate_one, moderate_two = (moderate_error(row, "b") for row in passes)
     limit = stiffness_limit(case_b.PATCH, two_passes_are_no_better)
@@ -41,7 +40,7 @@ def compute(report_progress: Progress) -> TwoPasses:
 
 def two_passes_are_no_better(departure: dict[PaperFormulation, float]) -> bool:
     """Return whether the pressures of two passes depart at least as far as those of one."""
-    return departure[formulations.TWO_PASS] >= departure[formulations.NTS_AR]
+    return departure[TWO_PASS] >= departure[NTS_AR]
 
 
 def statements(errors: TwoPasses) -> tuple[Statement, ...]:

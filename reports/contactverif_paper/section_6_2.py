@@ -19,13 +19,12 @@ from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import Column, Formulations
-from contactverif_paper.paper_formulations import PaperFormulation, measure, subject_of
+from contactverif_paper.paper_formulations import BASIC, STS, VTS_ME, VTS_PPT, PaperFormulation, measure, subject_of
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
 from contactverif_reports.html.pages import number
 
-FORMULATIONS = (formulations.VTS_ME, formulations.BASIC, formulations.VTS_PPT, formulations.STS)
+FORMULATIONS = (VTS_ME, BASIC, VTS_PPT, STS)
 SCENE = "example-1bis"
 OPTIONS = {"ratio": 0.5, "pressure": 100.0, "penalty": 1e4, "lowered": 0.0, "sides": "free"}  # Here ε̂ = E.
 DIRECTIONS = 8
@@ -62,9 +61,7 @@ def compute(report_progress: Progress) -> Tangents:
 
 def statements(result: Tangents) -> tuple[Statement, ...]:
     """Compare order and symmetry."""
-    me, basic, ppt = (
-        FORMULATIONS.index(row) for row in (formulations.VTS_ME, formulations.BASIC, formulations.VTS_PPT)
-    )
+    me, basic, ppt = (FORMULATIONS.index(row) for row in (VTS_ME, BASIC, VTS_PPT))
     return (
         Statement(
             "Section 6.2",

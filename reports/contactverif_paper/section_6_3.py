@@ -21,9 +21,8 @@ from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.studies.evaluation_cost import measure_costs
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import Column, Formulations, to_dataset
-from contactverif_paper.paper_formulations import PaperFormulation, subject_of
+from contactverif_paper.paper_formulations import STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.section_6_2 import FORMULATIONS as TANGENT_FORMULATIONS
 from contactverif_paper.section_6_2 import ROUNDOFF, Tangents, tangents
@@ -35,7 +34,7 @@ FORMULATIONS = (
     PaperFormulation("VTS-PPT", "vts-ppt:n=1"),
     PaperFormulation("segment-to-segment", "sts"),
 )
-TIMED = (formulations.VTS_ME, formulations.VTS_PPT, formulations.STS)
+TIMED = (VTS_ME, VTS_PPT, STS)
 PRINTED_TERMS = 392  # The paper's count for the exact tangent of segment-to-segment.
 MASTERS: Mapping[str, tuple[tuple[float, float], ...]] = {  # {head of a column: nodes of the master}
     "1 segment": ((2.3, 0.02), (-0.4, -0.03)),
@@ -130,7 +129,7 @@ def statements(section: Section63) -> tuple[Statement, ...]:
 
 
 def _feasible_statement(terms: IntArray, result: Tangents) -> Statement:
-    row = TANGENT_FORMULATIONS.index(formulations.STS)
+    row = TANGENT_FORMULATIONS.index(STS)
     return Statement(
         "Section 6.3",
         f"an exact tangent of a segment-to-segment formulation is practically unfeasible, with up to {PRINTED_TERMS} "

@@ -14,16 +14,15 @@ from typing import Annotated
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance
 from contactverif_paper import example_1, example_1bis
-from contactverif_paper import paper_formulations as formulations
 from contactverif_paper.paper_columns import WORDS, Column, name_columns
-from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_paper.paper_formulations import NTS, NTS_AR, TWO_PASS, VTS_PPT, PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
 from contactverif_paper.patch_solutions import PatchSetup, moderate_error, patch_solution, stiffness_limit
 from contactverif_reports.html.pages import number
 
 UNEQUAL = 10.0  # The stiffness of the other foundation over that of the punch.
 _SETUPS = (example_1.PATCH, example_1bis.PATCH)
-_COMPARED = (formulations.NTS_AR, formulations.NTS, formulations.TWO_PASS)
+_COMPARED = (NTS_AR, NTS, TWO_PASS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +57,14 @@ def compute(report_progress: Progress) -> Section71:
     return Section71(
         tuple(tuple(patch.curve(formulation).departure for formulation in _COMPARED) for patch in patches),
         tuple(stiffness_limit(setup, areas_are_best) for setup in _SETUPS),
-        (moderate_error(formulations.NTS_AR, "example-1"), moderate_error(formulations.TWO_PASS, "example-1")),
-        (moderate_error(formulations.VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
+        (moderate_error(NTS_AR, "example-1"), moderate_error(TWO_PASS, "example-1")),
+        (moderate_error(VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
     )
 
 
 def areas_are_best(departure: dict[PaperFormulation, float]) -> bool:
     """Return whether NTS-AR departs least of NTS, NTS-AR and two passes."""
-    return departure[formulations.NTS_AR] <= min(departure[formulations.NTS], departure[formulations.TWO_PASS])
+    return departure[NTS_AR] <= min(departure[NTS], departure[TWO_PASS])
 
 
 def statements(section: Section71) -> tuple[Statement, ...]:

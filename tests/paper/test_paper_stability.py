@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contactverif_paper import inf_sup_condition, locking
+from contactverif_paper import inf_sup_condition, locking, paper_formulations
 from contactverif_paper.figure_style import render_figure
 from contactverif_paper.paper_item import Agreement
 
@@ -48,7 +48,7 @@ def test_segment_to_segment_locks_and_mortar_does_not(result: locking.Locking) -
     assert smooth.max() < 1.6
     (row,) = locking.statements(result)
     assert "34% (VTS-PPT), 34% (segment-to-segment) and 34% (two-pass NTS-AR)" in row.result
-    assert np.abs(result.drift[locking.FORMULATIONS.index(locking.formulations.NTS_AR)]).max() < 0.001
+    assert np.abs(result.drift[locking.FORMULATIONS.index(paper_formulations.NTS_AR)]).max() < 0.001
 
 
 def test_the_figures_have_their_panels(constants: inf_sup_condition.Constants, result: locking.Locking) -> None:

@@ -33,6 +33,10 @@ class _Grid:
         """Return a variable of numbers of cases."""
         return numbers(_ROW, np.array(self.each(read, 0), dtype=np.int32), long_name, "1")
 
+    def words(self, read: Callable[[Row], str], long_name: str, comment: str = "") -> xr.Variable:
+        """Return a variable of words, empty where there is no row."""
+        return words(_ROW, self.each(read, ""), long_name, comment)
+
     def labels(self) -> Table:
         """Return the names along the two dimensions."""
         return {
@@ -107,10 +111,8 @@ def _rows(grid: _Grid, run: Run) -> Table:
             "crashed and fail first, then not judged, then pass; missing where the property was not checked",
             fill=schema.NOT_PLANNED,
         ),
-        "result": words(
-            _ROW,
-            grid.each(lambda row: str(row.result), ""),
-            "the verdict beside what the formulation states, as tables and pages show it",
+        "result": grid.words(
+            lambda row: str(row.result), "the verdict beside what the formulation states, as tables and pages show it"
         ),
         "promise": codes(
             _ROW,
@@ -119,11 +121,9 @@ def _rows(grid: _Grid, run: Run) -> Table:
             "what the traits of the formulation say",
             "stated_to_fail names a witness, a case that always runs",
         ),
-        "unexpected": words(
-            _ROW, grid.each(lambda row: row.unexpected, ""), "why this row makes the run fail", "empty if it does not"
-        ),
-        "known": words(_ROW, grid.each(lambda row: row.known, ""), "why a failure is known", "empty where none is"),
-        "reason": words(_ROW, grid.each(lambda row: row.reason, ""), "why the verdict is no pass, in the worst case"),
+        "unexpected": grid.words(lambda row: row.unexpected, "why this row makes the run fail", "empty if it does not"),
+        "known": grid.words(lambda row: row.known, "why a failure is known", "empty where none is"),
+        "reason": grid.words(lambda row: row.reason, "why the verdict is no pass, in the worst case"),
         "planned": grid.count(lambda row: row.planned, "number of random cases planned"),
         "judged": grid.count(lambda row: row.judged, "number of random cases that were decided"),
         "idle": grid.count(lambda row: row.idle, "number of judged random cases in which nothing was in contact"),
@@ -137,9 +137,8 @@ def _rows(grid: _Grid, run: Run) -> Table:
             "below the attribute least_contact of the property nothing is judged; missing where no case was",
             fill=schema.NOT_MEASURED,
         ),
-        "suspicion": words(
-            _ROW,
-            grid.each(lambda row: row.suspicion, ""),
+        "suspicion": grid.words(
+            lambda row: row.suspicion,
             "whether more cases are undecided than those of right formulations",
             "empty if they are not",
         ),
