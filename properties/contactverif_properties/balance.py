@@ -10,6 +10,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import any_cases, forces_of_any_state, prepare_state, random_directions
 from contactverif_properties.shared.kinks import find_kink
@@ -64,9 +65,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never: a change of partner moves forces between nodes and leaves their sum as it is.
     """
     state, forces = forces_of_any_state(case, subject)
-    imbalance = ratio(float(np.linalg.norm(forces.sum(axis=0))), sum_slave_forces(state, forces))
-    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
-    return Measurement([FORCE_IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
+    return _judge(FORCE_IMBALANCE, float(np.linalg.norm(forces.sum(axis=0))), 1.0, state, forces, subject.traits)
 
 
 @Property.define(
@@ -93,9 +92,14 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
     state, forces = forces_of_any_state(case, subject)
     arms = state.positions - state.positions.mean(axis=0)
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
-    imbalance = ratio(moment, state.diameter * sum_slave_forces(state, forces))
-    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, subject.traits))
-    return Measurement([MOMENT_IMBALANCE.check(imbalance, tolerance)], idle=not forces.any())
+    return _judge(MOMENT_IMBALANCE, moment, state.diameter, state, forces, subject.traits)
+
+
+def _judge(quantity: Quantity, lost: float, arm: float, state: Case, forces: FloatArray, traits: Traits) -> Measurement:
+    """Return what is lost of the forces (n_nodes, 2), or of their moment, over Σ|R| of the slave times the arm."""
+    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, traits))
+    imbalance = ratio(lost, arm * sum_slave_forces(state, forces))
+    return Measurement([quantity.check(imbalance, tolerance)], idle=not forces.any())
 
 
 @Property.define(

@@ -11,23 +11,20 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, prepare_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
-from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
-    COORDINATE_ROUNDING,
     SEGMENT_REASON,
     SEGMENT_TOLERANCE,
-    ratio,
     rounding_distance,
     segment_tolerance,
-    select_failures,
     sum_larger_forces,
 )
+from contactverif_properties.shared.same_answer import Change, judge_changes
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
 SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
@@ -77,17 +74,13 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     (forces,), tangents = ask_forces_and_tangents(formulation, (interface, pairing, case.z))
     (forces_there,), tangents_there = ask_forces_and_tangents(rescaled, (there.interface, pairing_there, there.z))
     forces, forces_there = forces[:n], forces_there[:n]
-    errors = {"forces": float(np.abs(forces_there / factor - forces).max())}
-    values = {SCALED_FORCES: ratio(errors["forces"], float(np.abs(forces).max()))}
+    changes = [Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
-        errors["tangent"] = float(np.abs(tangent_there - tangent).max())
-        values[SCALED_TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
+        changes.append(Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max())))
     tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
-    failures = select_failures(errors, values, tolerance)
-    rounding = COORDINATE_ROUNDING * case.largest_coordinate
-    undecided = explain_by_kink(case, formulation, pairing, rounding, failures) if failures else ""
-    return Measurement(check_all(values, tolerance), undecided, idle=not forces.any())
+    states = [(case, formulation, pairing, case.largest_coordinate)]
+    return Measurement(*judge_changes(changes, tolerance, states), idle=not forces.any())
 
 
 def turn_state(case: Case) -> tuple[Case, FloatArray]:
@@ -145,20 +138,15 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     largest = max(case.largest_coordinate, there.largest_coordinate)
     one_pass = forces / _count_passes(case, subject, formulation, pairing)
     tolerance = segment_tolerance(case, one_pass, largest)
-    errors = {"forces": float(np.abs(forces_there - turn @ forces).max())}
     size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
-    values = {TURNED_FORCES: ratio(errors["forces"], size)}
+    changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
     if tangents:
         tangent, tangent_there = tangents
-        errors["tangent"] = float(np.abs(tangent_there - turn @ tangent @ turn.T).max())
-        values[TURNED_TANGENT] = ratio(errors["tangent"], float(np.abs(tangent).max()))
-    failures = select_failures(errors, values, tolerance)
-    rounding = COORDINATE_ROUNDING * largest
-    undecided = ""
-    if failures:  # Slivers may cost more digits in one place than in the other.
-        undecided = explain_by_kink(case, formulation, pairing, rounding, failures)
-        undecided = undecided or explain_by_kink(there, formulation, pairing_there, rounding, failures)
-    return Measurement(check_all(values, tolerance), undecided, idle=not forces[:n].any())
+        change = tangent_there - turn @ tangent @ turn.T
+        changes.append(Change("tangent", TURNED_TANGENT, change, float(np.abs(tangent).max())))
+    # Slivers may cost more digits in one place than in the other, so that both are looked at.
+    both = [(state, formulation, its, largest) for state, its in ((case, pairing), (there, pairing_there))]
+    return Measurement(*judge_changes(changes, tolerance, both), idle=not forces[:n].any())
 
 
 def _count_passes(case: Case, subject: Subject, formulation: CheckedFormulation, pairing: Pairing | None) -> int:

@@ -8,7 +8,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.interleaved_calls import Question, compare_two_pairings, count_changes, renumber
@@ -118,43 +118,44 @@ def purity(case: Case, subject: Subject) -> Measurement:
         questions.append(Question(interface, pairing, near))
     changes = count_changes(formulation, second, questions)
 
-    values = {
-        REPEATED: changes.repeated,
-        REORDERED: changes.residual,
-        TANGENT: changes.tangent,
-        POINTS: changes.contact_points,
-    }
-    tolerances = dict.fromkeys(values, 0.0)
+    numbers = [
+        REPEATED.check(changes.repeated, 0.0),
+        REORDERED.check(changes.residual, 0.0),
+        TANGENT.check(changes.tangent, 0.0),
+        POINTS.check(changes.contact_points, 0.0),
+    ]
+    bound, bound_of_tangent = (count * UNIT_ROUNDOFF for count in (BATCH_ROUNDINGS, TANGENT_ROUNDINGS))
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
     if subject.traits.enforcement == "penalty":
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
     if subject.traits.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
-        values[BATCHED] = compare_batch(state, near, forces, batch)
-        tolerances[BATCHED] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        numbers.append(BATCHED.check(compare_batch(state, near, forces, batch), bound))
     if isinstance(subject, Restartable):
         far = subject.restart().with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
         forces_there = np.array(far.answers([("residual", interface, pairing, u) for u in (z, near)]))
-        values[SECOND_PROCESS] = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
-        tolerances[SECOND_PROCESS] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
+        difference = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
+        numbers.append(SECOND_PROCESS.check(difference, bound))
     if "residual_and_tangent" in formulation.provides:
-        values[IN_ONE_CALL], tolerances[IN_ONE_CALL] = changes.residual_and_tangent, 0.0
         answers = formulation.answers(
             [(verb, interface, pairing, u) for verb in ("tangent", "residual_and_tangent") for u in (z, near)]
         )
         tangents, pairs = np.array([dense(tangent) for tangent in answers[:2]]), answers[2:]
         one_call = np.array([residual for residual, _ in pairs])
-        values[ONE_RESIDUAL] = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
-        values[ONE_TANGENT] = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
-        tolerances[ONE_RESIDUAL] = BATCH_ROUNDINGS * UNIT_ROUNDOFF
-        tolerances[ONE_TANGENT] = TANGENT_ROUNDINGS * UNIT_ROUNDOFF
+        difference = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
+        of_tangents = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
+        numbers += [
+            IN_ONE_CALL.check(changes.residual_and_tangent, 0.0),
+            ONE_RESIDUAL.check(difference, bound),
+            ONE_TANGENT.check(of_tangents, bound_of_tangent),
+        ]
     if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
-    return Measurement(check_all(values, tolerances), broken="; ".join(broken), idle=idle)
+    return Measurement(numbers, broken="; ".join(broken), idle=idle)
 
 
 def _compare_penalties(
@@ -196,16 +197,7 @@ def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> 
 def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_call: FloatArray) -> float:
     """Return the largest difference of tangents in one call over what moving the nodes by X would change.
 
-    Parameters
-    ----------
-    case : Case
-        The state z.
-    near : FloatArray, shape (n_unknowns + n_multipliers,)
-        The state nearby.
-    tangents : FloatArray, shape (2, n, n)
-        The tangents of both states on the same pairing; n = n_unknowns + n_multipliers.
-    in_one_call : FloatArray, shape (2, n, n)
-        What was returned together with the residuals.
+    Both arrays (2, n, n) hold the tangents of both states on the same pairing; n = n_unknowns + n_multipliers.
     """
     way = float(np.abs(near - case.z).max())
     slope = float(np.abs(tangents[1] - tangents[0]).max()) / way if way > 0 else 0.0

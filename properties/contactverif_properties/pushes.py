@@ -40,7 +40,7 @@ OPEN = Quantity("force across an open gap", "1", "0", REASON)
 DISTANT = Quantity("force far from the contact zone", "1", "0", REASON)
 PULL_OF_POINT = Quantity("pull of a contact point", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
-CLOSED = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
+HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL_OF_NODE = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
 
@@ -258,7 +258,7 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
     """
-    opened = open_all_but_one_end(case, CLOSED) if "penetration" in case.parameters else case
+    opened = open_all_but_one_end(case, HALF) if "penetration" in case.parameters else case
     formulation, state = prepare_state(opened, subject)
     if state.n_multipliers:
         state = state.with_multipliers(release_some(state))

@@ -8,8 +8,6 @@ the same forces, Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
@@ -106,14 +104,6 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     penetration = mean_penetration(case, forces)
     reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment
     return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
-
-
-def select_failures(
-    errors: Mapping[str, float], values: Mapping[Quantity, float], tolerance: float
-) -> dict[str, float]:
-    """Return those errors whose value is above the tolerance."""
-    pairs = zip(errors.items(), values.values(), strict=True)
-    return {part: error for (part, error), value in pairs if value > tolerance}
 
 
 def ratio(part: float, whole: float) -> float:

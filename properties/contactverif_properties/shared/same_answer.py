@@ -6,14 +6,16 @@ Multipliers are uniform, so that their order does not matter; only the rows of p
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Quantity, check_all
+from contactverif.contract.property import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import default_points, nearest_segments
 from contactverif_properties.shared.any_state import ask_forces_and_tangents
@@ -25,7 +27,6 @@ from contactverif_properties.shared.roundoff import (
     ratio,
     rounding_distance,
     segment_tolerance,
-    select_failures,
     sum_larger_forces,
 )
 
@@ -86,6 +87,35 @@ def _answer(state: Case, formulation: CheckedFormulation) -> Answer:
     return Answer(state, formulation, pairing, forces, tangent)
 
 
+class Change(NamedTuple):
+    """The change of the forces, or of the tangent, between two states."""
+
+    part: str  # "forces" or "tangent".
+    quantity: Quantity
+    change: FloatArray
+    size: float  # The size that the largest change counts over, in the unit of the change.
+
+
+def judge_changes(
+    changes: Sequence[Change],
+    tolerance: float,
+    states: Iterable[tuple[Case, CheckedFormulation, Pairing | None, float]],
+) -> tuple[tuple[CheckedNumber, ...], str]:
+    """Return the largest changes over their sizes, and why a kink excuses those above the tolerance.
+
+    Each state comes with its pairing and its largest coordinate. Without states, nothing is excused.
+    """
+    errors = [float(np.abs(each.change).max()) for each in changes]
+    values = {each.quantity: ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
+    pairs = zip(changes, errors, strict=True)
+    failures = {each.part: error for each, error in pairs if values[each.quantity] > tolerance}
+    excuses = (
+        explain_by_kink(case, formulation, pairing, COORDINATE_ROUNDING * largest, failures)
+        for case, formulation, pairing, largest in states
+    )
+    return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
+
+
 def compare(
     quantities: tuple[Quantity, Quantity],
     subject: Subject,
@@ -104,33 +134,22 @@ def compare(
         of both states; both dimensionless. The detail `BITS` counts entries that are not equal to the last bit.
     """
     case, size = first.case, max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
-    change = second.forces[carry.nodes] - first.forces @ carry.matrix.T
-    errors, bits = {"forces": float(np.abs(change).max())}, int(np.count_nonzero(change))
-    values = {quantities[0]: ratio(errors["forces"], size)}
+    changes = [Change("forces", quantities[0], second.forces[carry.nodes] - first.forces @ carry.matrix.T, size)]
     if first.tangent is not None and second.tangent is not None:
         places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = second.tangent[np.ix_(places, places)] - turn @ first.tangent @ turn.T
-        errors["tangent"], bits = float(np.abs(change).max()), bits + int(np.count_nonzero(change))
-        values[quantities[1]] = ratio(
-            errors["tangent"], float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
-        )
+        size = float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
+        changes.append(Change("tangent", quantities[1], change, size))
     distance = max(rounding_distance(answer.case, subject.traits) for answer in (first, second))
     tolerance = segment_tolerance(case, first.forces, distance)
-    failures = select_failures(errors, values, tolerance)
-    undecided = _explain(first, second, failures) if failures and explain else ""
-    details, idle = {BITS: float(bits)}, not (first.forces.any() or second.forces.any())
-    return Measurement(check_all(values, tolerance), undecided, details=details, idle=idle)
-
-
-def _explain(first: Answer, second: Answer, failures: dict[str, float]) -> str:
-    """Return why the failures may be the fault of a kink in one of the states, or an empty string."""
-    for answer in (first, second):
-        reach = COORDINATE_ROUNDING * answer.case.largest_coordinate
-        if reason := explain_by_kink(answer.case, answer.formulation, answer.pairing, reach, failures):
-            return reason
-    # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
-    return _find_tie(first) or _find_tie(second)
+    states = [(each.case, each.formulation, each.pairing, each.case.largest_coordinate) for each in (first, second)]
+    numbers, undecided = judge_changes(changes, tolerance, states if explain else [])
+    if explain and not undecided and any(number.value > number.tolerance for number in numbers):
+        # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
+        undecided = _find_tie(first) or _find_tie(second)
+    details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
+    return Measurement(numbers, undecided, details=details, idle=not (first.forces.any() or second.forces.any()))
 
 
 def _find_tie(answer: Answer) -> str:
