@@ -18,7 +18,7 @@ from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from math import inf
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.foreign_text import LONGEST_NAME, describe_error, name_line
@@ -28,7 +28,9 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import Wrapper, load_remote, python_program, survey
-from contactverif.problems.problem import Problem
+
+if TYPE_CHECKING:
+    from contactverif.problems.problem import Problem
 
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
@@ -249,16 +251,16 @@ def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> P
 
 def load_problems() -> dict[str, Problem | NotLoaded]:
     """Load the installed problems with an exact answer by name, those of lower rank first."""
-    loaded = {name: _load_problem(name, entries) for name, entries in _entries_by_name(PROBLEMS).items()}
-    return dict(sorted(loaded.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
+    from contactverif.problems.problem import Problem  # It needs mechanics, which most commands do not.
 
-
-def _load_problem(name: str, entries: Sequence[EntryPoint]) -> Problem | NotLoaded:
-    loaded = _load_entry(name, entries)
-    if isinstance(loaded, NotLoaded | Problem):
-        return loaded
-    needed = "a contactverif.problems.problem.Problem"
-    return NotLoaded(name, f"the entry point gives a {type(loaded).__name__}; needed {needed}")
+    problems: dict[str, Problem | NotLoaded] = {}
+    for name, entries in _entries_by_name(PROBLEMS).items():
+        loaded = _load_entry(name, entries)
+        if not isinstance(loaded, NotLoaded | Problem):
+            needed = "a contactverif.problems.problem.Problem"
+            loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}; needed {needed}")
+        problems[name] = loaded
+    return dict(sorted(problems.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
