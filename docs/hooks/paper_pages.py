@@ -25,7 +25,8 @@ def paper_page(root: Path) -> str:
     readme = relink((root / FOLDER / "README.md").read_text(encoding="utf-8"), "reports/paper/README.md")
     with xr.open_datatree(root / FOLDER / "paper.nc") as tree:
         statements = tree["statements"].to_dataset().load()
-        captions = _captions(tree)
+        figures = tree["figures"].to_dataset()
+        captions = dict(zip(map(str, figures["name"].values), map(str, figures["caption"].values), strict=True))
     meanings = str(statements.agreement.attrs["flag_meanings"]).split()
     verdicts = [meanings[int(code)].replace("_", " ") for code in statements.agreement.values]
     counts = [(word.replace("_", " "), verdicts.count(word.replace("_", " "))) for word in meanings]
@@ -46,21 +47,9 @@ def paper_page(root: Path) -> str:
         name = Path(path).stem
         label = re.sub(r"^fig0?(\d+)", r"Fig. \1", name).replace("-", " ")
         title = label[0].upper() + label[1:]
-        caption = sentence(plain(captions.get(name, "")))
+        caption = sentence(plain(captions[name]))
         text.append(f"### {title}\n\n![{title}]({Path(path).name})\n\n{caption}\n")
     return "\n".join(text)
-
-
-def _captions(tree: xr.DataTree) -> dict[str, str]:
-    """Return {name of a figure: its caption}; none where the file holds no captions."""
-    if "figures" not in tree.children:
-        return {}
-    figures = tree["figures"].to_dataset()
-    columns = [name for name in ("caption", "title") if name in figures.variables]
-    if "name" not in figures.variables or not columns:
-        return {}
-    pairs = zip(figures["name"].values, figures[columns[0]].values, strict=True)
-    return {str(name): str(caption) for name, caption in pairs}
 
 
 def _introduction(readme: str) -> str:

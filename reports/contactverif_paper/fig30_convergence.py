@@ -44,9 +44,8 @@ _ENERGY = 1e-15  # The paper's energy norm in Example 2; here it is taken over t
 _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the stopping rules that ask for more.
 
 
-def _steps(name: str, units: str, meaning: str) -> Column:
-    dims = {"residual": "residuals_step", "energy": "energies_step"}.get(name, f"{name}_step")
-    return Column(dims, units, meaning, "NaN: nothing there", np.nan, name=name)
+def _steps(name: str, dim: str, units: str, meaning: str) -> Column:
+    return Column(dim, units, meaning, "NaN: nothing there", np.nan, name=name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,10 +54,16 @@ class History:
 
     formulation: PaperFormulation
     # The first two, (n_iterates,), go up to the solution.
-    residuals: Annotated[FloatArray, _steps("residual", schema.FORCE, "largest entry of the residual")]
-    energies: Annotated[FloatArray, _steps("energy", "N m", "energy of a Newton step")]  # |Δq · residual|
+    residuals: Annotated[
+        FloatArray, _steps("residual", "residuals_step", schema.FORCE, "largest entry of the residual")
+    ]
+    energies: Annotated[
+        FloatArray, _steps("energy", "energies_step", "N m", "energy of a Newton step")
+    ]  # |Δq · residual|
     # Only roundoff stops these steps.
-    beyond: Annotated[FloatArray, _steps("beyond", schema.FORCE, "largest entry of the residual in further steps")]
+    beyond: Annotated[
+        FloatArray, _steps("beyond", "beyond_step", schema.FORCE, "largest entry of the residual in further steps")
+    ]
     floor: Annotated[float, Column("", schema.FORCE, "what roundoff alone makes of the residual")]
     end: Annotated[str, Column("", WORDS, "end of Newton")]
 
