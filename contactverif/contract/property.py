@@ -117,7 +117,7 @@ class CheckedNumber:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found at one place, beside what is right there.
+    """The numbers at one place, beside what is right there.
 
     Attributes
     ----------

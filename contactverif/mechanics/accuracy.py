@@ -72,7 +72,7 @@ class Solution:
 
     @property
     def end(self) -> str:
-        """How Newton's method ended, in words."""
+        """The end of Newton's method, in words."""
         return self.trace.end.label if self.trace is not None else ""
 
     @property

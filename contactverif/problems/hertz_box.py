@@ -48,8 +48,8 @@ from contactverif.problems.problem import (
     PRESSURE,
     Bound,
     Errors,
-    PosedProblem,
     Problem,
+    ProblemInstance,
     Studies,
 )
 
@@ -280,7 +280,7 @@ class HertzStudy:
         length = BOX.half_width if self.fixed else 2 * BOX.half_width / (across + 1 / 3)
         return self.stiffness * BOX.young[0] / length
 
-    def pose(self, across: int, traits: Traits) -> PosedProblem:
+    def pose(self, across: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
         multipliers, penalty, role = traits.enforcement == "multiplier", self.penalty(across), self.parabola_is_slave
         law = None if multipliers else penalty
@@ -293,7 +293,7 @@ class HertzStudy:
             return exact_displacements(BOX, law, _number("slave", role), places[:, 0], across)
 
         forces = partial(exact_forces, BOX, law, scene.interface, role)
-        return PosedProblem(
+        return ProblemInstance(
             scene=scene,
             forces=forces,
             motions=(motion,),
@@ -386,7 +386,7 @@ HERTZ_STUDIES = Studies(
 )
 
 
-def _pose(across: int, stiffness: float, traits: Traits) -> PosedProblem:
+def _pose(across: int, stiffness: float, traits: Traits) -> ProblemInstance:
     return HertzStudy(True, stiffness).pose(across, traits)
 
 

@@ -21,7 +21,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import Scene
-from contactverif.problems.problem import PosedProblem, Problem
+from contactverif.problems.problem import Problem, ProblemInstance
 from contactverif.problems.uniform_stress import pose_uniform
 
 LAYERS = 2  # Layers of cells of each block.
@@ -163,7 +163,7 @@ def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
 _WIDTH, _HEIGHT = 8.0, 1.5  # Lengths of the zigzag with one tooth
 
 
-def _pose(teeth: int, stiffness: float, traits: Traits) -> PosedProblem:
+def _pose(teeth: int, stiffness: float, traits: Traits) -> ProblemInstance:
     """Return blocks on a zigzag of so many teeth: it has two normals, so that the uniform state is exact."""
     places = range(2 * teeth + 1)
     problem = KinkedPatch(tuple((_WIDTH * place / (2 * teeth), _HEIGHT / teeth * (place % 2)) for place in places))

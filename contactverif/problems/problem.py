@@ -1,4 +1,4 @@
-"""What problems with an exact answer have in common: to be posed on a mesh, to measure errors, and to be studied.
+"""The parts that problems with an exact answer have in common: scenes on meshes, errors, and studies on finer meshes.
 
 It is no part of `contract`, because scenes and solutions belong to mechanics, of which a contract knows nothing.
 """
@@ -36,7 +36,7 @@ def _no_errors(solution: Solution) -> Errors:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PosedProblem:
+class ProblemInstance:
     """A problem on one mesh, at one penalty, for formulations of some traits, with its exact answer."""
 
     scene: Scene  # Its penalty is ε̂. With multipliers it is the scale of the contact decision.
@@ -85,7 +85,7 @@ class Problem:
     unit: str  # The unit of the penalties, as "E/h"; empty if they are ε̂ itself
     meshes: tuple[int, ...]  # From coarse to fine
     penalties: tuple[float, ...]  # From soft to stiff, in the unit
-    pose: Callable[[int, float, Traits], PosedProblem]  # From mesh, penalty and the traits of a formulation
+    pose: Callable[[int, float, Traits], ProblemInstance]  # From mesh, penalty and the traits of a formulation
     rank: int = 100  # Pages show problems of lower rank first.
 
 
@@ -99,7 +99,7 @@ class Study(Protocol):
     def size(self, mesh: int) -> float:
         """Return the size of the cells of a mesh, in any unit."""
 
-    def pose(self, mesh: int, traits: Traits) -> PosedProblem:
+    def pose(self, mesh: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh for formulations of these traits."""
 
     def group(self, traits: Traits) -> str:

@@ -33,7 +33,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
-from contactverif.problems.problem import PosedProblem, Problem
+from contactverif.problems.problem import Problem, ProblemInstance
 
 Role = Literal["inner", "outer"]
 SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
@@ -262,7 +262,7 @@ class RingStudy:
         penalty = inf if traits.enforcement == "multiplier" else self.penalty
         return self.problem.finite(self.slave, penalty, "reference" if traits.area == "reference" else "current")
 
-    def pose(self, refine: int, traits: Traits) -> PosedProblem:
+    def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh.
 
         The ends of a quarter are held across their line of symmetry, and bear what contact does there.
@@ -276,7 +276,7 @@ class RingStudy:
             moves: FloatArray = outwards * places / np.linalg.norm(places, axis=1)[:, None]
             return moves
 
-        return PosedProblem(
+        return ProblemInstance(
             scene=scene,
             forces=partial(self._forces, scene.interface, fit),
             motions=(motion,),
@@ -308,7 +308,7 @@ class RingStudy:
 FIT = ShrinkFit(interference=1e-2)  # The interference is larger than the height of a facet.
 
 
-def _pose(refine: int, penalty: float, traits: Traits) -> PosedProblem:
+def _pose(refine: int, penalty: float, traits: Traits) -> ProblemInstance:
     return RingStudy(FIT, "inner", penalty).pose(refine, traits)
 
 

@@ -26,7 +26,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.problems.blocks import exact_unknowns, pressure_of
-from contactverif.problems.problem import Errors, PosedProblem
+from contactverif.problems.problem import Errors, ProblemInstance
 
 CONDITION_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r"
 STRESS_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂ + M U/ℓ)/p"
@@ -105,7 +105,7 @@ def uniform_forces(interface: Interface, pressure: float) -> FloatArray:
     return forces
 
 
-def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> PosedProblem:
+def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> ProblemInstance:
     """Return the problem of a scene whose exact pressure is uniform, with its exact unknowns (n_free,)."""
     interface = scene.interface
     exact_moves = scene.positions(exact).reshape(-1, 2) - interface.nodes
@@ -118,7 +118,7 @@ def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> PosedProbl
             squares += [integrals @ (field**2).sum(axis=1) for field in fields]
         return {"displacement": float(np.sqrt(squares[0] / squares[1]))}
 
-    return PosedProblem(
+    return ProblemInstance(
         scene=scene,
         forces=lambda _: uniform_forces(interface, pressure),
         pressure=lambda places: np.full(len(places), pressure),
@@ -128,7 +128,7 @@ def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> PosedProbl
     )
 
 
-def pose_blocks(case: Case, traits: Traits) -> PosedProblem:
+def pose_blocks(case: Case, traits: Traits) -> ProblemInstance:
     """Return the problem of two blocks under a uniform pressure, from their case."""
     scene = scene_of(case)
     penalty = np.inf if traits.enforcement == "multiplier" else case.penalty

@@ -30,7 +30,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import grid_cells
-from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, PosedProblem, Problem, Studies
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies
 
 UPPER, LOWER = 0, 1
 COLUMNS = (6, 8)  # The number of cells along the upper and the lower surface of the coarsest mesh.
@@ -216,7 +216,7 @@ class WavyStudy:
         problem = WavyProblem()
         return self.stiffness * problem.young[UPPER] * min(self.columns) * refine / problem.wavelength
 
-    def pose(self, refine: int, traits: Traits) -> PosedProblem:
+    def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh."""
         penalty = self.penalty(refine)
         multipliers = traits.enforcement == "multiplier"
@@ -231,7 +231,7 @@ class WavyStudy:
         # A pressure that is constant on each slave segment leaves h/√12 of a slope p1 k sin kx, and sin² has the
         # mean 1/2.
         segment = problem.wavelength / (self.columns[self.slave] * refine)
-        return PosedProblem(
+        return ProblemInstance(
             scene=scene,
             forces=partial(problem.forces, scene.interface, self.slave),
             motions=(partial(motion, self.slave), partial(motion, 1 - self.slave)),
@@ -358,7 +358,7 @@ CURVED_STUDIES = Studies(
 )
 
 
-def _pose(refine: int, stiffness: float, traits: Traits) -> PosedProblem:
+def _pose(refine: int, stiffness: float, traits: Traits) -> ProblemInstance:
     return WavyStudy(UPPER, stiffness).pose(refine, traits)
 
 

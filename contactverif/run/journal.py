@@ -53,7 +53,7 @@ class RecordFile:
         """
         if self._file is None or len(message) > _LARGEST:
             return None
-        place, data = self._end, _framed(message)
+        place, data = self._end, _frame(message)
         try:
             written = self._file.write(data)
             if written < len(data):  # The next attempt says what is wrong.
@@ -119,7 +119,7 @@ def write_record(path: Path, record: msgspec.Struct) -> None:
     """Write a file with one record, whole and on the disk."""
     part = path.with_name(f".{path.name}.part")
     with open(part, "wb") as file:
-        file.write(_framed(msgspec.msgpack.encode(record)))
+        file.write(_frame(msgspec.msgpack.encode(record)))
         file.flush()
         os.fsync(file.fileno())
     os.replace(part, path)
@@ -131,10 +131,10 @@ def read_record(path: Path, kind: type[_Record]) -> _Record | None:
         message = read_message(file, 0)
         if message is None or file.read(1):
             return None
-    return decoded(message, msgspec.msgpack.Decoder(kind))
+    return decode(message, msgspec.msgpack.Decoder(kind))
 
 
-def decoded(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Record | None:
+def decode(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Record | None:
     """Return the record of a message; None if it is none of these."""
     try:
         return decoder.decode(message)
@@ -142,7 +142,7 @@ def decoded(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Recor
         return None
 
 
-def _framed(message: bytes) -> bytes:
+def _frame(message: bytes) -> bytes:
     return _FRAME.pack(len(message), zlib.crc32(message)) + message
 
 

@@ -210,8 +210,8 @@ class RunJobs:
     def check_written(self) -> None:
         """Check that all outcomes are kept."""
         if self._journal.trouble and self._journal.folder is not None:
-            found = f"{self._journal.folder.name}: {self._journal.trouble}"
-            raise MisuseError("--out", found, "a disk with room")
+            trouble = f"{self._journal.folder.name}: {self._journal.trouble}"
+            raise MisuseError("--out", trouble, "a disk with room")
 
     @property
     def _open_rows(self) -> list[OpenRow]:
@@ -227,13 +227,13 @@ class RunJobs:
         for group in groups.values():
             if group[0].listed is not None:
                 for row in group:
-                    yield from self._listed(row, group[0].listed)
+                    yield from self._judge_list(row, group[0].listed)
             elif self._share is None:
                 yield self._blocks(group, 0)
             else:
                 yield from (self._blocks(group, n) for n in range(draw.number_of_blocks(self._sampling.examples)))
 
-    def _listed(self, row: OpenRow, cases: tuple[Case, ...]) -> Iterator[Iterable[Job]]:
+    def _judge_list(self, row: OpenRow, cases: tuple[Case, ...]) -> Iterator[Iterable[Job]]:
         chunks = in_chunks(cases, LIST_CHUNK)
         yield from [self._expect(row, chunks, len(cases), last=True)] if self._share is None else []
         yield from (self._judge(row, chunk) for chunk in chunks)
@@ -281,20 +281,20 @@ class RunJobs:
         """Return the number of cases of a row, once a block is drawn."""
         return block.number * BLOCK + block.count if block.exhausted else self._sampling.examples
 
-    def _add_drawn(self, group: Sequence[OpenRow], number: int, drawn: DrawnCases) -> Iterable[Job]:
+    def _add_drawn(self, group: Sequence[OpenRow], number: int, cases: DrawnCases) -> Iterable[Job]:
         """Return the jobs to judge a block, then those of the next block."""
         if number == 0:
-            for chunk in drawn.chunks[: -(-WHOLE // CHUNK)]:
+            for chunk in cases.chunks[: -(-WHOLE // CHUNK)]:
                 chunk.keep()
-        count = sum(chunk.count for chunk in drawn.chunks)
-        block = BlockRecord(self._sampling.block_name(group[0].question), number, count, drawn.exhausted, drawn.last)
+        count = sum(chunk.count for chunk in cases.chunks)
+        block = BlockRecord(self._sampling.block_name(group[0].question), number, count, cases.exhausted, cases.last)
         self._journal.add_block(block)
-        judging = chain.from_iterable(self._judge(row, chunk) for row in group for chunk in drawn.chunks)
+        judging = chain.from_iterable(self._judge(row, chunk) for row in group for chunk in cases.chunks)
         if self._share is not None:
             return judging
         planned = self._count_planned(block)
-        finished = [self._expect(row, drawn.chunks, planned, last=drawn.last) for row in group]
-        return chain(*finished, judging, () if drawn.last else self._blocks(group, number + 1))
+        finished = [self._expect(row, cases.chunks, planned, last=cases.last) for row in group]
+        return chain(*finished, judging, () if cases.last else self._blocks(group, number + 1))
 
     def _expect(self, row: OpenRow, chunks: Sequence[CaseChunk], planned: int, *, last: bool) -> Iterable[Job]:
         """Let a row expect the outcomes of chunks; one without any case is complete."""

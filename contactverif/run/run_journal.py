@@ -22,7 +22,7 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import CaseSummary
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
-from contactverif.run.journal import RecordFile, decoded, read_header, read_message, read_messages, record_files
+from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
 
 FORMAT = 2
 WITNESS = -1  # The number of the outcome of a row's witness.
@@ -245,7 +245,7 @@ class KnownOutcomes:
     def _read_file(self, path: Path, start: int) -> None:
         """Note the place of each outcome of a file, up to the first record that is damaged."""
         for place, message in read_messages(path):
-            record = decoded(message, _DECODER)
+            record = decode(message, _DECODER)
             if record is None:
                 return
             if isinstance(record, OutcomeRecord):
@@ -269,7 +269,7 @@ class KnownOutcomes:
                 self._files.pop(next(iter(self._files))).close()
             self._files[file] = self._paths[file].open("rb")
         message = read_message(self._files[file], place)
-        return None if message is None else decoded(message, _DECODER)
+        return None if message is None else decode(message, _DECODER)
 
     def _read_form(self, file: int, place: int) -> OutcomeForm | None:
         record = self._read(file, place)
@@ -321,7 +321,7 @@ def _file_of(folder: str, session: str) -> OutcomeFile:
 
 
 class Journal:
-    """What is known of a run from earlier processes (`sources`), and the folder for what comes; None to keep nothing.
+    """The record of a run by earlier processes (`sources`), and the folder for what comes; None to keep nothing.
 
     `trouble` is the first thing that kept a process from writing; empty if nothing did.
     """

@@ -79,7 +79,7 @@ class Job:
 
 
 class Scheduler:
-    """Does jobs, with the executor or in this process, and reports each step of the progress once."""
+    """A scheduler of jobs, in the executor or in this process, that reports each step of the progress once."""
 
     def __init__(self, executor: Executor | None = None, report: Callable[[Progress], None] | None = None) -> None:
         if isinstance(executor, ThreadPoolExecutor):  # Hypothesis does not allow threads.

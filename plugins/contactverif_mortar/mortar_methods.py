@@ -65,7 +65,7 @@ class Mortar:
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        rows = self.weighting.tangent(interface, self._carried(interface, pairing, z))
+        rows = self.weighting.tangent(interface, self._carry(interface, pairing, z))
         return rows.forces, rows.rest
 
     def factors(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Factors:
@@ -74,9 +74,9 @@ class Mortar:
         The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
         the tangent, or that knows the pressures as unknowns of their own, does not need it.
         """
-        return self.weighting.factors(interface, self._carried(interface, pairing, z))
+        return self.weighting.factors(interface, self._carry(interface, pairing, z))
 
-    def _carried(self, interface: Interface, pairing: Pairing, z: FloatArray) -> Carried:
+    def _carry(self, interface: Interface, pairing: Pairing, z: FloatArray) -> Carried:
         """Return the cells that carry pressures, with the pressures of the slave nodes."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)

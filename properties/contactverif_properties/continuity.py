@@ -1,4 +1,4 @@
-"""Whether the forces change without a jump when the slave slides."""
+"""Ask whether the forces change without a jump when the slave slides."""
 
 from __future__ import annotations
 

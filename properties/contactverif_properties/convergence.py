@@ -1,4 +1,4 @@
-"""Whether forces, pressures and displacements come near to the exact ones where pressures vary or surfaces bend.
+"""Ask whether forces, pressures and displacements come near to the exact ones where pressures vary or surfaces bend.
 
 The problems state their bounds, beside what right and wrong formulations measure. They stand nowhere else.
 """
@@ -19,7 +19,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
 from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_box import HERTZ_STUDIES
-from contactverif.problems.problem import ITERATIONS, Bound, Errors, PosedProblem, Studies, Study
+from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies, Study
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
 from contactverif_properties.patch_flat import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
@@ -31,21 +31,21 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
 
     All errors are kept as series. A number whose errors are not reported is left out.
     """
-    study, lost, rows = studies.read(case), [], []
+    study, failures, rows = studies.read(case), [], []
     for mesh in study.meshes:
-        posed = study.pose(mesh, subject.traits)
-        solution = solve_for_accuracy(posed.scene, subject, posed.start, posed.step)
-        largest = float(np.abs(posed.exact_forces(solution.state)).max())
+        instance = study.pose(mesh, subject.traits)
+        solution = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
+        largest = float(np.abs(instance.exact_forces(solution.state)).max())
         if not solution.is_balanced_to(studies.nearly * largest):
-            lost.append(f"mesh {mesh}: {solution.end}")
-        rows.append(posed.errors(solution) | {ITERATIONS: float(solution.n_iterations)})
-    undecided = f"Newton's method finds no solution on {', '.join(lost)}" if lost else ""
+            failures.append(f"mesh {mesh}: {solution.end}")
+        rows.append(instance.errors(solution) | {ITERATIONS: float(solution.n_iterations)})
+    undecided = f"Newton's method finds no solution on {', '.join(failures)}" if failures else ""
     details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: rows[-1][ITERATIONS]}
     errors = _by_kind(rows)
     series = {name: np.array(errors[kind]) for name, kind in studies.series.items() if kind in errors}
     group = study.group(subject.traits)
     numbers = [
-        bound.quantity.check(_value(bound, study, errors), _tolerance(bound, group, posed))
+        bound.quantity.check(_value(bound, study, errors), _tolerance(bound, group, instance))
         for bound in studies.bounds
         if errors.keys() >= set(bound.kinds)
     ]
@@ -66,7 +66,7 @@ def _value(bound: Bound, study: Study, errors: dict[str, list[float]]) -> float:
     return min(fit_rate(sizes, errors[kind]) for kind in bound.kinds)
 
 
-def _tolerance(bound: Bound, group: str, finest: PosedProblem) -> float:
+def _tolerance(bound: Bound, group: str, finest: ProblemInstance) -> float:
     limit = bound.limit(group)
     return limit * max(finest.best[kind] for kind in bound.kinds) if bound.of_best else limit
 

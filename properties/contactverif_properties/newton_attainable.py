@@ -1,4 +1,4 @@
-"""Whether Newton's method attains the accuracy that the conditioning allows."""
+"""Ask whether Newton's method attains the accuracy that the conditioning allows."""
 
 from __future__ import annotations
 

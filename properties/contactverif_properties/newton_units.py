@@ -1,4 +1,4 @@
-"""Whether Newton's method takes the same steps in other units."""
+"""Ask whether Newton's method takes the same steps in other units."""
 
 from __future__ import annotations
 

@@ -131,13 +131,13 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
     details: dict[str, float] = {}
     undecided = ""
     for refine in REFINEMENTS:
-        posed = study.pose(refine, subject.traits)
-        solution = solve_for_accuracy(posed.scene, subject)
+        instance = study.pose(refine, subject.traits)
+        solution = solve_for_accuracy(instance.scene, subject)
         if not solution.balanced:
             return Measurement(undecided=f"Newton's method: {solution.end} at refine = {refine}")
         undecided = undecided or _lost_end(solution)
         means.append(_mean_errors(solution, fit, study.slave))
-        forces = posed.errors(solution)[FORCES[0]]
+        forces = instance.errors(solution)[FORCES[0]]
         details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": forces}
     coarse, fine = means
     details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf

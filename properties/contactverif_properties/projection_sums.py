@@ -1,4 +1,4 @@
-"""What contact points add up to: areas of competence to the slave's length, pressures to the forces on it."""
+"""The sums over contact points: areas of competence to the slave's length, pressures to the forces on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether an answer depends on the question alone."""
+"""Ask whether an answer depends on the question alone."""
 
 from __future__ import annotations
 

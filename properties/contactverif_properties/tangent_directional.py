@@ -1,4 +1,4 @@
-"""Whether the tangent is the derivative of the residual, along some directions."""
+"""Ask whether the tangent is the derivative of the residual, along some directions."""
 
 from __future__ import annotations
 

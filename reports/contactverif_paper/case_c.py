@@ -32,7 +32,7 @@ _ENDS = {end.label.replace(" ", "_"): int(end) for end in End}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ends:
-    """How Newton's method ends with VTS-ME, over the penalty."""
+    """The end of Newton's method with VTS-ME, over the penalty."""
 
     end: Annotated[IntArray, Column("scene penalty", "1", "how Newton's method ended with VTS-ME", meanings=_ENDS)]
     scene: Annotated[tuple[str, ...], Column("scene", WORDS, "scene, as on the command line")] = SCENES

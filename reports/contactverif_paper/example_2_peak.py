@@ -107,8 +107,8 @@ def plot(study: PeakStudy) -> Figure:
     meshes.set_xlabel("element size in the middle (length)")
     meshes.set_ylabel("largest pressure\n(10⁶ force / length)")
     slopes.axhline(0.0, **REFERENCE_LINE)
-    shown = [FORMULATIONS.index(row) for row in EXPLAINED]
-    plot_series(slopes, Series(EXPLAINED, np.array(SLOPES), study.excess_over_slopes[shown]))
+    numbers = [FORMULATIONS.index(row) for row in EXPLAINED]
+    plot_series(slopes, Series(EXPLAINED, np.array(SLOPES), study.excess_over_slopes[numbers]))
     slopes.set_xlabel("a/R over that of the paper (–)")
     slopes.set_ylabel("excess over Hertz\non springs (–)")
     for axes in (meshes, slopes):
@@ -121,8 +121,8 @@ def plot(study: PeakStudy) -> Figure:
 def datasets(study: PeakStudy) -> dict[str, xr.Dataset]:
     """Return the study."""
     solutions = variables_of(study.solutions, "formulation mesh")
-    shown = {name: solutions[name] for name in ("largest", "half_width")}
-    return {"": xr.Dataset(variables_of(study) | shown)}
+    columns = {name: solutions[name] for name in ("largest", "half_width")}
+    return {"": xr.Dataset(variables_of(study) | columns)}
 
 
 def _solve_size(factor: float) -> DiskSolution:

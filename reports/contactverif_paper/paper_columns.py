@@ -22,7 +22,7 @@ WORDS = "words"  # Stands in place of a unit where a field holds words.
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """What `paper.nc` says of a field or property of an item's data."""
+    """The words of `paper.nc` about a field or property of an item's data."""
 
     dims: str  # The names of its dimensions, with blanks between them; empty for one number.
     units: str
@@ -39,16 +39,16 @@ class Column:
         values = [None if value is None else _part(value, self.part) for value in values]
         axes = [*dims.split(), *self.dims.split()]
         if self.units == WORDS:
-            return words(axes, _shaped(values, shape, ""), self.meaning, self.comment)
+            return words(axes, _shape_entries(values, shape, ""), self.meaning, self.comment)
         if self.meanings is not None:
-            array, fill = _shaped(values, shape, self.fill), None if self.fill is None else int(self.fill)
+            array, fill = _shape_entries(values, shape, self.fill), None if self.fill is None else int(self.fill)
             return codes(axes, array, self.meanings, self.meaning, self.comment, fill=fill)
-        array = self._padded(values, shape) if shape and self.dims else np.asarray(_shaped(values, shape, np.nan))
+        array = self._pad(values, shape) if shape and self.dims else np.asarray(_shape_entries(values, shape, np.nan))
         if array.dtype.kind == "i":
             array = array.astype(np.int32)
         return numbers(axes, array, self.meaning, self.units, self.comment, fill=self.fill)
 
-    def _padded(self, values: Sequence[Any], shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
+    def _pad(self, values: Sequence[Any], shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
         """Return the rows of all cells as one array (*shape, longest)."""
         rows = [np.zeros(0) if value is None else np.atleast_1d(value) for value in values]
         return np.array(list(itertools.zip_longest(*rows, fillvalue=self.pad))).T.reshape(*shape, -1)
@@ -118,7 +118,7 @@ def _part(value: Any, part: str) -> Any:
     return [getattr(entry, part) for entry in value] if isinstance(value, tuple) else getattr(value, part)
 
 
-def _shaped(values: Sequence[Any], shape: tuple[int, ...], missing: Any) -> Any:
+def _shape_entries(values: Sequence[Any], shape: tuple[int, ...], missing: Any) -> Any:
     """Return one entry for each cell as nested lists; the value of the only cell for a table without dimensions."""
     if not shape:
         return values[0]

@@ -28,7 +28,7 @@ from contactverif_paper.patch_solutions import PatchSetup, PatchSolution, patch_
 
 @dataclass(frozen=True, slots=True)
 class PrintedForces:
-    """What a figure of the paper prints of the forces on the master, from left to right: "3/2 3 7/2 3 1"."""
+    """The forces on the master that a figure of the paper prints, from left to right: "3/2 3 7/2 3 1"."""
 
     figure: str
     claim: str
@@ -38,7 +38,7 @@ class PrintedForces:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """What an item computes beside its patch tests."""
+    """The numbers that an item computes beside its patch tests."""
 
     name: str  # Its group.
     compute: Callable[[], Any]
@@ -117,11 +117,11 @@ def _datasets(printed: PrintedForces | None, study: Study | None, tests: PatchTe
 
 def _patch_dataset(patches: tuple[PatchSolution, ...]) -> xr.Dataset:
     """Return pressures, stress errors and displacements; nothing stands where a figure does not show a formulation."""
-    shown = tuple(shown_formulations(patches))
-    cells = [[{curve.formulation: curve for curve in patch.curves}.get(row) for row in shown] for patch in patches]
+    rows = tuple(shown_formulations(patches))
+    cells = [[{curve.formulation: curve for curve in patch.curves}.get(row) for row in rows] for patch in patches]
     comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"
     return xr.Dataset(
-        {column.name: column.variable([shown], "", ()) for column in name_columns("formulation")}
+        {column.name: column.variable([rows], "", ()) for column in name_columns("formulation")}
         | variables_of([patch.setup for patch in patches], "scene")
         | variables_of(patches, "scene")
         | variables_of(cells, "scene formulation"),

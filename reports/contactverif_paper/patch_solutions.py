@@ -109,7 +109,7 @@ class Curve:
 
     @property
     def end(self) -> Annotated[str, Column("", WORDS, "how Newton's method ended")]:
-        """How Newton's method ended."""
+        """The end of Newton's method."""
         return self.solution.end
 
     @property

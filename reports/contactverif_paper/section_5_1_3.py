@@ -32,10 +32,10 @@ def compute(report_progress: Progress) -> TwoPasses:
     report_progress("Section 5.1.3, over the penalty")
     patch = patch_solution(case_b.PATCH)
     passes = (NTS_AR, TWO_PASS)
-    one, two = (patch.curve(row).departure for row in passes)
+    single, double = (patch.curve(row).departure for row in passes)
     moderate_one, moderate_two = (moderate_error(row, "b") for row in passes)
     limit = stiffness_limit(case_b.PATCH, two_passes_are_no_better)
-    return TwoPasses((one, two), (moderate_one, moderate_two), limit)
+    return TwoPasses((single, double), (moderate_one, moderate_two), limit)
 
 
 def two_passes_are_no_better(departure: dict[PaperFormulation, float]) -> bool:
@@ -45,15 +45,15 @@ def two_passes_are_no_better(departure: dict[PaperFormulation, float]) -> bool:
 
 def statements(errors: TwoPasses) -> tuple[Statement, ...]:
     """Say up to which penalty the claim holds."""
-    (one, two), (moderate_one, moderate_two) = errors.departure, errors.stress_error
-    agreement = Agreement.decide(two >= one, always=moderate_two >= moderate_one)
+    (single, double), (moderate_one, moderate_two) = errors.departure, errors.stress_error
+    agreement = Agreement.decide(double >= single, always=moderate_two >= moderate_one)
     condition = f"ε̂ ≤ {errors.limit:.2f} E per unit of length" if agreement is Agreement.CONDITIONAL else ""
     return (
         Statement(
             "Section 5.1.3",
             "case B: two passes with a penalty do not come nearer than one",
-            f"at the soft penalty of Fig. 18 pressures depart by up to {two:.2f} from the exact one with "
-            f"two passes and by {one:.2f} with one. At ε̂ = 10 E/h the error of the stress is "
+            f"at the soft penalty of Fig. 18 pressures depart by up to {double:.2f} from the exact one with "
+            f"two passes and by {single:.2f} with one. At ε̂ = 10 E/h the error of the stress is "
             f"{moderate_one / moderate_two:.0f} times smaller with two, which lock",
             agreement,
             "fig18",

@@ -74,8 +74,8 @@ def statements(section: Section71) -> tuple[Statement, ...]:
 
 def _quality_statement(section: Section71) -> Statement:
     holds = all(row[0] <= min(row[1:]) for row in section.departure)
-    one, two = section.stress_error
-    agreement = Agreement.decide(holds, always=one <= two)
+    single, double = section.stress_error
+    agreement = Agreement.decide(holds, always=single <= double)
     rows = " and ".join(f"{ar:.2f} (NTS {nts:.2f}, two-pass {passes:.2f})" for ar, nts, passes in section.departure)
     limits = ", ".join(
         f"ε̂ ≤ {limit:.2f} E per unit of length in {setup.title}"
@@ -85,7 +85,7 @@ def _quality_statement(section: Section71) -> Statement:
         "Section 7.1",
         "Examples 1 and 1bis: NTS-AR fails, but does well beside NTS and two-pass NTS-AR",
         f"at the soft penalty of the figures pressures of NTS-AR depart by up to {rows}. At ε̂ = 10 E/h two passes have "
-        f"the smaller error of the stress, {number(two, 2)} to {number(one, 2)} in "
+        f"the smaller error of the stress, {number(double, 2)} to {number(single, 2)} in "
         "Example 1",
         agreement,
         "fig33",

@@ -113,10 +113,10 @@ def test_either_body_may_be_the_slave() -> None:
 
 def test_displacements_of_another_code_have_the_errors_of_the_solution_that_they_are_of() -> None:
     subject = load_subject("mortar")
-    posed = WAVY.pose(2, 30.0, subject.traits)
-    ours = solve_for_accuracy(posed.scene, subject, posed.start, posed.step)
-    theirs = Solution.from_displacements(posed.scene, ours.displacements)
+    instance = WAVY.pose(2, 30.0, subject.traits)
+    ours = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
+    theirs = Solution.from_displacements(instance.scene, ours.displacements)
     assert theirs.balanced
-    errors = posed.errors(ours)
+    errors = instance.errors(ours)
     del errors["pressure"]  # Displacements say nothing of reported pressures.
-    assert posed.errors(theirs) == {kind: pytest.approx(error, rel=1e-2) for kind, error in errors.items()}
+    assert instance.errors(theirs) == {kind: pytest.approx(error, rel=1e-2) for kind, error in errors.items()}

@@ -64,10 +64,10 @@ def test_the_master_forces_of_others_do_not_converge_even_at_a_fixed_penalty(nam
 @pytest.mark.parametrize(("make", "name"), [(ClippedCells, "sts"), (WeightedGaps, "mortar")])
 def test_a_stranger_who_clips_cells_has_the_same_errors(make: type, name: str) -> None:
     def errors_of(subject: Subject) -> Errors:
-        posed = HertzStudy(parabola_is_slave=False, stiffness=1.0).pose(COARSEST, subject.traits)
-        solution = solve_for_accuracy(posed.scene, subject, posed.start)
+        instance = HertzStudy(parabola_is_slave=False, stiffness=1.0).pose(COARSEST, subject.traits)
+        solution = solve_for_accuracy(instance.scene, subject, instance.start)
         assert solution.balanced
-        return posed.errors(solution)
+        return instance.errors(solution)
 
     theirs, ours = errors_of(Subject(make.__name__, make)), errors_of(load_subject(name))
     assert len(theirs) == 6

@@ -81,8 +81,8 @@ def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: s
 def test_errors_are_those_of_the_properties() -> None:
     """Properties keep the matrix of Newton's method, a bench does not: both are out of balance by 1e-9 at most."""
     subject = load_subject("nts-ar")
-    posed = PROBLEMS["hertz"].pose(16, 10.0, subject.traits)
-    expected = posed.errors(solve_for_accuracy(posed.scene, subject, posed.start, posed.step))
+    instance = PROBLEMS["hertz"].pose(16, 10.0, subject.traits)
+    expected = instance.errors(solve_for_accuracy(instance.scene, subject, instance.start, instance.step))
     errors = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"].errors
     assert errors["forces"] == pytest.approx(max(expected[kind] for kind in FORCES), rel=1e-6)
     assert errors["pressure"] == pytest.approx(expected[PRESSURE], rel=1e-6)
@@ -91,8 +91,8 @@ def test_errors_are_those_of_the_properties() -> None:
 
 def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
     subject = load_subject("vts-ppt")
-    posed = pose(WAVY, subject, 0)
-    (trace,) = solve_in_tries(posed.scene, subject.for_case(posed.first_guess), posed.start, posed.step)
+    instance = pose(WAVY, subject, 0)
+    (trace,) = solve_in_tries(instance.scene, subject.for_case(instance.first_guess), instance.start, instance.step)
     counts = run_cell(WAVY, [subject], 1, 0).runs["vts-ppt"].counts
     assert list(counts) == list(COUNTS)
     assert counts["iterations"] == trace.n_iterations
@@ -171,7 +171,7 @@ def note(output: Path, *cells: tuple[int, CellRecord]) -> None:
             journal.add(number, record)
 
 
-def finished(output: Path, header: Header = HEADER) -> dict[int, CellRecord]:
+def finished_cells(output: Path, header: Header = HEADER) -> dict[int, CellRecord]:
     with closing(Journal(output, header)) as journal:
         return journal.finished
 
@@ -181,9 +181,9 @@ def test_a_torn_record_is_left_out_and_another_plan_is_refused(tmp_path: Path) -
     note(output, (0, RECORD), (2, RECORD))
     (path,) = record_files(tmp_path / "a.nc.journal")
     path.write_bytes(path.read_bytes()[:-1])
-    assert finished(output) == {0: RECORD}
+    assert finished_cells(output) == {0: RECORD}
     note(output, (1, RECORD))
-    assert finished(output) == {0: RECORD, 1: RECORD}
+    assert finished_cells(output) == {0: RECORD, 1: RECORD}
     for other in ({"formulations": ("b",)}, {"versions": {}}):
         with pytest.raises(MisuseError, match="the journal of another bench"):
             Journal(output, msgspec.structs.replace(HEADER, **other))
@@ -195,12 +195,12 @@ def test_a_record_that_is_none_is_not_believed(tmp_path: Path, message: bytes) -
     note(output, (0, RECORD), (1, replace(RECORD, runs={"b": RunRecord()})))
     with closing(RecordFile(tmp_path / "a.nc.journal")) as file:
         file.append(message)
-    assert finished(output) == {0: RECORD}
+    assert finished_cells(output) == {0: RECORD}
 
 
 @pytest.mark.parametrize("header", [b"", b"{", b"\xff" * 100])
 def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
-    finished(tmp_path / "a.nc")
+    finished_cells(tmp_path / "a.nc")
     (tmp_path / "a.nc.journal" / "header").write_bytes(header)
     with pytest.raises(MisuseError, match=r"--out: found a.nc.journal with a damaged header; needed an undamaged"):
         Journal(tmp_path / "a.nc", HEADER)

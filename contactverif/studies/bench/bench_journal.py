@@ -14,7 +14,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.run.journal import (
     RecordFile,
     begin_journal,
-    decoded,
+    decode,
     journal_folder,
     read_header,
     read_messages,
@@ -25,14 +25,14 @@ from contactverif.studies.bench.cell_runs import CellRecord
 
 
 class Header(msgspec.Struct, frozen=True):
-    """What must agree before a killed bench goes on."""
+    """The facts that must agree before a killed bench goes on."""
 
     bench: BenchPlan
     formulations: tuple[str, ...]
     versions: dict[str, str]
 
     @classmethod
-    def of(cls, plan: BenchPlan, names: Sequence[str], provenance: Mapping[str, str]) -> Header:
+    def from_plan(cls, plan: BenchPlan, names: Sequence[str], provenance: Mapping[str, str]) -> Header:
         """Return the header of a bench of some formulations, with the versions of its provenance."""
         versions = {key: fact for key, fact in provenance.items() if key.endswith("_version") or key == "commit"}
         return cls(plan, tuple(names), versions)
@@ -62,7 +62,7 @@ class Journal:
             raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
         for path in record_files(folder):
             for _, message in read_messages(path):
-                cell = decoded(message, _DECODER)
+                cell = decode(message, _DECODER)
                 if cell is not None and cell.record.runs.keys() == {*header.formulations}:
                     self.finished[cell.number] = cell.record
         self._file = RecordFile(folder)

@@ -18,7 +18,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import Solution
-from contactverif.problems.problem import Errors, PosedProblem, Problem
+from contactverif.problems.problem import Errors, Problem, ProblemInstance
 from contactverif.problems.uniform_stress import pose_blocks
 from contactverif.run.draw import draw_cases
 from contactverif.run.registry import load_problems
@@ -109,7 +109,7 @@ def _grid(name: str, problem: Problem, *, quick: bool) -> list[Cell]:
     return [Cell(name, mesh, stiffness) for stiffness, mesh in product(penalties, meshes)]
 
 
-def pose(cell: Cell, subject: Subject, seed: int) -> PosedProblem:
+def pose(cell: Cell, subject: Subject, seed: int) -> ProblemInstance:
     """Return the problem that a formulation solves in a cell; the seed is that of the random scenes."""
     if cell.scene == RANDOM:
         return pose_blocks(random_cases(seed, cell.mesh + 1)[cell.mesh], subject.traits)
@@ -132,10 +132,10 @@ def random_cases(seed: int, count: int) -> tuple[Case, ...]:
     return draw_cases(source, seed=f"bench {seed}", examples=count).cases
 
 
-def largest_errors(posed: PosedProblem, solution: Solution) -> Errors:
+def largest_errors(instance: ProblemInstance, solution: Solution) -> Errors:
     """Return the largest error of each kind of a bench, such as "forces" of "slave forces" and "master forces"."""
     largest: Errors = {}
-    for name, error in posed.errors(solution).items():
+    for name, error in instance.errors(solution).items():
         kind = name.rpartition(" ")[2]
         if kind in ERRORS:
             largest[kind] = max(largest.get(kind, error), error)

@@ -41,7 +41,7 @@ def run_bench(
     del provenance["profile"], provenance["examples"]  # A bench has neither.
     names = [subject.name for subject in loaded]
     with ExitStack() as stack:
-        header = Header.of(plan, names, provenance)
+        header = Header.from_plan(plan, names, provenance)
         journal = stack.enter_context(closing(Journal(output, header))) if output else None
         records = _run_cells(loaded, plan, journal, progress or _show_nothing)
     not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)} | plan.not_loaded

@@ -52,7 +52,7 @@ class CellRecord:
 def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -> CellRecord:
     """Solve a cell with all formulations, in turns."""
     runners = [_Runner(subject, cell, seed) for subject in subjects]
-    scene = runners[0].posed.scene
+    scene = runners[0].instance.scene
     for runner in runners:
         runner.warm_up()
     yardstick = []
@@ -80,16 +80,16 @@ class _Runner:
     """One formulation in one cell, with its record so far."""
 
     def __init__(self, subject: Subject, cell: Cell, seed: int) -> None:
-        self.subject, self.posed, self.record = subject, pose(cell, subject, seed), RunRecord()
+        self.subject, self.instance, self.record = subject, pose(cell, subject, seed), RunRecord()
 
     def warm_up(self) -> None:
         """Solve once without the clock, and record outcome, errors and counts."""
         try:
-            timed, tries = solve_with_clock(self.subject, self.posed)
-            formulation = self.subject.for_case(self.posed.first_guess)
+            timed, tries = solve_with_clock(self.subject, self.instance)
+            formulation = self.subject.for_case(self.instance.first_guess)
             solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
             solved = is_solved(solution)
-            self.record.errors = largest_errors(self.posed, solution) if solved else {}
+            self.record.errors = largest_errors(self.instance, solution) if solved else {}
         except ContractError as error:
             self.record.remark = str(error)
             return
@@ -103,7 +103,7 @@ class _Runner:
         if self.record.outcome == Outcome.CRASHED:
             return
         try:
-            timed, _ = solve_with_clock(self.subject, self.posed)
+            timed, _ = solve_with_clock(self.subject, self.instance)
         except ContractError as error:  # A plugin with a memory may fail later.
             self.record = RunRecord(remark=str(error))
             return

@@ -17,7 +17,7 @@ import numpy as np
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import solve_in_tries
 from contactverif.mechanics.trace import Trace
-from contactverif.problems.problem import PosedProblem
+from contactverif.problems.problem import ProblemInstance
 from contactverif.studies.bench.meter import Meter, add_meter
 from contactverif_reports.bench.results import COUNTS
 
@@ -33,13 +33,13 @@ class TimedSolution:
     counts: dict[str, int]  # The counts by name.
 
 
-def solve_with_clock(subject: Subject, posed: PosedProblem) -> tuple[TimedSolution, tuple[Trace, ...]]:
+def solve_with_clock(subject: Subject, instance: ProblemInstance) -> tuple[TimedSolution, tuple[Trace, ...]]:
     """Solve in this process; return times and counts, and the tries."""
     meter = Meter()
-    formulation = add_meter(subject, posed.first_guess, meter)
+    formulation = add_meter(subject, instance.first_guess, meter)
     wall, start = perf_counter(), process_time()
     with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
-        tries = solve_in_tries(posed.scene, formulation, posed.start, posed.step)
+        tries = solve_in_tries(instance.scene, formulation, instance.start, instance.step)
     total, wall = process_time() - start - meter.excess, perf_counter() - wall - meter.wall_excess
     seconds = meter.seconds | {"solve": sum(trace.seconds["solve"] for trace in tries), "total": total}
     counts = (sum(trace.n_iterations for trace in tries), *(meter.states[name] for name in _COUNTED))
