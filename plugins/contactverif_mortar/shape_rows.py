@@ -19,11 +19,11 @@ from scipy import sparse
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_block
 from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Fields
 from contactverif_mortar.node_groups import RowGroups, find_member
 from contactverif_mortar.node_rows import NodeState, add_chains
-from contactverif_mortar.pressure_shapes import Shapes
 
 PIECE = 4096  # Points.
 MakeGains = Callable[[int, int], FloatArray]  # From the first and the last of some cells: their Δ.

@@ -33,12 +33,12 @@ from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
+from contactverif_mortar.cell_forces import Shapes, integrals
 from contactverif_mortar.covered_ranges import Ranges
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
 from contactverif_mortar.node_factors import NodeRows
 from contactverif_mortar.node_groups import RowGroups, group_nodes
 from contactverif_mortar.node_rows import NodeState
-from contactverif_mortar.pressure_shapes import Shapes, integrals
 from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
 from contactverif_mortar.weighted_gaps import divide_covered, own_lengths
 

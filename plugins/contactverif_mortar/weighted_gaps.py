@@ -19,11 +19,11 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif_mortar import cell_forces
+from contactverif_mortar.cell_forces import Shapes, integrals
 from contactverif_mortar.integration_cells import Cells, Quadrature, Sides
 from contactverif_mortar.node_factors import Factors, NodeRows
 from contactverif_mortar.node_groups import RowGroups, check_product, group_nodes
 from contactverif_mortar.node_rows import NodeState, Weights, node_rows, weigh
-from contactverif_mortar.pressure_shapes import Shapes, integrals
 from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
 
 # The smallest covered share of a node's own length that counts. Below it the node would carry less than the roundoff of

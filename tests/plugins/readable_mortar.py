@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C
-from contactverif_mortar.pressure_shapes import Shapes
 
 
 def _blocks(points: Any, gains: Any, pressure: Any, d_pressure: Any, n_q: int) -> Any:

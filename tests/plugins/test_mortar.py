@@ -16,8 +16,8 @@ from contactverif.mechanics.newton import solve
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.catalogue import load_scene
 from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
+from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.integration_cells import WEIGHT, C, Cells, Quadrature
-from contactverif_mortar.pressure_shapes import Shapes
 from contactverif_mortar.weighted_gaps import UNCOVERED
 
 TWO = Quadrature.gauss(2, current=True)

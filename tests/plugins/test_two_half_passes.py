@@ -11,9 +11,9 @@ from surfaces import DEPTH, make_bent, make_flat
 from contactverif import Interface, Surface
 from contactverif.oracle import uniform_pressure_weights
 from contactverif_mortar import cell_forces, mortar, mortar_two_half_pass
+from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.covered_ranges import Ranges
 from contactverif_mortar.integration_cells import WEIGHT, Cells, Quadrature
-from contactverif_mortar.pressure_shapes import Shapes
 
 CASE_C = [2.0, 2.0, 4.0, 4.0], [3.0, 3.0, 3.0, 3.0]
 TWO, FIVE = (Quadrature.gauss(n, current=True) for n in (2, 5))
