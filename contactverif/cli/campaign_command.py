@@ -10,7 +10,7 @@ import typer
 from contactverif.cli.run_endings import show_what_plugins_printed
 from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, complete_formulation
 from contactverif.cli.verify_command import select_names
-from contactverif.cli.verify_job import VerifyJob, VerifyOptions, make_plan, new_job
+from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
 if TYPE_CHECKING:
     from contactverif.run.campaign import Shard
@@ -60,8 +60,8 @@ def campaign(
     options = VerifyOptions(
         tuple(select_names(names, False, isolation.limits())), tuple(properties or ()), sampling, isolation=isolation
     )
-    job = new_job(options, fresh_seed=_SEED)
-    plan = piece.plan(make_plan(CAMPAIGN, job.options, job.profile))
+    job = new_job(options, fresh_seed=_SEED, command=CAMPAIGN)
+    plan = piece.plan(job.plan())
     made_folder(out, "--out")
     folder = out.absolute() / piece.folder
     if open_shard(folder, plan):
@@ -80,12 +80,11 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
     from contactverif.run.campaign import mark_done
-    from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.run import judge_share
     from contactverif.run.run_journal import Journal
 
-    limits = job.options.isolation.limits()
-    items = [*(load_formulation(name, limits) for name in job.options.names), *load_properties(job.options.properties)]
+    loaded, properties = job.load()
+    items = [*loaded, *properties]
     for item in items:
         if isinstance(item, NotLoaded):
             typer.echo(f"contactverif: {name_line(item.formulation)} does not load: {one_line(item.reason)}", err=True)

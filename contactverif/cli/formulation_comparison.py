@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -11,16 +11,9 @@ from pathlib import Path
 from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
 from contactverif.cli.console import say, show, show_as_it_is
 from contactverif.cli.counterexample_output import draw_outcome
-from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import PAGE, REPORT, PictureFolder
 from contactverif.cli.progress import Bar
-from contactverif.cli.run_endings import (
-    end_journal,
-    exit_status,
-    say_how_to_go_on,
-    show_what_plugins_printed,
-    watch_for_stops,
-    write_files,
-)
+from contactverif.cli.run_endings import end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
 from contactverif.cli.verify_job import VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -92,31 +85,26 @@ def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
                 executor=executor,
                 journal=journal,
             )
-        promises_kept = study.comparison.promises_kept
-        subjects = [plan.reference, *plan.candidates]
-        gap = find_gap(study.run, subjects, plan.properties, job.sampling) if promises_kept else ""
-        # The files are written before anything is shown, so that nothing that was judged is lost.
-        written = _write_results(study, plan, job.files)
-        complete = written.paths == job.files.paths and not gap
-        end_journal(journal, complete=complete)
+        gap = partial(find_gap, study.run, [plan.reference, *plan.candidates], plan.properties, job.sampling)
+        end = end_run(job, journal, gap, _writers(study, plan), promises_kept=study.comparison.promises_kept)
     show(SideBySide(study))
-    _show_meshes(study, plan, job.pictures, on_a_page=PAGE in written.paths)
+    _show_meshes(study, plan, job.pictures, on_a_page=PAGE in end.files.paths)
     show_what_plugins_printed()
-    written.announce()
-    show(f"Not complete: {gap}." if gap else last_line(study.comparison))
-    if not complete:
+    end.files.announce()
+    show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
+    if not end.complete:
         say_how_to_go_on(job)
-    return exit_status(gap, whole=complete and not journal.trouble, promises_kept=promises_kept)
+    return end.status
 
 
-def _write_results(study: Study, plan: ComparisonPlan, files: OutputFiles) -> OutputFiles:
-    """Write the report and the page that the user wants; return those that are there."""
+def _writers(study: Study, plan: ComparisonPlan) -> dict[str, Callable[[Path], None]]:
+    """Return the functions that write the report and the page."""
 
     def write_html(path: Path) -> None:
         drawings = [_page_drawing(differing, plan) for differing in study.differing]
         write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
 
-    return write_files(files, {REPORT: partial(write, study.run), PAGE: write_html})
+    return {REPORT: partial(write, study.run), PAGE: write_html}
 
 
 def _show_meshes(study: Study, plan: ComparisonPlan, folder: PictureFolder | None, *, on_a_page: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
@@ -21,21 +21,8 @@ NOT_WRITTEN = 2  # The exit status if a file could not be written.
 _LINES_OF_A_PLUGIN = 5
 
 
-def write_files(files: OutputFiles, writers: Mapping[str, Callable[[Path], None]]) -> OutputFiles:
-    """Write the files that the user wants; return those that are there. A line says why one is not.
-
-    Parameters
-    ----------
-    files : OutputFiles
-        The files.
-    writers : Mapping[str, Callable[[Path], None]]
-        {suffix: function that writes a file}.
-
-    Returns
-    -------
-    OutputFiles
-        The files that were written.
-    """
+def _write_files(files: OutputFiles, writers: Mapping[str, Callable[[Path], None]]) -> OutputFiles:
+    """Write each file by the function of its suffix, and return those that are there. A line says why one is not."""
     return files.only(
         [suffix for suffix, path in files.paths.items() if _write(writers[suffix], path, files.names[suffix])]
     )
@@ -56,7 +43,7 @@ def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
     return False
 
 
-def end_journal(journal: Journal, *, complete: bool) -> None:
+def _end_journal(journal: Journal, *, complete: bool) -> None:
     """Remove the journal once the files are complete."""
     from contactverif.run.journal import remove_journal
 
@@ -66,39 +53,37 @@ def end_journal(journal: Journal, *, complete: bool) -> None:
         remove_journal(journal.folder)
 
 
-def exit_status(gap: str, *, whole: bool, promises_kept: bool) -> int:
-    """Return the exit status; 0 only if nothing is missing in the run or in its files.
+class End(NamedTuple):
+    """What a run came to."""
 
-    Parameters
-    ----------
-    gap : str
-        What was not judged; empty if nothing is missing.
-    whole : bool
-        All files are complete, and so was the journal.
-    promises_kept : bool
-        Every promise is kept, and every property was judged.
+    files: OutputFiles  # Those that were written.
+    gap: str  # What was not judged; empty if nothing is missing.
+    complete: bool
+    status: int  # The exit status; 0 only if nothing is missing in the run or in its files, and promises are kept.
 
-    Returns
-    -------
-    int
-        0 to 2.
-    """
+
+def end_run(
+    job: VerifyJob,
+    journal: Journal,
+    find_gap: Callable[[], str],
+    writers: Mapping[str, Callable[[Path], None]],
+    *,
+    promises_kept: bool,
+) -> End:
+    """Write the files before anything is shown, so that nothing that was judged is lost, and remove the journal."""
+    gap = find_gap() if promises_kept else ""
+    written = _write_files(job.files, writers)
+    complete = written.paths == job.files.paths and not gap
+    _end_journal(journal, complete=complete)
     if gap:
-        return 1
-    if not whole:
-        return NOT_WRITTEN
-    return 0 if promises_kept else 1
+        return End(written, gap, complete, 1)
+    whole = complete and not journal.trouble
+    return End(written, gap, complete, (0 if promises_kept else 1) if whole else NOT_WRITTEN)
 
 
 @contextmanager
 def watch_for_stops(job: VerifyJob) -> Iterator[None]:
-    """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on.
-
-    Raises
-    ------
-    typer.Exit
-        With the status 130, after Ctrl-C.
-    """
+    """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on."""
     from contactverif.cli.console import show
     from contactverif.cli.run_tables import RunTable
     from contactverif.run.run import RunStopped

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.run_endings import (
-    end_journal,
-    exit_status,
-    say_how_to_go_on,
-    show_what_plugins_printed,
-    watch_for_stops,
-    write_files,
-)
+from contactverif.cli.run_endings import End, end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
 from contactverif.cli.shared_options import (
     FormulationNames,
     IsolationOptions,
@@ -107,16 +101,13 @@ def verify(
 def run_job(job: VerifyJob) -> int:
     """Judge what a job says, show the tables and write the files; return the exit status."""
     from contactverif.cli.progress import Bar
-    from contactverif.run.registry import load_formulation, load_properties
     from contactverif.run.rows import find_gap
     from contactverif.run.run import run
     from contactverif.run.scheduler import worker_pool
 
-    limits = job.options.isolation.limits()
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            questions = load_properties(job.options.properties)
-            subjects = [load_formulation(name, limits) for name in job.options.names]
+            subjects, questions = job.load()
             journal = stack.enter_context(job.journal())
             result = run(
                 subjects,
@@ -129,24 +120,20 @@ def run_job(job: VerifyJob) -> int:
                 executor=executor,
                 journal=journal,
             )
-        gap = find_gap(result, subjects, questions, job.sampling) if result.promises_kept else ""
-        # The files are written before anything is shown, so that nothing that was judged is lost.
-        written = write_results(result, job.files)
-        complete = written.paths == job.files.paths and not gap
-        end_journal(journal, complete=complete)
-    _show_results(result, subjects, questions, written, job.pictures, gap)
-    if not complete:
+        gap = partial(find_gap, result, subjects, questions, job.sampling)
+        end = end_run(job, journal, gap, _writers(result, job.files), promises_kept=result.promises_kept)
+    _show_results(result, subjects, questions, end, job.pictures)
+    if not end.complete:
         say_how_to_go_on(job)
-    return exit_status(gap, whole=complete and not journal.trouble, promises_kept=result.promises_kept)
+    return end.status
 
 
 def _show_results(
     result: Run,
     subjects: Sequence[Subject | NotLoaded],
     questions: Sequence[Property | NotLoaded],
-    files: OutputFiles,
+    end: End,
     folder: PictureFolder | None,
-    gap: str,
 ) -> None:
     """Show the table, the counterexamples, the names of the files, and the last line."""
     from contactverif.cli.console import show
@@ -156,16 +143,16 @@ def _show_results(
     show(RunTable(result))
     if remark := result.provenance.get("drawing"):
         show(f"{remark}.")
-    _show_counterexamples(result, subjects, questions, files, folder)
+    _show_counterexamples(result, subjects, questions, end.files, folder)
     show_what_plugins_printed()
-    files.announce()
-    if REPORT not in files.names and (advice := how_to_keep(result)) is not None:
+    end.files.announce()
+    if REPORT not in end.files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
-    show(f"Not complete: {gap}." if gap else summary(result))
+    show(f"Not complete: {end.gap}." if end.gap else summary(result))
 
 
-def write_results(result: Run, files: OutputFiles) -> OutputFiles:
-    """Write the report and the page that the user wants; return those that are there. A line says why one is not."""
+def _writers(result: Run, files: OutputFiles) -> dict[str, Callable[[Path], None]]:
+    """Return the functions that write the report and the page."""
 
     def write_report(path: Path) -> None:
         from contactverif_reports.netcdf.write import write
@@ -178,7 +165,7 @@ def write_results(result: Run, files: OutputFiles) -> OutputFiles:
 
         write_page(path, report_page(result, files.names.get(REPORT, Path("FILE.nc"))), "--out")
 
-    return write_files(files, {REPORT: write_report, PAGE: write_html})
+    return {REPORT: write_report, PAGE: write_html}
 
 
 def _show_counterexamples(

@@ -1,4 +1,4 @@
-"""The job of a run of `verify` or `compare`: its options, checked and with everything settled that a journal must know.
+"""The job that `verify`, `compare`, `campaign` and `merge` share: options with all settled that a journal must know.
 
 An option that changes an outcome is a field of `VerifyOptions`, so that the journal has it.
 """
@@ -22,6 +22,9 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
+    from contactverif.contract.property import Property
+    from contactverif.contract.result import NotLoaded
+    from contactverif.contract.subject import Subject
     from contactverif.run.draw import Sampling
     from contactverif.run.profiles import Profile
     from contactverif.run.run_journal import Journal, Plan
@@ -46,45 +49,27 @@ class VerifyOptions:
 
 @dataclass(frozen=True, slots=True)
 class VerifyJob:
-    """A run of `verify` before it begins.
+    """A run of `verify`, `compare` or `campaign` before it begins, or what `merge` makes of a campaign."""
 
-    Attributes
-    ----------
-    options : VerifyOptions
-        The options. The properties are ids, and the seed is a number.
-    profile : Profile
-        The number of cases and the seed.
-    files : OutputFiles
-        The files to write.
-    pictures : PictureFolder | None
-        The folder of pictures.
-    scene : Case | None
-        The scene on which everything is checked.
-    interface : Interface | None
-        The interface on which everything is checked.
-    known : dict[str, str]
-        {property: reason} of the known failures.
-    sources : tuple[Path, ...]
-        The journals whose outcomes are not judged again.
-    resumes : bool
-        The run goes on with its own journal.
-    again : str
-        The command line that goes on with the run, if it is not that command with `--resume`.
-    command : str
-        The command that judges.
-    """
-
-    options: VerifyOptions
+    options: VerifyOptions  # The properties are ids, and the seed is a number.
     profile: Profile
     files: OutputFiles
     pictures: PictureFolder | None
-    scene: Case | None
-    interface: Interface | None
-    known: dict[str, str]
-    sources: tuple[Path, ...] = ()
-    resumes: bool = False
-    again: str = ""
+    scene: Case | None  # The scene on which everything is checked.
+    interface: Interface | None  # The interface on which everything is checked.
+    known: dict[str, str]  # {property: reason} of the known failures.
+    sources: tuple[Path, ...] = ()  # The journals whose outcomes are not judged again.
+    resumes: bool = False  # The run goes on with its own journal.
+    again: str = ""  # The command line that goes on with the run, if it is not that command with `--resume`.
     command: str = VERIFY
+
+    def load(self) -> tuple[list[Subject | NotLoaded], tuple[Property | NotLoaded, ...]]:
+        """Load the formulations and the properties."""
+        from contactverif.run.registry import load_formulation, load_properties
+
+        limits = self.options.isolation.limits()
+        questions = load_properties(self.options.properties)
+        return [load_formulation(name, limits) for name in self.options.names], questions
 
     @property
     def jobs(self) -> int:
@@ -117,7 +102,22 @@ class VerifyJob:
 
     def plan(self) -> Plan:
         """Return the plan for the header of a journal."""
-        return make_plan(self.command, self.options, self.profile)
+        import msgspec
+
+        from contactverif.run.run_journal import Plan
+
+        assert self.profile.seed is not None
+        return Plan(
+            command=self.command,
+            options=msgspec.to_builtins(self.options, enc_hook=str),
+            folder=os.getcwd(),
+            versions=versions_of(self.options),
+            formulations=self.options.names,
+            properties=self.options.properties,
+            profile=self.profile.name,
+            examples=self.profile.examples,
+            seed=self.profile.seed,
+        )
 
     @contextmanager
     def journal(self) -> Iterator[Journal]:
@@ -150,22 +150,7 @@ class VerifyJob:
 
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:
-    """Return the job of options as they were typed.
-
-    Parameters
-    ----------
-    options : VerifyOptions
-        The options; the names are those of formulations.
-    fresh_seed : int | None
-        The seed if neither the options nor the profile have one; None draws a new one.
-    command : str
-        The command that judges.
-
-    Raises
-    ------
-    MisuseError
-        If an option is wrong.
-    """
+    """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
     from contactverif.run.profiles import profile_named
     from contactverif.run.registry import matching_ids
 
@@ -186,21 +171,9 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
 
 
 def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> VerifyJob:
-    """Return the job that goes on with a run that was stopped.
+    """Return the job that goes on with a run that was to write a report or page, and was stopped.
 
-    Parameters
-    ----------
-    output : Path
-        The report that the run was to write, or its page.
-    typed : VerifyOptions
-        The options beside `--resume`. Only a number of processes may be among them.
-    command : str
-        The command that judges.
-
-    Raises
-    ------
-    MisuseError
-        If there is no such journal, versions differ, or there are other options.
+    Beside `--resume` only a number of processes may be typed: all other options come from the journal.
     """
     from contactverif.run.journal import journal_folder
     from contactverif.run.run_journal import read_plan
@@ -219,26 +192,6 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
     return replace(job, sources=(folder,), resumes=True)
 
 
-def make_plan(command: str, options: VerifyOptions, profile: Profile) -> Plan:
-    """Return the plan of a command, for the header of its journal."""
-    import msgspec
-
-    from contactverif.run.run_journal import Plan
-
-    assert profile.seed is not None
-    return Plan(
-        command=command,
-        options=msgspec.to_builtins(options, enc_hook=str),
-        folder=os.getcwd(),
-        versions=versions_of(options),
-        formulations=options.names,
-        properties=options.properties,
-        profile=profile.name,
-        examples=profile.examples,
-        seed=profile.seed,
-    )
-
-
 def versions_of(options: VerifyOptions) -> dict[str, str]:
     """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
     from contactverif.run.provenance import code_digests, collect_versions
@@ -247,13 +200,7 @@ def versions_of(options: VerifyOptions) -> dict[str, str]:
 
 
 def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
-    """Return the options that a journal has, with files relative to today's working folder.
-
-    Raises
-    ------
-    MisuseError
-        If the journal is of another command, its options are none, or versions differ.
-    """
+    """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
     import msgspec
 
     from contactverif.run.run_journal import check_versions
