@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import replace
 from math import inf, nan
 from typing import Literal
 
@@ -9,8 +11,12 @@ import numpy as np
 import pytest
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict, judge
+from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.problems.named_states import named_case
 
 MOST = Quantity("defect", "1", "u 8X/|g|", "roundoff of a gap")
 LEAST = Quantity("slope", "1", "1.9", "second order", sense="at least")
@@ -131,3 +137,36 @@ def test_only_a_decision_counts_as_judged() -> None:
     case = Case(pair := Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]]), pair.nodes.reshape(-1))
     decided = {verdict for verdict in Verdict if Outcome(case, verdict).decided}
     assert decided == {Verdict.PASS, Verdict.FAIL, Verdict.CRASHED}
+
+
+@Property.define(
+    id="a.definition", family="a", summary="asks", quantities=(MOST,), promise=lambda traits: None,
+    cases=Cases.from_list(lambda: (named_case("a1"),)), asks=frozenset({"penalty"}),
+)  # fmt: skip
+def definition(case: Case, subject: Subject) -> Measurement:
+    """Ask nothing."""
+    return Measurement()
+
+
+def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> None:
+    assert definition.question == "Ask nothing."
+    assert pickle.loads(pickle.dumps(definition)) is definition
+    other = pickle.loads(pickle.dumps(replace(definition, id="another")))
+    assert (other.id, other.measure) == ("another", definition.measure)
+
+
+def test_who_is_not_asked_is_told_why() -> None:
+    refusals = [definition.refusal(Traits(enforcement=each)) for each in ("penalty", "multiplier", "barrier")]
+    assert refusals == [
+        "",
+        "the enforcement is by a multiplier",
+        "the states penetrate, where a barrier is not defined",
+    ]
+
+
+def test_a_list_has_no_cases_on_an_interface_but_those_of_its_function() -> None:
+    place = named_case("a1").interface
+    assert [case.name for case in definition.cases(None)] == ["a1"]
+    assert definition.cases(place) is None
+    assert Cases.from_list(tuple, on_place=lambda place: place)(place) is place
+    assert Cases.random(lambda place: place)(place) is place
