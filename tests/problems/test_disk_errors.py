@@ -19,7 +19,7 @@ from contactverif.contract.interface import Surface
 from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, solve_for_accuracy, traction_forces
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import disk_on_foundation
-from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, PosedProblem
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, ProblemInstance
 
 FINE = 2  # The numbers on the site are those of four times. Twice is enough here, and a tenth of the work.
 PARTS = 4  # The field of a reference is linear between nodes, which lie inside segments of a coarser mesh.
@@ -43,7 +43,7 @@ def _tractions(solution: Solution, surface: Surface) -> Field:
     return _along(surface, positions, solution.forces / np.where(integrals > 0, integrals, 1.0)[:, None])
 
 
-def pose_against(reference: Solution, scene: Scene) -> PosedProblem:
+def pose_against(reference: Solution, scene: Scene) -> ProblemInstance:
     """Return the problem of a scene whose exact answer is that of a solution on a finer mesh."""
     surfaces, finer = ((each.slave, each.master) for each in (scene.interface, reference.interface))
     tractions = [_tractions(reference, surface) for surface in finer]
@@ -55,7 +55,7 @@ def pose_against(reference: Solution, scene: Scene) -> PosedProblem:
     def pressure(places: FloatArray) -> FloatArray:
         return np.linalg.norm(tractions[0](places), axis=1)
 
-    return PosedProblem(
+    return ProblemInstance(
         scene=scene,
         forces=forces,
         motions=(_along(finer[0], reference.interface.nodes, reference.displacements),),
