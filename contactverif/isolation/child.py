@@ -12,7 +12,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from time import perf_counter, sleep
 from typing import Any
 
@@ -47,7 +47,8 @@ class Child:
         A frame from it has at most `largest` bytes. What it prints goes to the file descriptor `output`.
         """
         ours, theirs = socket.socketpair()
-        with theirs:
+        with theirs, ExitStack() as on_error:
+            on_error.callback(ours.close)
             process = subprocess.Popen(
                 [*command],
                 stdin=subprocess.DEVNULL,
@@ -57,6 +58,7 @@ class Child:
                 env=os.environ | (environment or {}) | {SOCKET: str(theirs.fileno())},
                 start_new_session=True,
             )
+            on_error.pop_all()
         return cls(process, Channel(ours, largest))
 
     @classmethod

@@ -83,6 +83,7 @@ class PluginProcess:
                 command, largest, environment=settings | numbers, files=files, output=self.output.end
             )
         except OSError as error:
+            self._progress.close()
             raise PluginError(f"import: {command[0]} does not start: {error.strerror}", "exit", ended=True) from error
         finally:
             self.output.start()

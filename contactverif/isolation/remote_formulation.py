@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from scipy import sparse
@@ -86,8 +87,12 @@ class RemoteFormulation(Prefetching):
         self._last: Question | None = None
         self._prefetched: deque[tuple[Call, Question]] = deque()
 
+    @cached_property
+    def _host(self) -> Host:
+        return self._make.host
+
     def _ask(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array | None) -> Question:
-        host = self._make.host
+        host = self._host
         if not host.is_alive(self._started):
             self._number, self._started = host.make(self._penalty)
             weakref.finalize(self, host.forget, self._number, self._started)
@@ -99,7 +104,7 @@ class RemoteFormulation(Prefetching):
     ) -> Answer:
         question = self._take_prefetched(verb, interface, pairing) or self._ask(verb, interface, pairing, z)
         if question.answer is None:
-            self._make.host.flush()
+            self._host.flush()
         if isinstance(pairing, RemotePairing):
             pairing.check()
         return answer_of(question)
@@ -131,7 +136,7 @@ class RemoteFormulation(Prefetching):
         They hold neither the round trip nor any check. A plugin may say what it likes, within reason.
         """
         assert self._last is not None
-        self._make.host.flush()
+        self._host.flush()
         answer = answer_of(self._last)
         if not (0 <= answer.seconds <= _MOST_SECONDS and 0 <= answer.processor_seconds <= _MOST_SECONDS):
             raise PluginError(f"{self._last.verb}: times that cannot be", "channel")
@@ -144,8 +149,8 @@ class RemoteFormulation(Prefetching):
     def pair(self, interface: Interface, z: FloatArray) -> Pairing:
         """Return the pairing at one state z (n_unknowns,). It is asked for together with the next question."""
         question = self._ask("pair", interface, None, z)
-        pairing = RemotePairing(self._make.host, question, interface)
-        self._make.host.keep(pairing, question.number)
+        pairing = RemotePairing(self._host, question, interface)
+        self._host.keep(pairing, question.number)
         return pairing
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
