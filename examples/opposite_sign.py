@@ -4,13 +4,13 @@ The residual is internal minus external force, so minus the residual pushes a sl
 normal. A first plugin often has it the other way round. The harness sees that before it asks any property.
 """
 
-from contactverif import Subject, Traits, load_formulation, load_properties, verify
+from contactverif import Rules, Subject, Traits, load_formulation, load_properties, verify
 
 
 class Negated:
     """NTS-AR with all signs turned round."""
 
-    traits = Traits(penalty="distributed")
+    traits = Traits(rules=Rules(penalty="distributed"))
 
     def __init__(self, *, penalty):
         self.right = load_formulation("nts-ar").with_penalty(penalty)

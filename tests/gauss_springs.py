@@ -13,10 +13,14 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Promises, Rules, Traits
 
 C = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # The places of the Gauss points on a slave segment
-TRAITS = Traits(area="current", penalty="distributed", tangent="exact", batched=True, takes_longdouble=True)
+TRAITS = Traits(
+    promises=Promises(tangent="exact"),
+    rules=Rules(area="current", penalty="distributed"),
+    abilities=Abilities(batched=True, takes_longdouble=True),
+)
 
 
 @dataclass
@@ -141,7 +145,7 @@ class GaussSprings:
     def __init__(self, penalty: float, way: Way, before: Callable[[Any], Any] = keep, **traits: Any) -> None:
         self.penalty, self.way, self.before = penalty, way, before
         self.tangent_way, self.search_before = way, keep
-        self.traits = replace(TRAITS, **traits)
+        self.traits = TRAITS.revise(**traits)
 
     def segments(self, interface: Any, master: Any, z: Any) -> Segments:
         x = z.reshape(*z.shape[:-1], -1, 2)

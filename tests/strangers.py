@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Rules, Traits
 
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 
@@ -27,7 +27,9 @@ class PointsFirst:
     Of tied segments the last one is taken, there is no tolerance past a free end, and the normal comes from an angle.
     """
 
-    traits = Traits(gap="closest point", penalty="distributed", area="current", conserves_force=True)
+    traits = Traits(
+        promises=Promises(conserves_force=True), rules=Rules(gap="closest point", penalty="distributed", area="current")
+    )
     places = np.array([-1.0, 1.0])
 
     def __init__(self, *, penalty: float) -> None:
@@ -97,7 +99,7 @@ class PointsFirst:
 class TurnedFrame(PointsFirst):
     """Springs at two points of each slave segment, computed in a frame along the first one, and turned back."""
 
-    traits = replace(PointsFirst.traits, translation_stable=True)
+    traits = PointsFirst.traits.revise(translation_stable=True)
     places = np.array([-0.5, 0.5])
 
     def contact_points(self, interface: Any, pairing: Any, z: Any) -> ContactPoints:
@@ -115,7 +117,8 @@ class SlaveNormalAtGaussPoints(PointsFirst):
     """
 
     traits = Traits(
-        gap="slave normal", penalty="distributed", area="current", conserves_force=True, translation_stable=True
+        promises=Promises(conserves_force=True, translation_stable=True),
+        rules=Rules(gap="slave normal", penalty="distributed", area="current"),
     )
     places = GAUSS
 
@@ -163,7 +166,7 @@ class NearbyOnly(PointsFirst):
     Points that find nothing name no master segment and leave all numbers NaN.
     """
 
-    traits = replace(PointsFirst.traits, covers_overhang=False)
+    traits = PointsFirst.traits.revise(overhang=False)
     places = np.array([-0.75, -0.25, 0.25, 0.75])
 
     def contact_points(self, interface: Any, pairing: Any, z: Any) -> ContactPoints:

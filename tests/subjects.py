@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -59,6 +58,6 @@ def with_promises(make: Callable[..., Any], **promises: Any) -> Subject:
 
     def make_boaster(*, penalty: float) -> Changed:
         inner = make(penalty=penalty)
-        return Changed(inner, traits=replace(inner.traits, **promises))
+        return Changed(inner, traits=inner.traits.revise(**promises))
 
     return Subject("boaster", make_boaster)

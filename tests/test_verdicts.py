@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from functools import cache
 from typing import Any
 
@@ -47,7 +46,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.oracle import projection_cases
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
@@ -198,15 +197,15 @@ def test_the_tangent_of_the_basic_vts_ppt_is_found_out() -> None:
 @pytest.mark.parametrize(
     ("make", "property_id", "promises", "unexpected"),
     [
-        (contactverif_nts.nts, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised to pass, but fails"),
-        (contactverif_nts.vts_me, PATCH, {"passes_flat_patch": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.nts, PATCH, {"flat": True, "witnesses": {}}, "promised to pass, but fails"),
+        (contactverif_nts.vts_me, PATCH, {"flat": True, "witnesses": {}}, "promised to pass, but fails"),
         (contactverif_nts.vts_ppt, FORCE, {"conserves_force": True, "witnesses": {}}, "promised to pass, but fails"),
         (contactverif_nts.vts_ppt, MOMENT, {"conserves_moment": True, "witnesses": {}}, "promised to pass, but fails"),
         (contactverif_nts.vts_ppt_basic, TANGENT, {"tangent": "exact", "witnesses": {}}, "promised to pass, but fails"),
         (
             contactverif_nts.vts_ppt,
             PATCH,
-            {"passes_flat_patch": False, "witnesses": {PATCH: "c"}},
+            {"flat": False, "witnesses": {PATCH: "c"}},
             "stated to fail, but passes",
         ),
         (
@@ -221,11 +220,11 @@ def test_the_tangent_of_the_basic_vts_ppt_is_found_out() -> None:
             {"tangent": "approximate", "witnesses": {TANGENT: "offset-c"}},
             "stated to fail, but passes",
         ),
-        (contactverif_nts.vts_ppt, PATCH, {"passes_flat_patch": False, "witnesses": {}}, "crashed"),
+        (contactverif_nts.vts_ppt, PATCH, {"flat": False, "witnesses": {}}, "crashed"),
         (
             contactverif_nts.vts_ppt,
             PATCH,
-            {"passes_flat_patch": False, "witnesses": {PATCH: "no such case"}},
+            {"flat": False, "witnesses": {PATCH: "no such case"}},
             "crashed",
         ),
     ],
@@ -246,10 +245,10 @@ def test_a_promise_that_is_true_is_kept() -> None:
 def test_what_promises_nothing_is_never_accused() -> None:
     """It promises no more than what its forces are measured in; what it states to fail, it does not state here."""
     stated = load_subject("vts-ppt-basic").traits
-    nothing = {field.name: None for field in fields(Traits) if getattr(stated, field.name) is False}
+    nothing = {name: None for name, value in stated.by_name().items() if value is False}
     nothing = {name: None for name in nothing if name not in ("batched", "takes_complex", "takes_longdouble")}
     nothing["locks"] = None  # The one trait whose bad word is True.
-    promises = ("passes_flat_patch", "covers_overhang", "tangent", "conserves_force", "conserves_moment", "continuity")
+    promises = ("flat", "overhang", "tangent", "conserves_force", "conserves_moment", "continuity")
     result = run(
         [with_promises(contactverif_nts.vts_ppt_basic, witnesses={}, **{**dict.fromkeys(promises), **nothing})],
         load_properties(),
@@ -286,12 +285,11 @@ def test_a_cut_that_begins_exactly_here_is_a_kink_and_no_broken_pairing() -> Non
 def test_a_formulation_that_does_nothing_is_not_judged() -> None:
     class Nothing:
         traits = Traits(
-            passes_flat_patch=False,
-            conserves_force=True,
-            conserves_moment=True,
-            tangent="exact",
-            penalty="nodal",
-            witnesses={"patch": "a1"},
+            promises=Promises(
+                patch=PatchPromises(flat=False), conserves_force=True, conserves_moment=True, tangent="exact"
+            ),
+            rules=Rules(penalty="nodal"),
+            evidence=Evidence(witnesses={"patch": "a1"}),
         )
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:

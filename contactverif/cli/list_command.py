@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from contactverif.isolation.loading import Wrapper
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
-    ("passes_normal_patch", "passes with node on node", "fails with node on node"),
-    ("passes_single_patch", "passes with nodes on midpoints", "fails with nodes on midpoints"),
-    ("covers_overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
+    ("normal", "passes with node on node", "fails with node on node"),
+    ("single", "passes with nodes on midpoints", "fails with nodes on midpoints"),
+    ("overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
     ("converges", "converges", "does not converge"),
     ("inf_sup", "satisfies inf-sup", "does not satisfy inf-sup"),
     ("locks", "locks", "does not lock"),
@@ -90,25 +90,26 @@ def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
 
 def _statements(traits: Traits, every_trait: bool) -> list[str]:
     """Return what the traits say, in words; the most important ones alone or all of them."""
-    statements: list[str] = [] if traits.enforcement == "penalty" else [f"by {traits.enforcement}"]
-    if traits.passes_flat_patch is not None:
-        statements.append("passes the flat patch test" if traits.passes_flat_patch else "fails the flat patch test")
-    if traits.tangent is not None:
-        statements.append(f"{traits.tangent} tangent")
+    statements: list[str] = [] if traits.rules.enforcement == "penalty" else [f"by {traits.rules.enforcement}"]
+    if traits.promises.patch.flat is not None:
+        statements.append("passes the flat patch test" if traits.promises.patch.flat else "fails the flat patch test")
+    if traits.promises.tangent is not None:
+        statements.append(f"{traits.promises.tangent} tangent")
     return statements + _further_statements(traits) if every_trait else statements
 
 
 def _further_statements(traits: Traits) -> list[str]:
-    statements = [
-        yes if getattr(traits, name) else no for name, yes, no in _YES_OR_NO if getattr(traits, name) is not None
-    ]
+    values = traits.by_name()
+    statements = [yes if values[name] else no for name, yes, no in _YES_OR_NO if values[name] is not None]
     for words, value in (
-        ("area {}", traits.area),
-        ("penalty {}", traits.penalty),
-        ("gap by {}", traits.gap),
-        ("force along {}", traits.force_along),
-        ("{} when sliding", traits.continuity),
-        ("forces stated on {}", ", ".join(traits.published_forces)),
+        ("area {}", traits.rules.area),
+        ("penalty {}", traits.rules.penalty),
+        ("gap by {}", traits.rules.gap),
+        ("force along {}", traits.rules.force_along),
+        ("{} when sliding", traits.promises.continuity),
+        ("forces stated on {}", ", ".join(traits.evidence.published_forces)),
     ):
         statements += [words.format(value)] if value else []
-    return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(traits.witnesses.items())]
+    return statements + [
+        f"{property_id} fails on {case}" for property_id, case in sorted(traits.evidence.witnesses.items())
+    ]

@@ -27,6 +27,7 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 # With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the
 # share is below 3/2300 with a probability of 95 %.
 NONE_UNDECIDED = 3 / 2300
+PLANE = 2  # The number of coordinates of all interfaces.
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
 
 
@@ -347,11 +348,13 @@ class Property(PropertyInfo):
 
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation, or an empty string."""
-        if traits.enforcement in self.asks:
+        if PLANE not in traits.abilities.dimensions:
+            return "the interfaces are plane, and the formulation takes none of them"
+        if traits.rules.enforcement in self.asks:
             return self.applicable(traits)
-        if traits.enforcement == "barrier" and "penalty" in self.asks:
+        if traits.rules.enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
-        return f"the enforcement is by a {traits.enforcement}"
+        return f"the enforcement is by a {traits.rules.enforcement}"
 
     def __reduce__(self) -> str | tuple[Any, ...]:
         # The name of a decorated function is that of the property, so the function itself cannot be pickled by it.

@@ -29,7 +29,7 @@ def parse_forces(text: str) -> tuple[Fractions, Fractions]:
         slave = master = ()
     if not slave or not master:
         needed = 'fractions on the slave nodes; fractions on the master nodes, such as "1 2 1; 2 2"'
-        raise ContractError(f"Traits.published_forces: found {text!r}; needed {needed}")
+        raise ContractError(f"Traits.evidence.published_forces: found {text!r}; needed {needed}")
     return slave, master
 
 
@@ -45,7 +45,7 @@ def check_published_forces(forces: object) -> None:
     """Raise a `ContractError` unless this maps names of cases to forces."""
     if not isinstance(forces, Mapping):
         raise ContractError(
-            f"Traits.published_forces: found a {type(forces).__name__}; needed {{name of a flat case: forces}}"
+            f"Traits.evidence.published_forces: found a {type(forces).__name__}; needed {{name of a flat case: forces}}"
         )
     for text in forces.values():
         (_parse_once if isinstance(text, str) else parse_forces)(text)

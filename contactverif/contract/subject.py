@@ -124,7 +124,7 @@ class Subject:
         return self._convert(case.interface, case.penalty)
 
     def _convert(self, interface: Interface, penalty: float) -> float:
-        if self.traits.penalty != "nodal":
+        if self.traits.rules.penalty != "nodal":
             return penalty
         return penalty * float(interface.slave.lengths(interface.nodes).mean())
 
@@ -186,9 +186,9 @@ class CheckedFormulation:
 
     def _count_multipliers(self, interface: Interface) -> int:
         count = self._call_n_multipliers(interface)
-        if (count > 0) is not (self._traits.enforcement == "multiplier"):
+        if (count > 0) is not (self._traits.rules.enforcement == "multiplier"):
             needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"
-            trait = f"{count} of them, with the trait enforcement {self._traits.enforcement!r}"
+            trait = f"{count} of them, with the trait enforcement {self._traits.rules.enforcement!r}"
             raise ContractError(f"n_multipliers: {trait}; needed {needed}")
         return count
 
@@ -233,7 +233,7 @@ class CheckedFormulation:
         self._check_size(interface, z)
         if z.ndim == 1:
             return self._residual(interface, self._pairing_at(interface, pairing, z), z)
-        if self._prefetching is not None or (self._traits.batched and not self.decides_anew(pairing)):
+        if self._prefetching is not None or (self._traits.abilities.batched and not self.decides_anew(pairing)):
             return self._residual(interface, pairing, z)
         forces = np.empty_like(z)
         for index in np.ndindex(z.shape[:-1]):

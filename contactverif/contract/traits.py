@@ -1,72 +1,58 @@
-"""The promises of a formulation: `Traits`.
-
-A trait is a claim that a property checks. The words that say what each promise means stand here, once.
+"""The traits of a formulation: what it promises, the rules it follows, what it is able to do, and what shows so.
 
 Rules for the next editor: a new trait is optional, and ``None`` promises nothing. A promise "does not" needs a witness
-that runs. A promise that no property checks is withdrawn.
+that runs. A promise that no property checks is withdrawn. No two traits have the same name, whatever their group.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from contactverif.contract.errors import ContractError
 from contactverif.contract.published_forces import check_published_forces
 
-_VALUES_OF_TRAITS: dict[str, tuple[object, ...]] = {
-    "passes_flat_patch": (True, False, None),
-    "passes_normal_patch": (True, False, None),
-    "passes_single_patch": (True, False, None),
-    "passes_kinked_patch": (True, False, None),
-    "covers_overhang": (True, False, None),
-    "converges": (True, False, None),
-    "inf_sup": (True, False, None),
-    "locks": (True, False, None),
-    "integrates_linear_gap": (True, False, None),
-    "tangent": ("exact", "approximate", None),
-    "symmetric": (True, False, None),
-    "conserves_force": (True, False, None),
-    "conserves_moment": (True, False, None),
-    "continuity": ("C0", "C1", "jumps", None),
-    "area": ("reference", "current", None),
-    "gap": ("closest point", "slave normal", "cells", "cells and nodes", None),
-    "force_along": ("master normal", "slave normal", None),
-    "local": (True, False, None),
-    "unbiased": (True, False, None),
-    "nodes_push": (True, False, None),
-    "translation_stable": (True, False, None),
-    "penalty": ("nodal", "distributed", None),
-    "enforcement": ("penalty", "multiplier", "barrier"),
-    "independent_multipliers": (True, False, None),
-    "batched": (True, False),
-    "takes_complex": (True, False),
-    "takes_longdouble": (True, False),
-}
-
 
 @dataclass(frozen=True, slots=True)
-class Traits:
-    """The promises of a formulation; the harness checks every one.
+class PatchPromises:
+    """The interfaces across which a formulation transmits a uniform pressure exactly.
 
-    Every trait is optional. ``None`` promises nothing. ``True``, or a word, is a promise that holds for all cases.
-    ``False`` says "does not"; it needs a case that shows so, the witness of the property that checks the promise.
+    With a penalty, the pressure is ε̂ |gap|; so a formulation whose law is not linear promises nothing here.
 
     Attributes
     ----------
-    passes_flat_patch : bool | None
-        The formulation transmits a uniform pressure exactly across any flat interface on which the master covers the
-        slave. With a penalty, the pressure is ε̂ |gap|; so a formulation whose law is not linear promises nothing here.
-    passes_normal_patch : bool | None
-        It does so at least where each inner node of the master lies on a node of the slave.
-    passes_single_patch : bool | None
-        It does so at least where each inner node of the master lies on a node of the slave or in the middle of a slave
+    flat : bool | None
+        Any flat interface on which the master covers the slave.
+    normal : bool | None
+        At least those where each inner node of the master lies on a node of the slave.
+    single : bool | None
+        At least those where each inner node of the master lies on a node of the slave or in the middle of a slave
         segment.
-    passes_kinked_patch : bool | None
-        The formulation does so too on an interface with kinks, if nodes of both surfaces lie at every kink.
-    covers_overhang : bool | None
-        The formulation does so too where the slave overhangs the master inside a slave segment.
+    kinked : bool | None
+        Also an interface with kinks, if nodes of both surfaces lie at every kink.
+    overhang : bool | None
+        Also where the slave overhangs the master inside a slave segment.
+    """
+
+    flat: bool | None = None
+    normal: bool | None = None
+    single: bool | None = None
+    kinked: bool | None = None
+    overhang: bool | None = None
+
+    def __post_init__(self) -> None:
+        _check_values(self, "promises.patch")
+
+
+@dataclass(frozen=True, slots=True)
+class Promises:
+    """What holds for all cases (``True``, or a word), or not for a case that shows so (``False``).
+
+    Attributes
+    ----------
+    patch : PatchPromises
+        The patch tests that the formulation passes.
     converges : bool | None
         On finer meshes, with a penalty that grows as E/h, nodal forces converge to those of the exact solution.
     inf_sup : bool | None
@@ -87,6 +73,53 @@ class Traits:
         The smoothness of the forces while a slave slides over the vertices of a master that no line along the normal
         meets twice: ``"C0"``, forces are continuous; ``"C1"``, their slopes are too; ``"jumps"``, forces jump, which
         needs a witness.
+    local : bool | None
+        The forces between a slave and the master segments that it touches do not depend on where other nodes of the
+        master are.
+    unbiased : bool | None
+        The forces are the same if slave and master exchange their roles.
+    nodes_push : bool | None
+        No node is ever pulled towards the other surface, but for master nodes of a segment that a foot lies past (Eq. 6
+        leaves ξ unclipped). Dual shape functions, which are negative in places, may pull.
+    translation_stable : bool | None
+        An exact translation of the whole state, however far, changes forces and tangent by no more than rounding the
+        positions relative to one another would. Kernels that take differences of nodes first are; kernels that round a
+        point at its distance from the origin are not. ``None`` promises nothing: such kernels are common and not wrong.
+    independent_multipliers : bool | None
+        The constraints are independent on any mesh, so that the multipliers are unique.
+    """
+
+    patch: PatchPromises = field(default_factory=PatchPromises)
+    converges: bool | None = None
+    inf_sup: bool | None = None
+    locks: bool | None = None
+    integrates_linear_gap: bool | None = None
+    tangent: Literal["exact", "approximate"] | None = None
+    symmetric: bool | None = None
+    conserves_force: bool | None = None
+    conserves_moment: bool | None = None
+    continuity: Literal["C0", "C1", "jumps"] | None = None
+    local: bool | None = None
+    unbiased: bool | None = None
+    nodes_push: bool | None = None
+    translation_stable: bool | None = None
+    independent_multipliers: bool | None = None
+
+    def __post_init__(self) -> None:
+        _check_values(self, "promises")
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """The rules by which a formulation finds its gaps, areas, forces and pressures.
+
+    Attributes
+    ----------
+    enforcement : Literal['penalty', 'multiplier', 'barrier']
+        The way in which contact is enforced.
+    penalty : Literal['nodal', 'distributed'] | None
+        The unit of the penalty: ``"nodal"`` is force per length, ``"distributed"`` is force per length per length of
+        penetration. For multipliers it says what a multiplier is: a nodal force, or a pressure.
     area : Literal['reference', 'current'] | None
         The configuration in which areas of competence are measured. They add up to the slave's length there, so that a
         uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass).
@@ -101,33 +134,51 @@ class Traits:
         as ``"cells"``, but pressures and contact follow from gaps of the slave nodes by ``"closest point"``.
     force_along : Literal['master normal', 'slave normal'] | None
         The direction in which a contact point pushes: along the normal of its master segment, or of its slave segment.
-    local : bool | None
-        The forces between a slave and the master segments that it touches do not depend on where other nodes of the
-        master are.
-    unbiased : bool | None
-        The forces are the same if slave and master exchange their roles.
-    nodes_push : bool | None
-        No node is ever pulled towards the other surface, but for master nodes of a segment that a foot lies past (Eq. 6
-        leaves ξ unclipped). Dual shape functions, which are negative in places, may pull.
-    translation_stable : bool | None
-        An exact translation of the whole state, however far, changes forces and tangent by no more than rounding the
-        positions relative to one another would. Kernels that take differences of nodes first are; kernels that round a
-        point at its distance from the origin are not. ``None`` promises nothing: such kernels are common and not wrong.
-    penalty : Literal['nodal', 'distributed'] | None
-        The unit of the penalty: ``"nodal"`` is force per length, ``"distributed"`` is force per length per length of
-        penetration. For multipliers it says what a multiplier is: a nodal force, or a pressure.
-    enforcement : Literal['penalty', 'multiplier', 'barrier']
-        The way in which contact is enforced.
-    independent_multipliers : bool | None
-        The constraints are independent on any mesh, so that the multipliers are unique.
+    """
+
+    enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
+    penalty: Literal["nodal", "distributed"] | None = None
+    area: Literal["reference", "current"] | None = None
+    gap: Literal["closest point", "slave normal", "cells", "cells and nodes"] | None = None
+    force_along: Literal["master normal", "slave normal"] | None = None
+
+    def __post_init__(self) -> None:
+        _check_values(self, "rules")
+
+
+@dataclass(frozen=True, slots=True)
+class Abilities:
+    """What a formulation takes.
+
+    Attributes
+    ----------
     dimensions : tuple[int, ...]
-        The numbers of coordinates that the formulation supports.
+        The numbers of coordinates. A formulation without 2 is asked nothing about plane interfaces.
     batched : bool
         ``residual`` takes a batch of states, z (..., n_unknowns), in one call. Otherwise the harness loops.
     takes_complex : bool
         ``residual`` takes complex positions, so that the harness may use a complex step.
     takes_longdouble : bool
         ``residual`` takes positions in ``numpy.longdouble`` and computes in that precision.
+    """
+
+    dimensions: tuple[int, ...] = (2,)
+    batched: bool = False
+    takes_complex: bool = False
+    takes_longdouble: bool = False
+
+    def __post_init__(self) -> None:
+        _check_values(self, "abilities")
+        if self.dimensions not in ((2,), (3,), (2, 3)):
+            raise ContractError(f"Traits.abilities.dimensions: found {self.dimensions!r}; needed (2,), (3,) or (2, 3)")
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """The cases that show what a formulation states, and its publication.
+
+    Attributes
+    ----------
     witnesses : Mapping[str, str]
         ``{property id: name of a case}`` for each promise "does not". The case always runs. The beginning of an id
         stands for all ids below it: ``"patch"`` is the witness of ``"patch.flat.solve"`` too. A property that solves
@@ -138,6 +189,37 @@ class Traits:
         those on the master nodes, each from left to right: ``{"a1": "1 2 1; 2 2"}``. The harness holds it to them.
     source : str
         The publication of the formulation.
+    """
+
+    witnesses: Mapping[str, str] = field(default_factory=dict)
+    published_forces: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        witnesses: object = self.witnesses
+        if not isinstance(witnesses, Mapping):
+            needed = "{property id: name of a case}"
+            raise ContractError(f"Traits.evidence.witnesses: found a {type(witnesses).__name__}; needed {needed}")
+        check_published_forces(self.published_forces)
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """What a formulation states about itself; the harness checks every statement.
+
+    Every trait is optional. ``None`` promises nothing. ``True``, or a word, is a promise that holds for all cases.
+    ``False`` says "does not"; it needs a case that shows so, the witness of the property that checks the promise.
+
+    Attributes
+    ----------
+    promises : Promises
+        What the formulation keeps on all cases, or does not.
+    rules : Rules
+        The rules by which it finds gaps, areas and forces, and the unit of its penalty.
+    abilities : Abilities
+        The kinds of states that it takes.
+    evidence : Evidence
+        The cases that show what it states, and its publication.
 
     Raises
     ------
@@ -148,45 +230,26 @@ class Traits:
     --------
     Nodal springs with an exact tangent that fail the patch test on case A1 of the reference paper:
 
-    >>> from contactverif import Traits
+    >>> from contactverif import Evidence, PatchPromises, Promises, Rules, Traits
     >>> traits = Traits(
-    ...     passes_flat_patch=False, witnesses={"patch": "a1"}, tangent="exact", symmetric=True, penalty="nodal"
+    ...     Promises(patch=PatchPromises(flat=False), tangent="exact", symmetric=True),
+    ...     Rules(penalty="nodal"),
+    ...     evidence=Evidence(witnesses={"patch": "a1"}),
     ... )
     >>> traits.witness("patch.flat.transmission")
     'a1'
     """
 
-    passes_flat_patch: bool | None = None
-    passes_normal_patch: bool | None = None
-    passes_single_patch: bool | None = None
-    passes_kinked_patch: bool | None = None
-    covers_overhang: bool | None = None
-    converges: bool | None = None
-    inf_sup: bool | None = None
-    locks: bool | None = None
-    integrates_linear_gap: bool | None = None
-    tangent: Literal["exact", "approximate"] | None = None
-    symmetric: bool | None = None
-    conserves_force: bool | None = None
-    conserves_moment: bool | None = None
-    continuity: Literal["C0", "C1", "jumps"] | None = None
-    area: Literal["reference", "current"] | None = None
-    gap: Literal["closest point", "slave normal", "cells", "cells and nodes"] | None = None
-    force_along: Literal["master normal", "slave normal"] | None = None
-    local: bool | None = None
-    unbiased: bool | None = None
-    nodes_push: bool | None = None
-    translation_stable: bool | None = None
-    penalty: Literal["nodal", "distributed"] | None = None
-    enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
-    independent_multipliers: bool | None = None
-    dimensions: tuple[int, ...] = (2,)
-    batched: bool = False
-    takes_complex: bool = False
-    takes_longdouble: bool = False
-    witnesses: Mapping[str, str] = field(default_factory=dict)
-    published_forces: Mapping[str, str] = field(default_factory=dict)
-    source: str = ""
+    promises: Promises = field(default_factory=Promises)
+    rules: Rules = field(default_factory=Rules)
+    abilities: Abilities = field(default_factory=Abilities)
+    evidence: Evidence = field(default_factory=Evidence)
+
+    def __post_init__(self) -> None:
+        for entry, kind in zip(fields(self), (Promises, Rules, Abilities, Evidence), strict=True):
+            actual = type(getattr(self, entry.name))
+            if not issubclass(actual, kind):
+                raise ContractError(f"Traits.{entry.name}: found a {actual.__name__}; needed {kind.__name__}(…)")
 
     def witness(self, property_id: str) -> str | None:
         """Return the name of the case that shows that a promise "does not" holds.
@@ -199,21 +262,78 @@ class Traits:
         Returns
         -------
         str | None
-            The name from `witnesses` for the id or for the longest beginning of it; None if there is none.
+            The name from `Evidence.witnesses` for the id or for the longest beginning of it; None if there is none.
         """
         parts = property_id.split(".")
         for n in range(len(parts), 0, -1):
-            if (name := self.witnesses.get(".".join(parts[:n]))) is not None:
+            if (name := self.evidence.witnesses.get(".".join(parts[:n]))) is not None:
                 return name
         return None
 
-    def __post_init__(self) -> None:
-        for name, values in _VALUES_OF_TRAITS.items():
-            if getattr(self, name) not in values:
-                needed = ", ".join(map(repr, values))
-                raise ContractError(f"Traits.{name}: found {getattr(self, name)!r}; needed one of {needed}")
-        if not isinstance(self.witnesses, Mapping):
-            raise ContractError(
-                f"Traits.witnesses: found a {type(self.witnesses).__name__}; needed {{property id: name of a case}}"
-            )
-        check_published_forces(self.published_forces)
+    def revise(self, **changes: Any) -> Traits:
+        """Return these traits with some changed, such as those of a formulation that wraps another one.
+
+        Parameters
+        ----------
+        **changes : Any
+            New values by the name of the trait, whatever its group: ``traits.revise(symmetric=True, area=None)``.
+
+        Raises
+        ------
+        ContractError
+            If there is no such trait, or it does not take the value.
+        """
+        if strangers := changes.keys() - self.by_name():
+            raise ContractError(f"Traits: found {', '.join(sorted(strangers))}; needed {', '.join(self.by_name())}")
+        revised = _revise(self, changes)
+        assert isinstance(revised, Traits)
+        return revised
+
+    def by_name(self) -> dict[str, Any]:
+        """Return ``{name: value}`` of the traits of all groups."""
+        return dict(_flatten(self))
+
+
+def _flatten(group: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the names and values of the traits of a group."""
+    for entry in fields(group):
+        value = getattr(group, entry.name)
+        yield from _flatten(value) if is_dataclass(value) else [(entry.name, value)]
+
+
+def _revise(group: Any, changes: Mapping[str, Any]) -> Any:
+    """Return a group with the changes that concern it."""
+    values = {entry.name: getattr(group, entry.name) for entry in fields(group)}
+    revised = {
+        name: _revise(value, changes) if is_dataclass(value) else changes.get(name, value)
+        for name, value in values.items()
+    }
+    return replace(group, **revised)
+
+
+def _listed_values(kind: type) -> dict[str, tuple[object, ...]]:
+    """Return {name: values} of the traits of a group whose annotations list their values."""
+    listed = {}
+    for name, annotation in get_type_hints(kind).items():
+        parts = (annotation,) if annotation is bool or get_origin(annotation) is Literal else get_args(annotation)
+        values = [value for part in parts for value in _VALUES_OF_TYPES.get(part) or _words(part)]
+        if values:
+            listed[name] = tuple(values)
+    return listed
+
+
+def _words(annotation: Any) -> tuple[object, ...]:
+    """Return the words of a Literal, and nothing for other annotations."""
+    return get_args(annotation) if get_origin(annotation) is Literal else ()
+
+
+def _check_values(group: Any, path: str) -> None:
+    """Check that each trait of a group has one of the values that its annotation lists."""
+    for name, values in _VALUES[type(group)].items():
+        if getattr(group, name) not in values:
+            needed = ", ".join(map(repr, values))
+            raise ContractError(f"Traits.{path}.{name}: found {getattr(group, name)!r}; needed one of {needed}")
+
+
+_VALUES_OF_TYPES: dict[Any, tuple[object, ...]] = {bool: (True, False), type(None): (None,)}
+_VALUES = {kind: _listed_values(kind) for kind in (PatchPromises, Promises, Rules, Abilities)}

@@ -85,8 +85,9 @@ def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Repl
 
 def _traits(words: dict[str, Any]) -> Traits:
     """Return the traits that a plugin's process states, checked."""
-    if isinstance(words.get("source"), str):
-        words["source"] = one_line(words["source"])
+    evidence = words.get("evidence")
+    if isinstance(evidence, dict) and isinstance(evidence.get("source"), str):
+        evidence["source"] = one_line(evidence["source"])
     try:
         return msgspec.convert(words, Traits)
     except (msgspec.ValidationError, RecursionError) as error:

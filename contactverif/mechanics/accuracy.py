@@ -97,7 +97,7 @@ def solve_for_accuracy(
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
     formulation = subject.for_case(guess)
     trace = solve_in_tries(scene, formulation, start, step, keep_matrix=True)[-1]
-    return solution_of(trace, formulation, nodal=subject.traits.penalty == "nodal")
+    return solution_of(trace, formulation, nodal=subject.traits.rules.penalty == "nodal")
 
 
 def solve_in_tries(

@@ -282,7 +282,11 @@ class HertzStudy:
 
     def pose(self, across: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
-        multipliers, penalty, role = traits.enforcement == "multiplier", self.penalty(across), self.parabola_is_slave
+        multipliers, penalty, role = (
+            traits.rules.enforcement == "multiplier",
+            self.penalty(across),
+            self.parabola_is_slave,
+        )
         law = None if multipliers else penalty
         scene = hertz_box(BOX, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
         start, pressure = None, BOX.pressure(law)
@@ -307,7 +311,7 @@ class HertzStudy:
     def group(self, traits: Traits) -> str:
         """Return the word of the penalty; multipliers are as stiff as can be."""
         penalties = {penalty: word for word, penalty in PENALTIES.items()}
-        return "stiff" if traits.enforcement == "multiplier" else penalties[self.stiffness, self.fixed]
+        return "stiff" if traits.rules.enforcement == "multiplier" else penalties[self.stiffness, self.fixed]
 
     @classmethod
     def from_case(cls, case: Case) -> HertzStudy:

@@ -169,7 +169,7 @@ def _pose(teeth: int, stiffness: float, traits: Traits) -> ProblemInstance:
     problem = KinkedPatch(tuple((_WIDTH * place / (2 * teeth), _HEIGHT / teeth * (place % 2)) for place in places))
     penalty = stiffness * problem.young
     scene = kinked_patch(problem, penalty=penalty)
-    penetration = 0.0 if traits.enforcement == "multiplier" else problem.pressure / penalty
+    penetration = 0.0 if traits.rules.enforcement == "multiplier" else problem.pressure / penalty
     return pose_uniform(scene, problem.pressure, exact_unknowns(problem, scene, penetration))
 
 

@@ -259,8 +259,8 @@ class RingStudy:
 
     def fit(self, traits: Traits) -> FiniteFit:
         """Return the exact fit for formulations of these traits."""
-        penalty = inf if traits.enforcement == "multiplier" else self.penalty
-        return self.problem.finite(self.slave, penalty, "reference" if traits.area == "reference" else "current")
+        penalty = inf if traits.rules.enforcement == "multiplier" else self.penalty
+        return self.problem.finite(self.slave, penalty, "reference" if traits.rules.area == "reference" else "current")
 
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh.

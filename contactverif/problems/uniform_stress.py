@@ -131,6 +131,6 @@ def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> ProblemIns
 def pose_blocks(case: Case, traits: Traits) -> ProblemInstance:
     """Return the problem of two blocks under a uniform pressure, from their case."""
     scene = scene_of(case)
-    penalty = np.inf if traits.enforcement == "multiplier" else case.penalty
+    penalty = np.inf if traits.rules.enforcement == "multiplier" else case.penalty
     pressure = pressure_of(case, penalty)
     return pose_uniform(scene, pressure, exact_unknowns(scene, pressure, penalty))

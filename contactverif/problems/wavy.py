@@ -219,7 +219,7 @@ class WavyStudy:
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh."""
         penalty = self.penalty(refine)
-        multipliers = traits.enforcement == "multiplier"
+        multipliers = traits.rules.enforcement == "multiplier"
         problem = WavyProblem(penalty=inf if multipliers else penalty, amplitude=self.amplitude)
         scene = wavy_scene(problem, refine, self.slave, self.columns)
         if multipliers:

@@ -166,7 +166,7 @@ def has_opposite_sign(subject: Subject) -> bool:
     A residual with all signs turned round is the most frequent mistake of a first plugin. Then nearly every property
     fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
     """
-    if subject.traits.enforcement == "barrier":  # It is not defined in penetration.
+    if subject.traits.rules.enforcement == "barrier":  # It is not defined in penetration.
         return False
     try:
         return all(_push(subject, named_case(name)) < 0 for name in STATES)

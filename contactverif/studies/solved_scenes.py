@@ -105,7 +105,7 @@ def _contact(
     try:
         pairing = formulation.pair(interface, z)
         forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
-        if "contact_points" not in formulation.provides or subject.traits.penalty == "nodal":
+        if "contact_points" not in formulation.provides or subject.traits.rules.penalty == "nodal":
             return forces, None, ""
         points = formulation.contact_points(interface, pairing, z)
     except ContractError as error:
@@ -134,4 +134,4 @@ def _exact_pressure(case: Case, subject: Subject) -> float:
     """
     if not is_uniform(case):
         return np.nan
-    return pressure_of(case, np.inf if subject.traits.enforcement == "multiplier" else case.penalty)
+    return pressure_of(case, np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty)

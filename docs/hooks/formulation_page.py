@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 
 from page_text import plain, table
@@ -12,10 +11,10 @@ from contactverif import Subject, Traits
 from contactverif.run.registry import load_formulations
 
 _COLUMNS = {
-    "passes_flat_patch": "flat patch test",
-    "passes_normal_patch": "node on node",
-    "passes_single_patch": "nodes on midpoints",
-    "covers_overhang": "overhang",
+    "flat": "flat patch test",
+    "normal": "node on node",
+    "single": "nodes on midpoints",
+    "overhang": "overhang",
     "tangent": "tangent",
     "symmetric": "symmetric",
     "conserves_force": "force balance",
@@ -31,10 +30,12 @@ def _cell(value: object) -> str:
 
 def formulation_page(root: Path) -> str:
     """Return the page of the formulations that are installed."""
-    names = [field.name for field in fields(Traits) if field.name in _COLUMNS]
+    names = [name for name in Traits().by_name() if name in _COLUMNS]
     subjects = [item for item in load_formulations() if isinstance(item, Subject)]
-    rows = [[f"`{item.name}`", *(_cell(getattr(item.traits, name)) for name in names)] for item in subjects]
-    sources = [[f"`{item.name}`", plain(item.traits.source)] for item in subjects if item.traits.source]
+    rows = [[f"`{item.name}`", *(_cell(item.traits.by_name()[name]) for name in names)] for item in subjects]
+    sources = [
+        [f"`{item.name}`", plain(item.traits.evidence.source)] for item in subjects if item.traits.evidence.source
+    ]
     families = relink((root / "plugins" / "README.md").read_text(encoding="utf-8"), "plugins/README.md")
     body = families.partition("\n")[2]
     text = [

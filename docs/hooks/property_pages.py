@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import fields
 from itertools import combinations
 from pathlib import Path
 
@@ -13,10 +12,10 @@ from page_text import plain, sentence, table
 from contactverif import Property, Quantity, Traits
 
 _VALUES = {
-    "passes_flat_patch": (True,),
-    "passes_normal_patch": (True,),
-    "passes_single_patch": (True,),
-    "covers_overhang": (True,),
+    "flat": (True,),
+    "normal": (True,),
+    "single": (True,),
+    "overhang": (True,),
     "tangent": ("exact",),
     "symmetric": (True,),
     "conserves_force": (True,),
@@ -25,7 +24,7 @@ _VALUES = {
     "area": ("current", "reference"),
     "penalty": ("distributed", "nodal"),
     "enforcement": ("multiplier",),
-    "passes_kinked_patch": (True,),
+    "kinked": (True,),
     "converges": (True,),
     "inf_sup": (True,),
     "locks": (False,),
@@ -44,7 +43,7 @@ def promised_by(question: Property) -> str:
     """Return in words which traits promise that the property passes; each small set of traits is tried."""
     if question.promise(Traits()):
         return "every formulation, whatever its traits say"
-    names = {field.name for field in fields(Traits)}
+    names = Traits().by_name().keys()
     singles = [(name, value) for name, values in _VALUES.items() if name in names for value in values]
     for size in (1, 2):
         hits = [dict(hit) for hit in combinations(singles, size) if len(dict(hit)) == size and _promises(question, hit)]
@@ -54,7 +53,7 @@ def promised_by(question: Property) -> str:
 
 
 def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
-    return bool(question.promise(Traits(**dict(values))))  # type: ignore[arg-type]
+    return bool(question.promise(Traits().revise(**dict(values))))  # type: ignore[arg-type]
 
 
 def property_page(question: Property) -> str:

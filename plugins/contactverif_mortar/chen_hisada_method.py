@@ -18,7 +18,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif.geometry.projection import (
@@ -229,32 +229,32 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     current = choose("area", area, AREAS)
     return ChenHisada(
         Traits(
-            passes_flat_patch=True,
-            passes_normal_patch=True,
-            passes_single_patch=True,
-            passes_kinked_patch=True,
-            covers_overhang=False,
-            converges=True,
-            locks=False,
-            tangent="exact",
-            symmetric=False,
-            conserves_force=True,
-            conserves_moment=True,
-            area="current" if current else "reference",
-            gap="cells and nodes",
-            force_along="slave normal",
-            integrates_linear_gap=True,
-            local=True,
-            nodes_push=True,
-            unbiased=False,
-            continuity="C0",
-            translation_stable=True,
-            penalty="distributed",
-            batched=True,
-            takes_complex=True,
-            takes_longdouble=TAKES_LONGDOUBLE,
-            witnesses={"patch.dead-zone": "dead-zone", "symmetric": "offset-c", "swap": "tilted"},
-            source="Chen & Hisada, as Zavarise & De Lorenzis describe it, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
+            promises=Promises(
+                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=False),
+                converges=True,
+                locks=False,
+                tangent="exact",
+                symmetric=False,
+                conserves_force=True,
+                conserves_moment=True,
+                integrates_linear_gap=True,
+                local=True,
+                nodes_push=True,
+                unbiased=False,
+                continuity="C0",
+                translation_stable=True,
+            ),
+            rules=Rules(
+                area="current" if current else "reference",
+                gap="cells and nodes",
+                force_along="slave normal",
+                penalty="distributed",
+            ),
+            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+            evidence=Evidence(
+                witnesses={"patch.dead-zone": "dead-zone", "symmetric": "offset-c", "swap": "tilted"},
+                source="Chen & Hisada, as described by Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
+            ),
         ),
         check_penalty(penalty),
         Quadrature.gauss(N_POINTS, current),

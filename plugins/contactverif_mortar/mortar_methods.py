@@ -11,7 +11,7 @@ Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -21,7 +21,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
@@ -223,8 +223,7 @@ def _weighting(area: str, normals: str, dual: bool) -> Weighting:
 
 def _with_multipliers(traits: Traits) -> Traits:
     """Return the promises of a penalty method, for multipliers in its place."""
-    return replace(
-        traits,
+    return traits.revise(
         enforcement="multiplier",
         independent_multipliers=True,
         inf_sup=True,
@@ -239,31 +238,37 @@ def _traits(area: str, normals: str, dual: bool) -> Traits:
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}
     return Traits(
-        passes_flat_patch=True,
-        passes_normal_patch=True,
-        passes_single_patch=True,
-        passes_kinked_patch=not averaged,  # An averaged normal belongs to neither facet of a kink.
-        covers_overhang=True,
-        converges=True,
-        locks=False,
-        tangent="exact",
-        symmetric=False,
-        conserves_force=True,
-        conserves_moment=True,
-        # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
-        continuity=None if averaged else "C0",
-        area="current" if choose("area", area, AREAS) else "reference",
-        gap=None if averaged else "cells",
-        force_along=None if averaged else "slave normal",
-        integrates_linear_gap=None if averaged else False,
-        local=True,
-        nodes_push=not dual,  # Dual shapes are negative in places.
-        unbiased=False,
-        translation_stable=True,
-        penalty="distributed",
-        batched=True,
-        takes_complex=True,
-        takes_longdouble=TAKES_LONGDOUBLE,
-        witnesses={**kinked, **pulls, "patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted"},
-        source=_SOURCES[dual],
+        promises=Promises(
+            patch=PatchPromises(
+                flat=True,
+                normal=True,
+                single=True,
+                kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
+                overhang=True,
+            ),
+            converges=True,
+            locks=False,
+            tangent="exact",
+            symmetric=False,
+            conserves_force=True,
+            conserves_moment=True,
+            # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
+            continuity=None if averaged else "C0",
+            integrates_linear_gap=None if averaged else False,
+            local=True,
+            nodes_push=not dual,  # Dual shapes are negative in places.
+            unbiased=False,
+            translation_stable=True,
+        ),
+        rules=Rules(
+            area="current" if choose("area", area, AREAS) else "reference",
+            gap=None if averaged else "cells",
+            force_along=None if averaged else "slave normal",
+            penalty="distributed",
+        ),
+        abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+        evidence=Evidence(
+            witnesses={**kinked, **pulls, "patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted"},
+            source=_SOURCES[dual],
+        ),
     )

@@ -17,7 +17,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
@@ -103,37 +103,37 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
     """
     return SegmentToSegment(
         Traits(
-            passes_flat_patch=True,
-            passes_normal_patch=True,
-            passes_single_patch=True,
-            passes_kinked_patch=True,
-            covers_overhang=True,
-            converges=True,
-            locks=True,
-            tangent="exact",
-            symmetric=False,
-            conserves_force=True,
-            conserves_moment=True,
-            continuity="C0",
-            area="current" if choose("area", area, AREAS) else "reference",
-            gap="cells",
-            force_along="slave normal",
-            integrates_linear_gap=True,
-            local=True,
-            nodes_push=True,
-            unbiased=False,
-            translation_stable=True,
-            penalty="distributed",
-            batched=True,
-            takes_complex=True,
-            takes_longdouble=TAKES_LONGDOUBLE,
-            witnesses={
-                "symmetric": "offset-c",
-                "swap": "tilted",
-                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                "accuracy.wavy-curved": "upper slave, 100 E/h",
-            },
-            source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
+            promises=Promises(
+                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=True),
+                converges=True,
+                locks=True,
+                tangent="exact",
+                symmetric=False,
+                conserves_force=True,
+                conserves_moment=True,
+                continuity="C0",
+                integrates_linear_gap=True,
+                local=True,
+                nodes_push=True,
+                unbiased=False,
+                translation_stable=True,
+            ),
+            rules=Rules(
+                area="current" if choose("area", area, AREAS) else "reference",
+                gap="cells",
+                force_along="slave normal",
+                penalty="distributed",
+            ),
+            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+            evidence=Evidence(
+                witnesses={
+                    "symmetric": "offset-c",
+                    "swap": "tilted",
+                    "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
+                    "accuracy.wavy-curved": "upper slave, 100 E/h",
+                },
+                source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
+            ),
         ),
         check_penalty(penalty),
         Quadrature.gauss(N_POINTS, choose("area", area, AREAS)),

@@ -28,7 +28,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
 from contactverif_mortar import cell_forces
@@ -245,34 +245,34 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
     """
     return TwoHalfPasses(
         Traits(
-            passes_flat_patch=True,
-            passes_normal_patch=True,
-            passes_single_patch=True,
-            passes_kinked_patch=True,
-            covers_overhang=True,
-            locks=True,
-            tangent="exact",
-            symmetric=False,
-            conserves_force=False,
-            conserves_moment=False,
-            area="current" if choose("area", area, AREAS) else "reference",
-            force_along="slave normal",
-            local=True,
-            unbiased=True,
-            nodes_push=True,
-            translation_stable=True,
-            penalty="distributed",
-            batched=True,
-            takes_complex=True,
-            takes_longdouble=TAKES_LONGDOUBLE,
-            witnesses={
-                "balance.force": "tilted",
-                "balance.moment": "tilted",
-                "symmetric": "offset-c",
-                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                "accuracy.wavy-curved": "upper slave, 100 E/h",
-            },
-            source=_SOURCE,
+            promises=Promises(
+                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=True),
+                locks=True,
+                tangent="exact",
+                symmetric=False,
+                conserves_force=False,
+                conserves_moment=False,
+                local=True,
+                unbiased=True,
+                nodes_push=True,
+                translation_stable=True,
+            ),
+            rules=Rules(
+                area="current" if choose("area", area, AREAS) else "reference",
+                force_along="slave normal",
+                penalty="distributed",
+            ),
+            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+            evidence=Evidence(
+                witnesses={
+                    "balance.force": "tilted",
+                    "balance.moment": "tilted",
+                    "symmetric": "offset-c",
+                    "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
+                    "accuracy.wavy-curved": "upper slave, 100 E/h",
+                },
+                source=_SOURCE,
+            ),
         ),
         check_penalty(penalty),
         Quadrature.gauss(max(2, check_count(n)), choose("area", area, AREAS)),

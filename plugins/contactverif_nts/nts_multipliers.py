@@ -40,14 +40,12 @@ def nts_lm(*, penalty: float, tau: float = 1e-2) -> PointContact:
     Zavarise & De Lorenzis (2009), Section 5.1.3; rows and tangent: here.
     """
     springs = nts(penalty=penalty, tau=tau)
-    witnesses = {**springs.traits.witnesses, "patch": "b"}  # on A1 and A2 nodal forces are free to be the right ones
-    traits = replace(
-        springs.traits,
-        passes_normal_patch=True,
-        enforcement="multiplier",
-        independent_multipliers=True,
-        inf_sup=True,
-        witnesses=witnesses,
+    witnesses = {
+        **springs.traits.evidence.witnesses,
+        "patch": "b",
+    }  # on A1 and A2 nodal forces are free to be the right ones
+    traits = springs.traits.revise(
+        normal=True, enforcement="multiplier", independent_multipliers=True, inf_sup=True, witnesses=witnesses
     )
     return replace(springs, traits=traits)
 
@@ -115,14 +113,13 @@ def _with_multipliers(traits: Traits, n: int) -> Traits:
     Where nodes coincide, some pressures at n ≥ 2 points a segment move nothing. At one point a segment, a pressure that
     alternates moves less and less as the mesh is refined.
     """
-    witnesses = {**traits.witnesses, "stability.inf-sup": "matching"}
+    witnesses = {**traits.evidence.witnesses, "stability.inf-sup": "matching"}
     if n > 1:
         witnesses["multipliers"] = "a1"
-    return replace(
-        traits,
+    return traits.revise(
         enforcement="multiplier",
         independent_multipliers=n == 1,
-        converges=traits.converges if n == 1 else None,
+        converges=traits.promises.converges if n == 1 else None,
         inf_sup=False,
         locks=None,
         integrates_linear_gap=None,

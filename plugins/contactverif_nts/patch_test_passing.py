@@ -30,7 +30,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.local_matrix import NO_NODE, share_couplings
@@ -44,40 +44,35 @@ from contactverif_nts.walk import FREE_ENDS, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
 _PRINTED = Traits(
-    passes_flat_patch=True,
-    passes_normal_patch=True,
-    passes_single_patch=True,
-    passes_kinked_patch=True,
-    covers_overhang=False,
-    converges=True,
-    tangent="exact",
-    symmetric=False,
-    conserves_force=False,
-    conserves_moment=False,
-    area="current",
-    gap="closest point",
-    force_along="master normal",
-    integrates_linear_gap=False,
-    local=True,
-    nodes_push=True,
-    unbiased=False,
-    continuity="jumps",
-    translation_stable=True,
-    penalty="distributed",
-    batched=True,
-    takes_complex=True,
-    takes_longdouble=TAKES_LONGDOUBLE,
-    witnesses={
-        "balance.force": "tilted",
-        "balance.moment": "tilted",
-        "patch.dead-zone": "dead-zone",
-        "patch.tilted": "tilted",
-        "symmetric": "offset-c",
-        "swap": "tilted",
-        "continuity": "sliding",
-    },
-    published_forces={"c": "1 2 3 4 2; 3/2 3 3 3 3/2"},  # Fig. 20
-    source=_PAPER,
+    promises=Promises(
+        patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=False),
+        converges=True,
+        tangent="exact",
+        symmetric=False,
+        conserves_force=False,
+        conserves_moment=False,
+        integrates_linear_gap=False,
+        local=True,
+        nodes_push=True,
+        unbiased=False,
+        continuity="jumps",
+        translation_stable=True,
+    ),
+    rules=Rules(area="current", gap="closest point", force_along="master normal", penalty="distributed"),
+    abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+    evidence=Evidence(
+        witnesses={
+            "balance.force": "tilted",
+            "balance.moment": "tilted",
+            "patch.dead-zone": "dead-zone",
+            "patch.tilted": "tilted",
+            "symmetric": "offset-c",
+            "swap": "tilted",
+            "continuity": "sliding",
+        },
+        published_forces={"c": "1 2 3 4 2; 3/2 3 3 3 3/2"},  # Fig. 20
+        source=_PAPER,
+    ),
 )
 
 
@@ -100,7 +95,7 @@ class PatchTestPassing:
 
     def n_multipliers(self, interface: Interface, /) -> int:
         """Return the number of multipliers: one for each virtual slave node, or 0 for a penalty."""
-        return self.n * len(interface.slave) if self.traits.enforcement == "multiplier" else 0
+        return self.n * len(interface.slave) if self.traits.rules.enforcement == "multiplier" else 0
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the master segments under each area of competence, and decide which virtual slave nodes are active."""
@@ -222,7 +217,7 @@ def vts_ppt(
     """
     # A segment that is continued past its free end has shares below zero.
     pushes = None if free_end == "extend" else True
-    traits = replace(_PRINTED, covers_overhang=free_end == "cover", nodes_push=pushes)
+    traits = _PRINTED.revise(overhang=free_end == "cover", nodes_push=pushes)
     return PatchTestPassing(
         traits=add_locking(traits, check_count(n)),
         penalty=check_penalty(penalty),
@@ -249,8 +244,8 @@ def vts_ppt_basic(
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
-    witnesses = {**consistent.traits.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
-    traits = replace(consistent.traits, tangent="approximate", witnesses=witnesses)
+    witnesses = {**consistent.traits.evidence.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
+    traits = consistent.traits.revise(tangent="approximate", witnesses=witnesses)
     return replace(consistent, consistent=False, traits=traits)
 
 
@@ -269,12 +264,11 @@ def vts_ppt_balanced(
     """
     current = choose("area", area, AREAS) == CURRENT
     covers = free_end == "cover" or None
-    traits = replace(
-        _PRINTED,
-        covers_overhang=covers,
+    traits = _PRINTED.revise(
+        overhang=covers,
         conserves_force=covers,
         conserves_moment=covers,
-        nodes_push=covers or None,  # Otherwise the shares at a free end have any sum, by which the force is divided.
+        nodes_push=covers or None,
         area="current" if current else "reference",
         witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"},
     )

@@ -23,7 +23,7 @@ Source: Zavarise & De Lorenzis (2009), Sections 4.1, 4.2 and 5.1.2.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -36,7 +36,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
@@ -63,7 +63,7 @@ class PointContact:
 
     def n_multipliers(self, interface: Interface, /) -> int:
         """Return the number of multipliers: one for each point, in their order, or 0 for a penalty."""
-        return len(self._points(interface)[0]) if self.traits.enforcement == "multiplier" else 0
+        return len(self._points(interface)[0]) if self.traits.rules.enforcement == "multiplier" else 0
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the nearest master segment of each point, and decide which points are active."""
@@ -282,43 +282,43 @@ def _traits(
     """
     areas = {eq6.CURRENT: "current", eq6.REFERENCE: "reference", None: None}
     return Traits(
-        passes_flat_patch=False,
-        passes_normal_patch=passes_normal,
-        passes_single_patch=passes_single,
-        passes_kinked_patch=False,
-        covers_overhang=False,
-        converges=False if n_points <= FEW_POINTS else None,
-        tangent="exact",
-        symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
-        conserves_force=True,
-        conserves_moment=True,
-        area=areas[area_from],  # type: ignore[arg-type]
-        gap="closest point",
-        force_along="master normal",
-        local=True,
-        nodes_push=True,
-        unbiased=False,
-        continuity="jumps",
-        integrates_linear_gap=None if area_from is None else linear,
-        translation_stable=True,
-        penalty=penalty,  # type: ignore[arg-type]
-        batched=True,
-        takes_complex=True,
-        takes_longdouble=TAKES_LONGDOUBLE,
-        witnesses={
-            "patch": patch_witness,
-            "patch.dead-zone": "dead-zone",
-            "patch.kinked": "edge of 53°, lower slave",
-            "patch.tilted": "tilted",
-            "symmetric": "offset-c",
-            "swap": "tilted",
-            "continuity": "sliding",
-            "accuracy.hertz": "parabola-layer",
-            "accuracy.wavy": "upper slave, 10 E/h",
-            "accuracy.wavy-curved": "upper slave, 100 E/h",
-        },
-        published_forces=published_forces,
-        source=_PAPER,
+        promises=Promises(
+            patch=PatchPromises(flat=False, normal=passes_normal, single=passes_single, kinked=False, overhang=False),
+            converges=False if n_points <= FEW_POINTS else None,
+            tangent="exact",
+            symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
+            conserves_force=True,
+            conserves_moment=True,
+            local=True,
+            nodes_push=True,
+            unbiased=False,
+            continuity="jumps",
+            integrates_linear_gap=None if area_from is None else linear,
+            translation_stable=True,
+        ),
+        rules=Rules(
+            area=areas[area_from],  # type: ignore[arg-type]
+            gap="closest point",
+            force_along="master normal",
+            penalty=penalty,  # type: ignore[arg-type]
+        ),
+        abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+        evidence=Evidence(
+            witnesses={
+                "patch": patch_witness,
+                "patch.dead-zone": "dead-zone",
+                "patch.kinked": "edge of 53°, lower slave",
+                "patch.tilted": "tilted",
+                "symmetric": "offset-c",
+                "swap": "tilted",
+                "continuity": "sliding",
+                "accuracy.hertz": "parabola-layer",
+                "accuracy.wavy": "upper slave, 10 E/h",
+                "accuracy.wavy-curved": "upper slave, 100 E/h",
+            },
+            published_forces=published_forces,
+            source=_PAPER,
+        ),
     )
 
 
@@ -330,7 +330,7 @@ def add_locking(traits: Traits, n: int) -> Traits:
     if n < 2:
         return traits
     witnesses = {"stability.locking": "12 on 8, ε̂ = 1e8 E/h", "accuracy.wavy-curved": "upper slave, 100 E/h"}
-    return replace(traits, locks=True, witnesses={**traits.witnesses, **witnesses})
+    return traits.revise(locks=True, witnesses={**traits.evidence.witnesses, **witnesses})
 
 
 def _points_at(
@@ -338,7 +338,7 @@ def _points_at(
 ) -> PointContact:
     """Return the formulation with points at c on each slave segment, its options checked."""
     return PointContact(
-        traits=replace(traits, locks=False) if at_nodes else add_locking(traits, len(np.atleast_1d(c))),
+        traits=traits.revise(locks=False) if at_nodes else add_locking(traits, len(np.atleast_1d(c))),
         penalty=check_penalty(penalty),
         c=freeze(c, np.float64),
         weight=freeze(weight, np.float64),

@@ -145,28 +145,29 @@ def _traits(inner: Traits) -> Traits:
     segment.
     """
     passes, independent, converges, inf_sup, locks = None, None, None, None, None
-    witnesses = {part: name for part, name in inner.witnesses.items() if not part.startswith(("patch", "multipliers"))}
-    if inner.enforcement == "penalty" and inner.locks is not None:
+    witnesses = {
+        part: name for part, name in inner.evidence.witnesses.items() if not part.startswith(("patch", "multipliers"))
+    }
+    if inner.rules.enforcement == "penalty" and inner.promises.locks is not None:
         locks = True  # Each pass forces the nodes of one surface onto the other.
         witnesses["stability.locking"] = "12 on 8, ε̂ = 1e8 E/h"
-    if inner.enforcement == "penalty" and inner.converges is not None:
+    if inner.rules.enforcement == "penalty" and inner.promises.converges is not None:
         converges = False
         witnesses |= dict.fromkeys(("accuracy.wavy", "accuracy.wavy-curved"), "upper slave, 10 E/h")
         witnesses["accuracy.hertz"] = "parabola-layer"
-    if inner.enforcement == "penalty" and inner.passes_flat_patch is not None:
+    if inner.rules.enforcement == "penalty" and inner.promises.patch.flat is not None:
         passes, witnesses["patch"], witnesses["patch.kinked"] = False, "a1", "edge of 53°, lower slave"
-    elif inner.enforcement == "multiplier":
+    elif inner.rules.enforcement == "multiplier":
         independent = inf_sup = False  # two nodes in one place have two multipliers for one gap
         witnesses |= {"multipliers": "a1", "stability.inf-sup": "matching"}
-        if inner.penalty == "nodal" and inner.conserves_force and inner.conserves_moment:
+        if inner.rules.penalty == "nodal" and inner.promises.conserves_force and inner.promises.conserves_moment:
             passes = True
-    return replace(
-        inner,
-        passes_flat_patch=passes,
-        passes_normal_patch=passes if passes or inner.passes_normal_patch is not None else None,
-        passes_single_patch=passes if passes or inner.passes_single_patch is not None else None,
-        passes_kinked_patch=passes,
-        covers_overhang=passes,
+    return inner.revise(
+        flat=passes,
+        normal=passes if passes or inner.promises.patch.normal is not None else None,
+        single=passes if passes or inner.promises.patch.single is not None else None,
+        kinked=passes,
+        overhang=passes,
         converges=converges,
         inf_sup=inf_sup,
         locks=locks,
@@ -177,8 +178,8 @@ def _traits(inner: Traits) -> Traits:
         unbiased=True,
         batched=True,
         witnesses=witnesses,
-        published_forces=_add_exchanged(inner.published_forces),
-        source=f"two passes of: {inner.source}" if inner.source else "",
+        published_forces=_add_exchanged(inner.evidence.published_forces),
+        source=f"two passes of: {inner.evidence.source}" if inner.evidence.source else "",
     )
 
 

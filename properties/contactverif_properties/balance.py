@@ -46,7 +46,7 @@ WORK = Quantity(
     summary="The forces on slave and master add up to zero on tilts, kinks and curves.",
     quantities=(FORCE_IMBALANCE,),
     cases=Cases.random(any_cases),
-    promise=lambda traits: traits.conserves_force,
+    promise=lambda traits: traits.promises.conserves_force,
 )
 def force_balance(case: Case, subject: Subject) -> Measurement:
     """Ask whether the forces on slave and master add up to zero.
@@ -74,7 +74,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     summary="The moments of the forces on slave and master add up to zero on tilts, kinks and curves.",
     quantities=(MOMENT_IMBALANCE,),
     cases=Cases.random(any_cases),
-    promise=lambda traits: traits.conserves_moment,
+    promise=lambda traits: traits.promises.conserves_moment,
 )
 def moment_balance(case: Case, subject: Subject) -> Measurement:
     """Ask whether the moments of the forces on slave and master add up to zero.
@@ -108,7 +108,7 @@ def _judge(quantity: Quantity, lost: float, arm: float, state: Case, forces: Flo
     summary="The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.",
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: traits.symmetric,
+    promise=lambda traits: traits.promises.symmetric,
 )
 def symmetric(case: Case, subject: Subject) -> Measurement:
     """Ask whether the tangent is symmetric, and the forces have a potential.
@@ -141,7 +141,7 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
         tangent = dense(formulation.tangent(case.interface, pairing, case.z))
         values[ASYMMETRY] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
         tolerances[ASYMMETRY] = segment_tolerance(case, forces, distance)
-    if subject.traits.tangent != "approximate":
+    if subject.traits.promises.tangent != "approximate":
         for share in RADII if pairing is None else RADII[:1]:
             radius = share * case.shortest_segment
             values[WORK] = largest_work(case, formulation, pairing, radius)

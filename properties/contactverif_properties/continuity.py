@@ -39,14 +39,14 @@ Function = Callable[[FloatArray], FloatArray]
 
 def promise_continuity(traits: Traits) -> bool | None:
     """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
-    return None if traits.continuity is None else traits.continuity != "jumps"
+    return None if traits.promises.continuity is None else traits.promises.continuity != "jumps"
 
 
 def refuse_unstated_continuity(traits: Traits) -> str:
     """Return why the question makes no sense for a formulation, or an empty string if it does."""
-    if traits.enforcement == "multiplier":
+    if traits.rules.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
-    return "the trait `continuity` is not stated" if traits.continuity is None else ""
+    return "the trait `continuity` is not stated" if traits.promises.continuity is None else ""
 
 
 @Property.define(
@@ -88,7 +88,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
     jumps = find_jumps(forces, samples, HALVINGS, ALLOWED)
     values = {FORCE: ratio(jumps[0][1], size)}
     tolerances = {FORCE: ALLOWED * ratio(_largest_step(samples), size) + rounding}
-    if subject.traits.continuity == "C1":
+    if subject.traits.promises.continuity == "C1":
         samples = slope(_places())
         steepest = float(np.abs(samples).max())
         values[SLOPE] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)

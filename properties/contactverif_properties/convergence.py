@@ -83,7 +83,7 @@ def exact_forces(studies: Studies, case: Case) -> FloatArray:
     summary="Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.",
     quantities=WAVY_STUDIES.quantities,
     cases=Cases.from_list(WAVY_STUDIES.cases),
-    promise=lambda traits: traits.converges,
+    promise=lambda traits: traits.promises.converges,
     applicable=refuse_dependent_multipliers,
     series=dict.fromkeys(WAVY_STUDIES.series, "1"),
     bodies=True,
@@ -131,9 +131,9 @@ def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
 
 def promise_without_locking(traits: Traits) -> bool | None:
     """Return whether the traits promise convergence without locking; None if they leave one of them open."""
-    if traits.converges is False or traits.locks is True:
+    if traits.promises.converges is False or traits.promises.locks is True:
         return False
-    return True if traits.converges and traits.locks is False else None
+    return True if traits.promises.converges and traits.promises.locks is False else None
 
 
 @Property.define(
@@ -178,7 +178,7 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     summary="Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.",
     quantities=HERTZ_STUDIES.quantities,
     cases=Cases.from_list(HERTZ_STUDIES.cases),
-    promise=lambda traits: traits.converges,
+    promise=lambda traits: traits.promises.converges,
     applicable=lambda traits: refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits),
     series=dict.fromkeys(HERTZ_STUDIES.series, "1"),
     bodies=True,
@@ -293,14 +293,14 @@ def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[Quantity, float]:
     formulation, interface, n_slave = subject.for_case(case), case.interface, case.interface.n_slave_nodes
     case = case.with_multipliers(np.full(formulation.n_multipliers(interface), arcs.pressure))
     # Areas of the reference are those of the master's arc, on which the slave lies there.
-    share = arcs.radius / arcs.slave_radius if subject.traits.area == "reference" else 1.0
+    share = arcs.radius / arcs.slave_radius if subject.traits.rules.area == "reference" else 1.0
     pairing = formulation.pair(interface, case.z)
     forces = -formulation.residual(interface, pairing, case.z)[: interface.n_unknowns].reshape(-1, 2)
     exact = share * arcs.slave_force
     totals = forces[:n_slave].sum(axis=0), -forces[n_slave:].sum(axis=0)
     slave, master = (float(np.linalg.norm(total - exact) / np.linalg.norm(exact)) for total in totals)
     values = {SLAVE: slave, FORCES: _nodal_error(arcs, case, forces, share)}
-    if subject.traits.conserves_force:
+    if subject.traits.promises.conserves_force:
         values[MASTER] = master
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(interface, pairing, case.z)

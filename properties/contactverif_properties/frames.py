@@ -64,7 +64,7 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     """
     interface, random = case.interface, np.random.default_rng(case.seed)
     factor, n = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1)), interface.n_unknowns
-    distributed = subject.traits.penalty == "distributed"
+    distributed = subject.traits.rules.penalty == "distributed"
     formulation, case = prepare_state(case, subject)
     z = np.concatenate([case.z[:n] * factor, case.z[n:] * (1.0 if distributed else factor)])
     there = replace(case, interface=interface.at(interface.nodes * factor), z=z)
@@ -151,6 +151,6 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
 
 def _count_passes(case: Case, subject: Subject, formulation: CheckedFormulation, pairing: Pairing | None) -> int:
     """Return 2 where springs act twice, in two passes: half of the penetration needs the same forces. Else return 1."""
-    if subject.traits.area is not None or "contact_points" not in formulation.provides:
+    if subject.traits.rules.area is not None or "contact_points" not in formulation.provides:
         return 1
     return len(list(split_passes(case, formulation.contact_points(case.interface, pairing, case.z))))

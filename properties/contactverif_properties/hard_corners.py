@@ -40,7 +40,7 @@ SIZE = Quantity("force over ε̂ D L", "1", "4", f"No gap is longer than D; {TWO
 
 def measure_bounded(case: Case, subject: Subject) -> Measurement:
     """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
-    bounds = case.parameters["segment_bounds" if subject.traits.gap else "bounds"] * case.penalty
+    bounds = case.parameters["segment_bounds" if subject.traits.rules.gap else "bounds"] * case.penalty
     slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     largest = case.penalty * case.diameter * case.slave_length
@@ -200,7 +200,7 @@ PULLING = Quantity("pull across the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "A s
     cases=Cases.from_list(touching_states),
     promise=lambda traits: True,
     asks=WITHOUT_BARRIER | {"barrier"},
-    applicable=lambda traits: "a barrier is infinite in touch" if traits.enforcement == "barrier" else "",
+    applicable=lambda traits: "a barrier is infinite in touch" if traits.rules.enforcement == "barrier" else "",
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:
     """Ask whether surfaces that just touch give neither a force nor nonsense.
@@ -231,7 +231,7 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     size, gap = case.largest_coordinate, abs(case.parameter("shift"))
     values = {FORCE: float(np.abs(forces).max()) / (case.penalty * longest * size)}
     tolerances = {FORCE: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
-    if "tangent" in subject.provides and subject.traits.tangent == "exact":
+    if "tangent" in subject.provides and subject.traits.promises.tangent == "exact":
         n = interface.n_unknowns
         tangent = dense(formulation.tangent(interface, pairing, state.z))[:n, :n]
         along, across = _motions(case)

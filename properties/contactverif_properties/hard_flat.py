@@ -1,7 +1,7 @@
 """Hard states of a flat interface with a uniform penetration: far away, deep, over a node, or near other surfaces.
 
 All rules for gaps agree there, so every formulation is asked something: no force along the surface, and a push out of
-the master (everybody); the total (who states `penalty` and `area`); each nodal force (unless `passes_flat_patch` is
+the master (everybody); the total (who states `penalty` and `area`); each nodal force (unless `patch.flat` is
 False).
 """
 
@@ -41,12 +41,12 @@ VACUOUS = "the gap is smaller than the rounding of positions that far from the o
 
 def knows_total(traits: Traits) -> bool:
     """Return whether the traits say what the total force of a uniform penetration is."""
-    return traits.penalty == "distributed" and traits.area is not None
+    return traits.rules.penalty == "distributed" and traits.rules.area is not None
 
 
 def promise_flat_forces(traits: Traits) -> bool | None:
     """Return True where the traits promise what is asked, the patch test or at least the total; else None."""
-    return True if traits.passes_flat_patch or (traits.passes_flat_patch is False and knows_total(traits)) else None
+    return True if traits.promises.patch.flat or (traits.promises.patch.flat is False and knows_total(traits)) else None
 
 
 def measure_flat(case: Case, subject: Subject) -> Measurement:
@@ -64,7 +64,7 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     if knows_total(traits):
         values[TOTAL], tolerances[TOTAL] = abs(push / whole - 1), tolerance
-    if traits.passes_flat_patch is not False:
+    if traits.promises.patch.flat is not False:
         forces, largest = forces_of_gap(case, subject, exact)
         values[NODAL] = float(np.linalg.norm(forces - exact, axis=1).max()) / whole
         tolerances[NODAL] = tolerance * largest
@@ -106,7 +106,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     coordinates of few enough bits. So the stored gap is uniform, and the forces are exact in rationals. Near 1e8 the
     stored gap is not the one that was asked for, and the stored one counts. What is asked depends on the traits: no
     force along the surface (everybody), the total (who states `penalty` and `area`), each nodal force (unless
-    `passes_flat_patch` is False). The tolerance is u(8Z/|g| + 4N). Z is the diameter D of the interface for whoever
+    `patch.flat` is False). The tolerance is u(8Z/|g| + 4N). Z is the diameter D of the interface for whoever
     says `translation_stable`, and the largest coordinate X for everybody else.
 
     **Undecided.** The case whose gap is one step of the doubles is undecided without that promise: there the tolerance

@@ -49,7 +49,7 @@ def measure_patch(case: Case, subject: Subject) -> Measurement:
     if not has_bodies(case):
         return measure_flat(case, subject)
     measurement, traits = measure_once(case, subject), subject.traits
-    if traits.passes_flat_patch and traits.independent_multipliers is False:
+    if traits.promises.patch.flat and traits.promises.independent_multipliers is False:
         # Newton's method may release a redundant multiplier, and others carry its force: another solution.
         return replace(measurement, undecided="the multipliers are not independent, so the forces are not unique")
     return measurement
@@ -64,7 +64,7 @@ _define = partial(Property.define, family="hard", bodies=True)
 _define_patch = partial(
     _define,
     quantities=(*FLAT_QUANTITIES, *QUANTITIES, MULTIPLIERS),
-    promise=lambda traits: True if traits.passes_flat_patch else None,  # Which of the cases would fail is not stated.
+    promise=lambda traits: True if traits.promises.patch.flat else None,  # Which of the cases would fail is not stated.
     exact=patch_forces,
 )
 
@@ -87,7 +87,7 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The states have the paper's forces, in rationals, and are judged as in `hard.offset`. The
     scenes have a master three times as stiff, and ε̂ = E and 1e4 E; they are judged as in `patch.flat.solve`, with its
-    tolerances. The promise is `passes_flat_patch`.
+    tolerances. The promise is `patch.flat`.
 
     **Undecided.** Never: on a flat interface both partners of the kink give the same gap.
     """
@@ -108,7 +108,7 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** Manuals tell users to take the softer or the finer body as the slave, and warn of locking
     otherwise. A formulation that passes the patch test must pass it for every choice.
 
-    **How it is judged.** As in `patch.flat.solve`, with its tolerances. The promise is `passes_flat_patch`. Whether
+    **How it is judged.** As in `patch.flat.solve`, with its tolerances. The promise is `patch.flat`. Whether
     pressures that vary lock is another question, which this one does not answer.
 
     **Undecided.** Never.
@@ -132,7 +132,7 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** As states, with the penalties as they are: as in `hard.offset`. Solved, with E = 1 in both
     blocks: as in `patch.flat.solve`, whose tolerances have the term 5e-15/r for the ratio r = 4e-6 of the shortest to
-    the longest segment. The promise is `passes_flat_patch`.
+    the longest segment. The promise is `patch.flat`.
 
     **Undecided.** A scene that fails is undecided for multipliers that are not independent: Newton's method may release
     one that is redundant on the tiny segment, and others carry its force.
@@ -158,7 +158,7 @@ def hard_stiff(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** As in `patch.flat.solve`. Its tolerances contain the condition κ of the matrix and the
     rounding X ε̂/p of gaps, so they are wide at 1e10: up to 1 part in 10 for pressures. What is asked there is that
     nothing is worse than conditioning, that Newton's method comes near a solution, and that all numbers are finite. The
-    promise is `passes_flat_patch`.
+    promise is `patch.flat`.
 
     **Undecided.** Never.
     """
@@ -181,7 +181,7 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
     summary="A uniform pressure stays exact where the master covers 1e-1 to 1e-12 of a slave segment.",
     quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
     cases=Cases.from_list(vanishing_overlap_scenes),
-    promise=lambda traits: True if traits.covers_overhang else None,
+    promise=lambda traits: True if traits.promises.patch.overhang else None,
     exact=forces_to_draw,
 )
 def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
@@ -193,7 +193,7 @@ def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** As a body slides off an edge, every such share occurs. A nodal gap is then an integral over the
     share, divided by another one. A multiplier has next to nothing to act on, and the matrix loses rank.
 
-    **How it is judged.** As in `patch.dead-zone`, and promised by the same trait, `covers_overhang`. Where the master
+    **How it is judged.** As in `patch.dead-zone`, and promised by the same trait, `patch.overhang`. Where the master
     covers a share s of a segment, roundoff of a gap there grows by 1/s. So what is measured at single points (gaps and
     pressures) has the rounding term 64 u X ε̂/(p s) more, and with multipliers all that is measured has X/s in place of
     X: a force that no gap holds is known no better. Details say what the matrix of the exact solution is like: its
@@ -206,7 +206,7 @@ def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
     measurement = patch_dead_zone.measure(case, subject)
     rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure_of(case, case.penalty)
     more = rounding / covered_share(case)
-    if subject.traits.enforcement == "multiplier":
+    if subject.traits.rules.enforcement == "multiplier":
         growth = 1 + more / measurement.tolerances[STRESS.name]  # The other tolerances are multiples of this one.
         numbers = [replace(number, tolerance=growth * number.tolerance) for number in measurement.numbers]
     else:
@@ -229,7 +229,7 @@ def covered_share(case: Case) -> float:
 def _rank(case: Case, subject: Subject) -> dict[str, float]:
     """Return the reciprocal condition and the lack of rank of the matrix at the exact solution."""
     scene, formulation, multipliers = scene_of(case), subject.for_case(case), np.zeros(0)
-    penalty = np.inf if subject.traits.enforcement == "multiplier" else case.penalty
+    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
     pressure = pressure_of(case, penalty)
     exact = exact_unknowns(scene, pressure, penalty)
     if formulation.n_multipliers(case.interface):

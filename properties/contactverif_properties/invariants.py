@@ -110,7 +110,7 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     summary="Slave and master may exchange their roles.",
     quantities=WITH_ROLES_EXCHANGED,
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: traits.unbiased,
+    promise=lambda traits: traits.promises.unbiased,
 )
 def swap(case: Case, subject: Subject) -> Measurement:
     """Ask whether slave and master may exchange their roles.
@@ -130,7 +130,7 @@ def swap(case: Case, subject: Subject) -> Measurement:
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
     """
     exchanged, carry = exchange_roles(case)
-    answers, unbiased = answer_alike(case, exchanged, subject), bool(subject.traits.unbiased)
+    answers, unbiased = answer_alike(case, exchanged, subject), bool(subject.traits.promises.unbiased)
     return compare(WITH_ROLES_EXCHANGED, subject, *answers, carry, explain=unbiased)
 
 

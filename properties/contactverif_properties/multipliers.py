@@ -57,7 +57,7 @@ REDUNDANT = Quantity(
     quantities=(TENSION, CHANGE),
     cases=Cases.random(solid_cases),
     promise=lambda traits: (
-        True if traits.enforcement == "multiplier" and not refuse_dependent_multipliers(traits) else None
+        True if traits.rules.enforcement == "multiplier" and not refuse_dependent_multipliers(traits) else None
     ),
     asks=frozenset({"multiplier"}),
     applicable=refuse_dependent_multipliers,
@@ -108,7 +108,7 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     summary="The constraints are independent, so that the multipliers are unique.",
     quantities=(REDUNDANT,),
     cases=Cases.random(block_cases),
-    promise=lambda traits: traits.independent_multipliers,
+    promise=lambda traits: traits.promises.independent_multipliers,
     asks=frozenset({"multiplier"}),
     bodies=True,
 )

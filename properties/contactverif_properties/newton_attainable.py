@@ -94,7 +94,7 @@ class Attained:
     summary="Far from the origin, residual and accuracy are limited by the stored positions alone.",
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),
-    promise=lambda traits: traits.translation_stable,
+    promise=lambda traits: traits.promises.translation_stable,
     applicable=refuse_dependent_multipliers,
     bodies=True,
     usual_undecided=0.002,

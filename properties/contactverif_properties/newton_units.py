@@ -76,7 +76,7 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
     k = int(random.integers(-LARGEST_LENGTH, LARGEST_LENGTH + 1))
     j = int(random.integers(-LARGEST_MODULUS, LARGEST_MODULUS + 1))
     length, modulus, penalty = 2.0**k, 4.0**j, subject.penalty(case)
-    distributed = subject.traits.penalty == "distributed"
+    distributed = subject.traits.rules.penalty == "distributed"
     system = System(scene, subject.with_penalty(penalty))
     rescaled = subject.with_penalty(penalty * modulus / (length if distributed else 1.0))
     other = System(change_units(scene, length, modulus), rescaled)

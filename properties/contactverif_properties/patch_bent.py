@@ -73,14 +73,16 @@ def rings() -> tuple[Case, ...]:
 
 def refuse_unknown_mean(traits: Traits) -> str:
     """Return why the mean pressure is unknown from the traits, or an empty string if they say enough."""
-    if traits.enforcement == "multiplier":
+    if traits.rules.enforcement == "multiplier":
         return refuse_dependent_multipliers(traits)
     return refuse_unknown_total(traits)
 
 
 def promise_mean(traits: Traits) -> bool | None:
     """Return True where the traits say what the mean pressure is, and for multipliers, that they are unique."""
-    if refuse_unknown_mean(traits) or (traits.enforcement == "multiplier" and not traits.independent_multipliers):
+    if refuse_unknown_mean(traits) or (
+        traits.rules.enforcement == "multiplier" and not traits.promises.independent_multipliers
+    ):
         return None
     return True
 
@@ -241,7 +243,7 @@ def forces_to_draw(case: Case) -> FloatArray:
     summary="A uniform pressure stays exact on an interface with a kink.",
     quantities=(STRESS, SLAVE, MASTER, PRESSURE, CUT, FALL),
     cases=Cases.from_list(kinked_cases),
-    promise=lambda traits: traits.passes_kinked_patch,
+    promise=lambda traits: traits.promises.patch.kinked,
     bodies=True,
     exact=forces_to_draw,
 )
@@ -269,7 +271,7 @@ def patch_kinked(case: Case, subject: Subject) -> Measurement:
       falls by at least 0.95 decades: earlier the part of second order counts, later roundoff may. Where the error is
       below 4 (g/ℓ) tan(φ/2) + u (8X/g + 4N) at p = 1e-3 E, as that of multipliers, nothing need fall.
 
-    The trait `passes_kinked_patch` promises it.
+    The trait `patch.kinked` promises it.
 
     **Undecided.** A case whose uniform state is exact, but whose solution with three normals Newton's method does not
     find.
@@ -285,7 +287,7 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     scene = kinked_patch(problem, upper_slave=upper_slave, penalty=penalty)
     traits, pressure, gap = subject.traits, problem.pressure, problem.pressure / penalty
     start = Case(scene.interface, scene.positions(scene.start), penalty)
-    formulation, multiplier = subject.for_case(start), traits.enforcement == "multiplier"
+    formulation, multiplier = subject.for_case(start), traits.rules.enforcement == "multiplier"
     trace, u = _solve(scene, formulation, exact_unknowns(problem, scene, 0.0 if multiplier else gap), gap)
     q, multipliers = u[: scene.n_free], u[scene.n_free :]
     z = np.concatenate([scene.positions(q), multipliers])
@@ -301,8 +303,8 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
         MASTER: float(errors[n_slave:].max()),
     }
     tolerances = dict.fromkeys(values, _floor(problem, start, gap))
-    unique = not multiplier or traits.independent_multipliers is True
-    if "contact_points" in formulation.provides and traits.penalty == "distributed" and unique:
+    unique = not multiplier or traits.promises.independent_multipliers is True
+    if "contact_points" in formulation.provides and traits.rules.penalty == "distributed" and unique:
         points = formulation.contact_points(scene.interface, pairing, z)
         if not points.on_master.any():  # Nobody says how two passes share a pressure.
             values[PRESSURE] = _pressure_error(points, pressure)

@@ -51,7 +51,7 @@ _define = partial(Property.define, family="patch")
     summary="A uniform penetration of a flat interface gives the exact nodal forces on both sides.",
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
-    promise=lambda traits: traits.passes_flat_patch,
+    promise=lambda traits: traits.promises.patch.flat,
     exact=forces_of_penetration,
 )
 def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
@@ -81,9 +81,9 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
 def refuse_unknown_total(traits: Traits) -> str:
     """Return why the total force is unknown from the traits, or an empty string if they say enough."""
-    if traits.penalty == "nodal":
+    if traits.rules.penalty == "nodal":
         return "there are no distributed springs"
-    if traits.penalty is None or traits.area is None:
+    if traits.rules.penalty is None or traits.rules.area is None:
         return "the traits `penalty` and `area` are not both stated, so the total is unknown"
     return ""
 
@@ -120,7 +120,7 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     formulation, stretched = subject.for_case(case), replace(case, interface=interface)
     state, pairing, forces = forces_of_multiplier(stretched, formulation, case.penalty * penetration)
     exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
-    if subject.traits.area == "reference":
+    if subject.traits.rules.area == "reference":
         exact = exact * stretch
     error = float(np.linalg.norm(forces[: interface.n_slave_nodes].sum(axis=0) - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
@@ -133,12 +133,12 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
 
 def promise_single(traits: Traits) -> bool | None:
     """Return the promise for meshes with master nodes on slave nodes and in the middle of slave segments."""
-    return True if traits.passes_flat_patch else traits.passes_single_patch
+    return True if traits.promises.patch.flat else traits.promises.patch.single
 
 
 def promise_normal(traits: Traits) -> bool | None:
     """Return the promise for meshes with master nodes on slave nodes."""
-    return True if promise_single(traits) else traits.passes_normal_patch
+    return True if promise_single(traits) else traits.promises.patch.normal
 
 
 def measure_class(case: Case, subject: Subject) -> Measurement:
@@ -160,7 +160,7 @@ def _measure_once(case: Case, subject: Subject) -> Measurement:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = _point_errors(case, formulation)
         values[GAP], tolerances[GAP] = gap, tolerance
-        if subject.traits.penalty != "nodal":  # A nodal formulation knows forces only.
+        if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
             values[PRESSURE], tolerances[PRESSURE] = pressure, tolerance
     return Measurement(check_all(values, tolerances))
 
@@ -236,7 +236,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The measured numbers are the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both
     surfaces, the largest error of a reported gap over |g|, and that of a reported pressure over ε̂ |g|. The exact
     forces are computed in rationals. The tolerance is u(8X/|g| + 4N), as in `patch.flat.transmission`, and multipliers
-    are judged as there. The promise is `passes_normal_patch`; a formulation that passes any flat patch test is asked
+    are judged as there. The promise is `patch.normal`; a formulation that passes any flat patch test is asked
     too.
 
     **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly, and roundoff
@@ -264,7 +264,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     an even number of points passes here and fails elsewhere. VTS-G, whose points are elsewhere on the segment, fails
     here. So this is the test that tells them apart, and that a VTS-ME with misplaced points cannot pass.
 
-    **How it is judged.** As in `patch.flat.normal`, with the same tolerances. The promise is `passes_single_patch`; a
+    **How it is judged.** As in `patch.flat.normal`, with the same tolerances. The promise is `patch.single`; a
     formulation that passes any flat patch test is asked too.
 
     **Undecided.** As in `patch.flat.normal`.
@@ -279,9 +279,9 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     summary="Nodal springs push each node with their stiffness times the gap, shared by the lever rule.",
     quantities=(FORCE, GAP, REPORTED_FORCE),
     cases=Cases.random(overhung_cases),
-    promise=lambda traits: True if traits.penalty == "nodal" and traits.enforcement == "penalty" else None,
+    promise=lambda traits: True if traits.rules.penalty == "nodal" and traits.rules.enforcement == "penalty" else None,
     asks=frozenset({"penalty"}),
-    applicable=lambda traits: "" if traits.penalty == "nodal" else "there are no nodal springs",
+    applicable=lambda traits: "" if traits.rules.penalty == "nodal" else "there are no nodal springs",
 )
 def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     """Ask whether the springs of a nodal method give ε |g| at each node, shared by the lever rule, on flat surfaces.
@@ -306,7 +306,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     """
     formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
     pairing, spring = formulation.pair(interface, case.z), subject.penalty(case) * depth
-    unbiased = bool(subject.traits.unbiased)
+    unbiased = bool(subject.traits.promises.unbiased)
     weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
     exact = spring * push_apart(case, weights, 1.0)
     forces = -formulation.residual(interface, pairing, case.z).reshape(-1, 2)
@@ -328,8 +328,8 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     summary="The forces that the traits state of named flat cases, right or wrong, come out exactly.",
     quantities=(STATED,),
     cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
-    promise=lambda traits: True if traits.published_forces else None,
-    applicable=lambda traits: "" if traits.published_forces else "the traits state no forces of named cases",
+    promise=lambda traits: True if traits.evidence.published_forces else None,
+    applicable=lambda traits: "" if traits.evidence.published_forces else "the traits state no forces of named cases",
     least_contact=0.0,  # Nothing is asked on a case of which nothing is stated, and one table is better than none.
 )
 def patch_flat_published(case: Case, subject: Subject) -> Measurement:
@@ -362,13 +362,13 @@ def patch_flat_published(case: Case, subject: Subject) -> Measurement:
 
 def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
     """Return the forces (n_nodes, 2) that must come out; None if that is not known."""
-    if strangers := traits.published_forces.keys() - set(FLAT_NAMES):
+    if strangers := traits.evidence.published_forces.keys() - set(FLAT_NAMES):
         needed = f"names of flat cases: {', '.join(FLAT_NAMES)}"
         raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
-    if case.name not in traits.published_forces:
-        consistent = traits.passes_flat_patch and traits.penalty == "distributed"
+    if case.name not in traits.evidence.published_forces:
+        consistent = traits.promises.patch.flat and traits.rules.penalty == "distributed"
         return consistent_forces(case, 1.0) if consistent else None
-    slave, master = parse_forces(traits.published_forces[case.name])
+    slave, master = parse_forces(traits.evidence.published_forces[case.name])
     slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     if (len(slave), len(master)) != (len(slave_x), len(master_x)):
         counts = f"{len(slave)} and {len(master)} forces on {case.name}"

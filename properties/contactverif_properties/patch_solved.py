@@ -36,7 +36,7 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     The details are how each solution ended, and the slope of the logarithm of the stress error over that of the
     penalty.
     """
-    if subject.traits.enforcement == "multiplier":
+    if subject.traits.rules.enforcement == "multiplier":
         return measure_once(case, subject)
     moderate = measure_at_penalty(case, subject, case.penalty)
     high = measure_at_penalty(case, subject, HIGH * case.penalty)
@@ -84,7 +84,7 @@ _define_at_two_penalties = partial(
     id="patch.flat.solve",
     summary="Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.",
     cases=Cases.random(block_cases),
-    promise=lambda traits: traits.passes_flat_patch,
+    promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     """Ask whether two elastic blocks under a uniform pressure find the exact stress, at a moderate and a high penalty.
@@ -171,7 +171,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     summary="A uniform pressure stays exact with a rigid master, unequal materials, an inclined interface or a punch.",
     quantities=(*QUANTITIES, MULTIPLIERS),
     cases=Cases.random(variant_cases),
-    promise=lambda traits: traits.passes_flat_patch,
+    promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_variants(case: Case, subject: Subject) -> Measurement:
     """Ask whether the solved patch test holds in unusual set-ups: rigid, unequal, inclined, slid, or under a punch.
@@ -200,7 +200,7 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
     summary="A uniform pressure stays exact where the slave overhangs the master inside a slave segment.",
     quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
-    promise=lambda traits: traits.covers_overhang,
+    promise=lambda traits: traits.promises.patch.overhang,
 )
 def patch_dead_zone(case: Case, subject: Subject) -> Measurement:
     """Ask whether the solved patch test holds where the slave overhangs the master inside a slave segment.

@@ -31,7 +31,7 @@ from contactverif_properties.shared.passes import Pass
 
 def refuse_without_rule(traits: Traits) -> str:
     """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
-    return "" if traits.gap is not None else "the trait `gap` states no rule of projection"
+    return "" if traits.rules.gap is not None else "the trait `gap` states no rule of projection"
 
 
 # Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
@@ -65,7 +65,7 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
     """
     reported = Reported.from_case(case, subject)
-    rule, value, ties, broken = subject.traits.gap, 0.0, 0, ""
+    rule, value, ties, broken = subject.traits.rules.gap, 0.0, 0, ""
     for each in reported.passes:
         places = Places.from_pass(each, rule, reported.distant)
         segments = places.reported.master_segment
@@ -131,7 +131,7 @@ def projection_place(case: Case, subject: Subject) -> Measurement:
     reported = Reported.from_case(case, subject)
     values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:
-        places = Places.from_pass(each, subject.traits.gap, reported.distant)
+        places = Places.from_pass(each, subject.traits.rules.gap, reported.distant)
         for name, errors in (*_errors(places, reported.distant), (POSITION, _position_errors(each, far))):
             values[name] = float(np.maximum(values[name], largest(errors)))
     tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
@@ -174,9 +174,9 @@ WRONG = Quantity(
 
 def refuse_other_decisions(traits: Traits) -> str:
     """Return why the decision is not known from the gap, or an empty string."""
-    if traits.enforcement == "multiplier":
+    if traits.rules.enforcement == "multiplier":
         return "the enforcement is by a multiplier, which decides in its own way"
-    if traits.gap == "cells and nodes":
+    if traits.rules.gap == "cells and nodes":
         return "the slave nodes decide, and the points do not"
     return refuse_without_rule(traits)
 
@@ -234,7 +234,7 @@ class _Count:
 
 def _count(reported: Reported) -> _Count:
     """Count the decisions in one state."""
-    rule, wrong, decided = reported.traits.gap, 0, 0
+    rule, wrong, decided = reported.traits.rules.gap, 0, 0
     for each in reported.passes:
         weighted = each.points.select(each.points.weighted)
         local = Places.from_pass(each, rule, reported.distant)

@@ -38,7 +38,7 @@ SUM = Quantity(
     id="projection.area",
     summary="Areas of competence and weights add up to the slave's length, or to what of it is covered.",
     quantities=(WEIGHT, ENDS, SUM),
-    applicable=lambda traits: "" if traits.penalty == "distributed" else "there are no distributed springs",
+    applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
 )
 def projection_area(case: Case, subject: Subject) -> Measurement:
     """Ask whether the areas of competence add up to the slave's length, or to what of it is covered.
@@ -54,7 +54,7 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     `area` (without the trait, in either); the point lies between them, and areas of one segment do not overlap: 16u of
     the interface's diameter. The sum of the weights is held against an exact length, 64u of the diameter for each
     segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up to the slave's
-    length; unless the trait `covers_overhang` is False, they need to only where the whole slave faces one master chain
+    length; unless the trait `patch.overhang` is False, they need to only where the whole slave faces one master chain
     in all its normals. Points that look along the slave's normal need to where all of the slave sees the master.
     Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
     slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
@@ -94,14 +94,14 @@ def _area_breach(reported: Reported, *, fits: bool) -> str:
 def _lengths(each: Pass, traits: Traits) -> list[FloatArray]:
     """Return the lengths (n_segments,) of the slave in the configurations in which areas may be measured."""
     current, reference = (each.interface.slave.lengths(nodes) for nodes in (each.positions, each.interface.nodes))
-    return {"current": [current], "reference": [reference], None: [current, reference]}[traits.area]
+    return {"current": [current], "reference": [reference], None: [current, reference]}[traits.rules.area]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Areas:
     """The points of a pass, the lengths of the slave segments, and the length at which a point may be rounded.
 
-    The trait `covers_overhang` speaks of the sum of all passes, so it says something here if there is one.
+    The trait `patch.overhang` speaks of the sum of all passes, so it says something here if there is one.
     """
 
     each: Pass
@@ -139,7 +139,7 @@ class _Areas:
     def _sum_errors(self, size: FloatArray) -> Iterator[float]:
         """Yield the errors of sums of weights, over the lengths that they are formed from."""
         points, slave = self.each.points, self.each.interface.slave
-        rule = self.traits.gap
+        rule = self.traits.rules.gap
         scale = len(slave) * float((size * self.length / self._current()).max())
         total, whole = float(points.weight.sum()), float(self.length.sum())
         lattice = Lattice.from_state(self.each.interface, self.each.z)
@@ -151,7 +151,7 @@ class _Areas:
 
     def _covers_all(self, lattice: Lattice) -> bool:
         """Return whether the weights of the points must add up to the slave's length."""
-        rule, covers = self.traits.gap, self.traits.covers_overhang
+        rule, covers = self.traits.rules.gap, self.traits.promises.patch.overhang
         if rule == CLOSEST:
             return (covers is False and self.one_pass) or lies_in_shadow(lattice, self.each.interface)
         if rule is None:
@@ -242,7 +242,7 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
     if (difference := _force_difference(reported)) is not None:
         values[FORCES], tolerance = _compare_forces(reported, difference)
         tolerances[FORCES] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
-    if subject.traits.gap is not None:
+    if subject.traits.rules.gap is not None:
         values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
         tolerances[FOOT] = 16 * UNIT_ROUNDOFF
     if _has_linear_law(subject.traits):
@@ -274,7 +274,7 @@ def _breach(points: ContactPoints, traits: Traits) -> str:
     """Return how the points break the contract, or an empty string."""
     if (points.weighted & (np.abs(points.c) < 1)).any():
         return "a weighted node lies inside a segment"
-    if traits.penalty == "nodal" and (points.weight[points.active] != 1).any():
+    if traits.rules.penalty == "nodal" and (points.weight[points.active] != 1).any():
         return "a nodal force has a weight other than 1"
     if not (points.pressure[points.active] >= 0).all():
         return "a pressure at an active point is negative or NaN"
@@ -355,7 +355,7 @@ def _foot_error(each: Pass, reported: Reported) -> float:
     far = np.abs(each.positions).max()
     length = np.hypot(along[:, 0], along[:, 1])
     carrier = each.interface.slave.lengths(each.positions)[points.slave_segment]
-    if reported.traits.gap == CLOSEST:
+    if reported.traits.rules.gap == CLOSEST:
         carrier = length
     size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * length
     size += reported.distant * (np.abs(points.gap) / carrier + np.abs(points.xi))
@@ -365,6 +365,6 @@ def _foot_error(each: Pass, reported: Reported) -> float:
 
 def _has_linear_law(traits: Traits) -> bool:
     """Return whether a pressure is −ε̂ × the gap that is reported beside it."""
-    if traits.enforcement != "penalty" or traits.gap in (None, "cells and nodes"):
+    if traits.rules.enforcement != "penalty" or traits.rules.gap in (None, "cells and nodes"):
         return False
-    return traits.penalty == "distributed" and traits.area is not None
+    return traits.rules.penalty == "distributed" and traits.rules.area is not None

@@ -126,9 +126,9 @@ def purity(case: Case, subject: Subject) -> Measurement:
     ]
     bound, bound_of_tangent = (count * UNIT_ROUNDOFF for count in (BATCH_ROUNDINGS, TANGENT_ROUNDINGS))
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
-    if subject.traits.enforcement == "penalty":
+    if subject.traits.rules.enforcement == "penalty":
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
-    if subject.traits.batched:
+    if subject.traits.abilities.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         numbers.append(BATCHED.check(compare_batch(state, near, forces, batch), bound))
     if isinstance(subject, Restartable):

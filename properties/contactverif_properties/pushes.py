@@ -226,7 +226,7 @@ def _forces(formulation: CheckedFormulation, case: Case) -> Array:
     quantities=(PULL_OF_NODE,),
     cases=Cases.by_kind(pushing_cases),
     kinds=(FLAT, ANY_SHAPE),
-    promise=lambda traits: traits.nodes_push,
+    promise=lambda traits: traits.promises.nodes_push,
     usual_undecided=0.002,
 )
 def nodal_push(case: Case, subject: Subject) -> Measurement:

@@ -51,7 +51,7 @@ SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
     summary="A part far from the origin gets the same forces as the same part at the origin.",
     quantities=(FORCES, TANGENT, SEARCH),
     cases=Cases.random(translated_cases),
-    promise=lambda traits: traits.translation_stable,
+    promise=lambda traits: traits.promises.translation_stable,
 )
 def stability_translation(case: Case, subject: Subject) -> Measurement:
     """Ask whether a part far from the origin gets the same forces as the same part at the origin.
@@ -101,7 +101,7 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
 
 def refuse_unknown_forces(traits: Traits) -> str:
     """Return why no exact force is known, or an empty string if one is."""
-    if knows_forces(traits) or knows_total(traits) or traits.takes_longdouble:
+    if knows_forces(traits) or knows_total(traits) or traits.abilities.takes_longdouble:
         return ""
     return "no exact force is known: the traits promise no patch test, no area and no long double"
 
@@ -120,7 +120,7 @@ def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[
     quantities=(FORCES_THERE, TOTAL_THERE),
     cases=Cases.by_kind(local_cases),
     kinds=KINDS,
-    promise=lambda traits: True if traits.translation_stable else None,
+    promise=lambda traits: True if traits.promises.translation_stable else None,
     applicable=refuse_unknown_forces,
 )
 def stability_local(case: Case, subject: Subject) -> Measurement:
@@ -163,7 +163,7 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
     errors = (
         _errors_of_linear(near, subject.traits, forces) if linear else _errors_of_uniform(near, subject.traits, forces)
     )
-    if FORCES_THERE not in errors and subject.traits.takes_longdouble:
+    if FORCES_THERE not in errors and subject.traits.abilities.takes_longdouble:
         errors[FORCES_THERE] = forces - _in_long_double(far, formulation, pairing)
     if not errors:
         errors[FORCES_THERE] = forces - near_forces
@@ -192,12 +192,12 @@ def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Q
 
 def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
     """Return the same under a linear penetration, of the rows of slave nodes."""
-    if traits.enforcement != "penalty" or not knows_linear_total(traits):
+    if traits.rules.enforcement != "penalty" or not knows_linear_total(traits):
         return {}
     n_slave = case.interface.n_slave_nodes
     error = forces[: 2 * n_slave].reshape(-1, 2) + exact_slave_forces(case, traits)
     errors = {TOTAL_THERE: error.sum(axis=0)}
-    if traits.integrates_linear_gap:
+    if traits.promises.integrates_linear_gap:
         errors[FORCES_THERE] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
     return errors
 
@@ -241,14 +241,18 @@ def _count_total(case: Case, error: FloatArray, conditioning: Conditioning) -> f
 
 def knows_forces(traits: Traits) -> bool:
     """Return whether the traits say what the force on each node is: that of springs, or of uniform pressures."""
-    if traits.enforcement == "multiplier" and traits.penalty != "distributed":
+    if traits.rules.enforcement == "multiplier" and traits.rules.penalty != "distributed":
         return False
-    return traits.passes_flat_patch is True
+    return traits.promises.patch.flat is True
 
 
 def knows_total(traits: Traits) -> bool:
     """Return whether the traits say what the total force of springs is."""
-    return traits.enforcement == "penalty" and traits.penalty == "distributed" and traits.area is not None
+    return (
+        traits.rules.enforcement == "penalty"
+        and traits.rules.penalty == "distributed"
+        and traits.rules.area is not None
+    )
 
 
 def move_swept(case: Case) -> Case:
@@ -265,7 +269,7 @@ def move_swept(case: Case) -> Case:
     summary="Small gaps, short segments and a place far away cost no more digits than the condition number says.",
     quantities=(SWEPT_ROUNDINGS,),
     cases=Cases.from_list(stability_states),
-    promise=lambda traits: traits.translation_stable,
+    promise=lambda traits: traits.promises.translation_stable,
 )
 def stability_sweep(case: Case, subject: Subject) -> Measurement:
     """Ask whether the error of the forces stays in proportion to the condition number, on named states that get harder.

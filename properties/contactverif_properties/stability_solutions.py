@@ -76,9 +76,13 @@ _UNSOLVED = "Newton's method finds no solution on the pairing of the uniform sta
 
 def refuse_without_solution(traits: Traits) -> str:
     """Return why a formulation is not asked, or an empty string if it has springs that Newton's method can solve."""
-    if traits.enforcement != "penalty" or traits.penalty is None:
-        return f"the enforcement is by a {traits.enforcement}, not by springs of a stated stiffness"
-    return "" if traits.tangent == "exact" else "no exact tangent, with which Newton's method settles at any penalty"
+    if traits.rules.enforcement != "penalty" or traits.rules.penalty is None:
+        return f"the enforcement is by a {traits.rules.enforcement}, not by springs of a stated stiffness"
+    return (
+        ""
+        if traits.promises.tangent == "exact"
+        else "no exact tangent, with which Newton's method settles at any penalty"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +115,7 @@ class _TurnedSystem:
     summary="The contact forces of a solution keep their digits as far as the penalty lets them, up to 1e12 E/h.",
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
-    promise=lambda traits: traits.translation_stable,
+    promise=lambda traits: traits.promises.translation_stable,
     applicable=refuse_without_solution,
     needs=frozenset({"tangent"}),
     bodies=True,
@@ -245,7 +249,7 @@ def _conditioning(state: Case, system: System, pairing: Pairing | None, forces: 
     quantities=(ZEROS, SLOPE),
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
     cases=Cases.from_list(refinement_cases),
-    promise=lambda traits: traits.inf_sup,
+    promise=lambda traits: traits.promises.inf_sup,
     asks=frozenset({"multiplier"}),
     applicable=refuse_unstated_penalty,
     bodies=True,
@@ -278,7 +282,7 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
     move nothing on a finer one. The numerical test is that of Chapelle & Bathe, Computers & Structures 47 (1993)
     537–545.
     """
-    nodal = subject.traits.penalty == "nodal"
+    nodal = subject.traits.rules.penalty == "nodal"
     meshes = [inf_sup_constant(scene, subject.for_case(scene.case()), nodal=nodal) for scene in refinements(case)]
     segments, constants = (np.array([getattr(mesh, name) for mesh in meshes]) for name in ("segment", "constant"))
     series = {
@@ -302,7 +306,7 @@ def refuse_undefined_pressure(traits: Traits) -> str:
 
 def promise_smoothness(traits: Traits) -> bool | None:
     """Return whether the formulation promises not to lock; None if it promises nothing."""
-    return None if traits.locks is None else not traits.locks
+    return None if traits.promises.locks is None else not traits.promises.locks
 
 
 @Property.define(
@@ -360,7 +364,7 @@ def locking(case: Case, subject: Subject) -> Measurement:
     details = {"roughness of nodal forces": by_forces}
     if np.isfinite(by_points):
         details["roughness of reported pressures"] = by_points
-    if subject.traits.enforcement == "penalty":
+    if subject.traits.rules.enforcement == "penalty":
         soft = answer_to_wave(columns, SOFT, subject)
         if soft is None:
             return Measurement(undecided=_UNSOLVED)

@@ -37,7 +37,7 @@ AFTER_A_BEND = same_answer_quantities("after a bend elsewhere")
 
 def refuse_unknown_direction(traits: Traits) -> str:
     """Return why the direction of the forces is unknown from the traits, or an empty string if they state it."""
-    stated = traits.force_along is not None
+    stated = traits.rules.force_along is not None
     return "" if stated else "the trait `force_along` is not stated, so the direction of the force is unknown"
 
 
@@ -52,7 +52,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     summary="A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.",
     quantities=(OFF_NORMAL, TOTAL),
     cases=Cases.random(tilted_cases),
-    promise=lambda traits: True if traits.force_along else None,
+    promise=lambda traits: True if traits.rules.force_along else None,
     applicable=refuse_unknown_direction,
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
@@ -76,7 +76,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more.
     """
     traits, total = subject.traits, slave_forces(case, subject).sum(axis=0)
-    normal = directions(case)[0 if traits.force_along == "master normal" else 1]
+    normal = directions(case)[0 if traits.rules.force_along == "master normal" else 1]
     push, across = float(total @ normal), abs(float(total[0] * normal[1] - total[1] * normal[0]))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     values = {OFF_NORMAL: ratio(across, float(np.linalg.norm(total)))}
@@ -97,7 +97,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
 
 def refuse_unknown_integral(traits: Traits) -> str:
     """Return why no exact nodal force follows from the traits, or an empty string if one does."""
-    if traits.enforcement == "multiplier":
+    if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
     if not knows_linear_total(traits):
         return "the traits `penalty`, `area`, `gap` and `force_along` do not state all of the integral"
@@ -110,7 +110,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     summary="Each node of a straight, tilted slave gets the exact integral of its linear gap.",
     quantities=(NODAL,),
     cases=Cases.random(tilted_cases),
-    promise=lambda traits: traits.integrates_linear_gap,
+    promise=lambda traits: traits.promises.integrates_linear_gap,
     applicable=refuse_unknown_integral,
 )
 def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
@@ -139,7 +139,7 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     summary="A bend of the master's unloaded neighbours changes neither forces nor tangent.",
     quantities=AFTER_A_BEND,
     cases=Cases.random(bent_end_cases),
-    promise=lambda traits: traits.local,
+    promise=lambda traits: traits.promises.local,
 )
 def locality_bend(case: Case, subject: Subject) -> Measurement:
     """Ask whether a bend elsewhere changes the forces.

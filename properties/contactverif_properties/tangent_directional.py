@@ -57,7 +57,7 @@ COMPLEX = Quantity(
     summary="The tangent is the derivative of the residual on a frozen pairing.",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: None if traits.tangent is None else traits.tangent == "exact",
+    promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
     needs=frozenset({"tangent"}),
 )
 def tangent_directional(case: Case, subject: Subject) -> Measurement:
@@ -111,7 +111,7 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
         values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
             values[TAYLOR] = comparison.slope
-        if subject.traits.takes_complex and not formulation.decides_anew(pairing):
+        if subject.traits.abilities.takes_complex and not formulation.decides_anew(pairing):
             values[COMPLEX], complex_finding = differences.compare_complex_step(
                 np.vstack([directions, more]), comparison.turns
             )

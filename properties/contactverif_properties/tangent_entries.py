@@ -35,7 +35,7 @@ from contactverif_properties.shared.tangent_blocks import (
 
 def promise_exact_tangent(traits: Traits) -> bool | None:
     """Return whether the traits promise an exact tangent; None if they say nothing about it."""
-    return None if traits.tangent is None else traits.tangent == "exact"
+    return None if traits.promises.tangent is None else traits.promises.tangent == "exact"
 
 
 @Property.define(

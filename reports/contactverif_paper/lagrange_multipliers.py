@@ -204,7 +204,7 @@ def _test(formulation: PaperFormulation, name: str, scene: Scene) -> MultiplierT
     subject, tolerance = subject_of(formulation), condition_tolerance(scene, scene.penalty)
     trace = newton.solve(scene, subject.for_case(scene.case()))
     pressures = trace.multipliers / float(scene.facts["pressure"])
-    if subject.traits.penalty == "nodal":  # The slave's nodes, in a second pass the master's too.
+    if subject.traits.rules.penalty == "nodal":  # The slave's nodes, in a second pass the master's too.
         lengths = uniform_pressure_weights(scene.interface, scene.facts["along"])[: len(pressures)]
         pressures = pressures[lengths > 0] / lengths[lengths > 0]
     return MultiplierTest(

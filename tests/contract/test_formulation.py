@@ -11,7 +11,7 @@ import pytest
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
 
@@ -88,13 +88,13 @@ def test_same_as() -> None:
 
 def test_no_traits_promise_nothing() -> None:
     traits = Traits()
-    for name in ("passes_flat_patch", "tangent", "symmetric", "conserves_force", "conserves_moment", "continuity"):
-        assert getattr(traits, name) is None
-    assert not traits.batched
-    assert not traits.takes_complex
-    assert not traits.witnesses
+    for name in ("flat", "tangent", "symmetric", "conserves_force", "conserves_moment", "continuity"):
+        assert traits.by_name()[name] is None
+    assert not traits.abilities.batched
+    assert not traits.abilities.takes_complex
+    assert not traits.evidence.witnesses
     with pytest.raises(FrozenInstanceError):
-        traits.symmetric = True  # type: ignore[misc]
+        traits.promises = Promises()  # type: ignore[misc]
 
 
 def points(**changed: Any) -> ContactPoints:

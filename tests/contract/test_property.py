@@ -15,7 +15,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.named_states import named_case
 
 MOST = Quantity("defect", "1", "u 8X/|g|", "roundoff of a gap")
@@ -156,7 +156,9 @@ def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> Non
 
 
 def test_who_is_not_asked_is_told_why() -> None:
-    refusals = [definition.refusal(Traits(enforcement=each)) for each in ("penalty", "multiplier", "barrier")]
+    refusals = [
+        definition.refusal(Traits(rules=Rules(enforcement=each))) for each in ("penalty", "multiplier", "barrier")
+    ]
     assert refusals == [
         "",
         "the enforcement is by a multiplier",

@@ -8,7 +8,7 @@ import pytest
 
 from contactverif.contract.errors import ContractError
 from contactverif.contract.published_forces import format_forces, parse_forces
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Evidence, Traits
 
 
 def test_text_becomes_fractions_and_text_again() -> None:
@@ -20,9 +20,9 @@ def test_text_becomes_fractions_and_text_again() -> None:
 @pytest.mark.parametrize("text", ["", "1 2 1", "1 2 1;", "1; 2; 3", "one; two", "1/0; 1", None, 3])
 def test_other_texts_break_the_contract(text: object) -> None:
     with pytest.raises(ContractError, match=r"published_forces: found .*; needed fractions on the slave nodes"):
-        Traits(published_forces={"a1": text})  # type: ignore[dict-item]
+        Traits(evidence=Evidence(published_forces={"a1": text}))  # type: ignore[dict-item]
 
 
 def test_forces_belong_to_names() -> None:
     with pytest.raises(ContractError, match=r"published_forces: found a str; needed \{name of a flat case: forces\}"):
-        Traits(published_forces="1 2 1; 2 2")  # type: ignore[arg-type]
+        Traits(evidence=Evidence(published_forces="1 2 1; 2 2"))  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from contactverif.contract.errors import ContractError, MisuseError, NonFiniteEr
 from contactverif.contract.formulation import ContactPoints, Pairing, evaluate_both
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Promises, Rules, Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation
 
@@ -31,7 +31,7 @@ class Springs:
 
     def __init__(self, penalty: float, **parts: Any) -> None:
         self.penalty = penalty
-        self.traits = Traits(tangent="exact")
+        self.traits = Traits(promises=Promises(tangent="exact"))
         for name, part in parts.items():
             setattr(self, name, part)
 
@@ -72,7 +72,7 @@ def raising(*_: Any, **__: Any) -> Any:
 def test_a_correct_plugin() -> None:
     springs = subject()
     assert springs.provides == {"pair", "tangent", "contact_points"}
-    assert springs.traits.tangent == "exact"
+    assert springs.traits.promises.tangent == "exact"
     pairing = answer_to("pair")
     assert isinstance(pairing, Pairing)
     assert pairing["active"].sum() == (Z > 0).sum()
@@ -83,8 +83,8 @@ def test_a_correct_plugin() -> None:
 
 def test_the_penalty_in_the_kind_of_the_formulation() -> None:
     assert subject().penalty(CASE) == 10
-    assert subject(traits=Traits(penalty="distributed")).penalty(CASE) == 10
-    assert subject(traits=Traits(penalty="nodal")).penalty(CASE) == 20  # mean slave segment: 2
+    assert subject(traits=Traits(rules=Rules(penalty="distributed"))).penalty(CASE) == 10
+    assert subject(traits=Traits(rules=Rules(penalty="nodal"))).penalty(CASE) == 20  # mean slave segment: 2
     assert subject().with_penalty(7).residual(PAIR, None, Z).tolist() == (7 * Z).tolist()
 
 
@@ -117,7 +117,7 @@ def test_a_batch_equals_a_loop(dtype: type) -> None:
 
     answers = {}
     for batched in (False, True):
-        guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
+        guarded = subject(residual=residual, traits=Traits(abilities=Abilities(batched=batched))).for_case(CASE)
         answers[batched] = guarded.residual(PAIR, guarded.pair(PAIR, Z), states)
     assert dimensions == [1] * 6 + [3]
     assert answers[True].shape == states.shape
@@ -285,7 +285,7 @@ def test_one_bad_state_of_a_batch() -> None:
         return np.where(z > 11, np.nan, z)
 
     for batched in (False, True):
-        guarded = subject(residual=residual, traits=Traits(batched=batched)).for_case(CASE)
+        guarded = subject(residual=residual, traits=Traits(abilities=Abilities(batched=batched))).for_case(CASE)
         with pytest.raises(NonFiniteError, match="residual: nan in 2 of "):
             guarded.residual(PAIR, None, BATCH)
 
@@ -342,7 +342,7 @@ def test_a_factory_that_fails_for_the_penalty_of_the_case() -> None:
 )
 def test_multipliers_and_the_trait_go_together(enforcement: Any, count: Any, message: str) -> None:
     class Counting:
-        traits = Traits(enforcement=enforcement)
+        traits = Traits(rules=Rules(enforcement=enforcement))
 
         def n_multipliers(self, interface: Interface) -> Any:
             return count
@@ -357,7 +357,7 @@ def test_multipliers_and_the_trait_go_together(enforcement: Any, count: Any, mes
 
 def test_multipliers_are_counted_once_an_interface() -> None:
     class Restless:
-        traits = Traits(enforcement="multiplier")
+        traits = Traits(rules=Rules(enforcement="multiplier"))
         count = 0
 
         def n_multipliers(self, interface: Interface) -> int:

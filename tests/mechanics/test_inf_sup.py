@@ -21,7 +21,9 @@ def formulation_on(name: str, scene: Scene) -> CheckedFormulation:
 
 
 def constant_of(name: str, scene: Scene) -> InfSup:
-    return inf_sup_constant(scene, formulation_on(name, scene), nodal=load_subject(name).traits.penalty == "nodal")
+    return inf_sup_constant(
+        scene, formulation_on(name, scene), nodal=load_subject(name).traits.rules.penalty == "nodal"
+    )
 
 
 def node_on_node_constants(scene: Scene) -> Any:

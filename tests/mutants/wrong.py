@@ -139,7 +139,7 @@ def _encodes_numbers(penalty: float) -> Any:
         return np.unpackbits(np.ascontiguousarray(values, float).view(np.uint8)).astype(bool)
 
     class Encoded:
-        traits = replace(inner.traits, takes_complex=False, batched=False)
+        traits = inner.traits.revise(takes_complex=False, batched=False)
 
         def pair(self, interface: Any, z: Any) -> Any:
             pairing = inner.pair(interface, z)

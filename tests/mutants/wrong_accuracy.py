@@ -31,7 +31,7 @@ def _reports_mean(*, penalty: float) -> Any:
 
 def _denies_that_it_locks(*, penalty: float) -> Any:
     right = sts(penalty=penalty)
-    return replace(right, traits=replace(right.traits, locks=False))
+    return replace(right, traits=right.traits.revise(locks=False))
 
 
 MUTANTS = (

@@ -52,7 +52,7 @@ def _reports_a_fifth_less(*, penalty: float) -> Any:
 def _says_that_kinks_pass(*, penalty: float) -> Any:
     """Make a mortar method with normals averaged over kinks that promises to pass at them."""
     inner = contactverif_mortar.mortar(penalty=penalty, normals="averaged")
-    return replace(inner, traits=replace(inner.traits, passes_kinked_patch=True, witnesses={}))
+    return replace(inner, traits=inner.traits.revise(kinked=True, witnesses={}))
 
 
 def _whole_segments(*, penalty: float) -> Any:

@@ -7,7 +7,7 @@ reported: what is wrong shows in the forces alone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from mutate import Mutant
@@ -26,7 +26,7 @@ class SharedForces:
 
     def __post_init__(self) -> None:
         self._inner = contactverif_nts.vts_ppt_balanced(penalty=self.penalty)
-        self.traits = replace(self._inner.traits, converges=True)
+        self.traits = self._inner.traits.revise(converges=True)
 
     def pair(self, interface: Any, z: Any) -> Any:
         return self._inner.pair(interface, z)

@@ -6,7 +6,7 @@ Tangents are exact, action equals reaction, and nothing is reported: what is wro
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class FactoredSprings:
     def __init__(self, penalty: float, factor: Factor, **traits: Any) -> None:
         self.penalty, self.factor = penalty, factor
         self._inner = contactverif_nts.vts_g(penalty=penalty)
-        self.traits = replace(self._inner.traits, takes_longdouble=False, **traits)
+        self.traits = self._inner.traits.revise(takes_longdouble=False, **traits)
 
     def pair(self, interface: Any, z: Any) -> Any:
         return self._inner.pair(interface, z)
@@ -159,7 +159,7 @@ def _says(make: Any, **traits: Any) -> Any:
 
     def boast(*, penalty: float) -> Any:
         inner = make(penalty=penalty)
-        return Changed(inner, traits=replace(inner.traits, **traits))
+        return Changed(inner, traits=inner.traits.revise(**traits))
 
     return boast
 
@@ -170,7 +170,7 @@ class ForcesAlone:
     def __init__(self, *, penalty: float) -> None:
         inner = contactverif_nts.nts_ar(penalty=penalty)
         self.pair, self.residual = inner.pair, inner.residual
-        self.traits = replace(inner.traits, tangent=None, symmetric=True)
+        self.traits = inner.traits.revise(tangent=None, symmetric=True)
 
 
 MUTANTS = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ class PointsFirst:
     def __init__(self, *, penalty: float) -> None:
         self._inner = contactverif_nts.vts_me(penalty=penalty)
         self.penalty = penalty
-        self.traits = replace(self._inner.traits, translation_stable=True, batched=False, takes_complex=False)
+        self.traits = self._inner.traits.revise(translation_stable=True, batched=False, takes_complex=False)
 
     def pair(self, interface: Any, z: Any) -> Any:
         return self._inner.pair(interface, z)

@@ -54,7 +54,7 @@ def _claims(make: Callable[..., Any], **promises: Any) -> Callable[..., Any]:
 
     def mutant(*, penalty: float) -> Any:
         inner = make(penalty=penalty)
-        return replace(inner, traits=replace(inner.traits, **promises))
+        return replace(inner, traits=inner.traits.revise(**promises))
 
     return mutant
 

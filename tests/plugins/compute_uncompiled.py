@@ -44,7 +44,7 @@ def main(file: str) -> None:
     answers: dict[str, Any] = {}
     for name in FORMULATIONS:
         subject = load_formulation(name)
-        assert subject.traits.takes_longdouble
+        assert subject.traits.abilities.takes_longdouble
         formulation = subject.with_penalty(PENALTY)
         for state, interface, z in far_states(formulation):
             pairing = formulation.pair(interface, z)

@@ -37,7 +37,7 @@ def answers(formulation: Any, interface: Interface, z: Any) -> tuple[dict[str, A
 @pytest.mark.parametrize("name", FORMULATIONS)
 def test_an_exact_translation_changes_no_bit(name: str) -> None:
     subject = load_formulation(name)
-    assert subject.traits.translation_stable
+    assert subject.traits.promises.translation_stable
     formulation, in_contact = subject.with_penalty(3.0), 0
     for seed in range(4):
         for kind in KINDS:

@@ -38,7 +38,7 @@ def in_long_double(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def test_compiled_kernels_promise_no_long_double() -> None:
     assert compiled.ARE_KERNELS_COMPILED
     assert not compiled.TAKES_LONGDOUBLE
-    assert not load_formulation("mortar").traits.takes_longdouble
+    assert not load_formulation("mortar").traits.abilities.takes_longdouble
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)

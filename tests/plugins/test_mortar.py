@@ -203,7 +203,7 @@ def test_averaged_normals_differ_on_bent_surfaces_and_not_on_flat_ones() -> None
     ids=["sts", "mortar", "mortar_dual", "averaged"],
 )
 def test_forces_do_not_jump_while_a_slave_slides_over_bent_vertices(formulation: Any) -> None:
-    assert formulation.traits.continuity in ("C0", None)  # None: with averaged normals not on coarse rings
+    assert formulation.traits.promises.continuity in ("C0", None)  # None: with averaged normals not on coarse rings
     changes, worst = 0, 0.0
     for seed in range(4):
         random = np.random.default_rng(seed)

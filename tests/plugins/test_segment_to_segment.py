@@ -115,9 +115,9 @@ def test_conserving_and_unsymmetric_as_declared(name: str, options: dict[str, st
         assert np.abs(forces.sum(axis=0)).max() <= 1e-14 * size
         assert abs((x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()) <= 1e-13 * size
     assert unsymmetric > 0.1
-    assert formulation.traits.symmetric is False
-    assert formulation.traits.conserves_force
-    assert formulation.traits.conserves_moment
+    assert formulation.traits.promises.symmetric is False
+    assert formulation.traits.promises.conserves_force
+    assert formulation.traits.promises.conserves_moment
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))

@@ -11,7 +11,7 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from test_forces import PENALTY
 
 import contactverif_nts
-from contactverif import Interface, Pairing, Traits
+from contactverif import Abilities, Interface, Pairing, Promises, Traits
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
@@ -152,7 +152,7 @@ def dense_tangent(interface: Any, pairing: Any, z: Any) -> Any:
 def test_the_least_plugin_in_two_passes() -> None:
     subject, (interface, z) = wrap(), make_flat([2, 2], [3, 1])
     assert subject.provides == frozenset()
-    assert subject.traits == Traits(batched=True, unbiased=True)
+    assert subject.traits == Traits(promises=Promises(unbiased=True), abilities=Abilities(batched=True))
     formulation = subject.with_penalty(3.0)
     assert formulation.pair(interface, z) is None
     assert formulation.n_multipliers(interface) == 0
@@ -208,12 +208,12 @@ def test_what_it_promises() -> None:
         "enforcement",
     )
     assert all(getattr(springs, name) == getattr(inner, name) for name in unchanged)
-    assert (springs.passes_flat_patch, springs.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
-    assert traits_of("vts_ppt").passes_flat_patch is False  # springs that act twice
+    assert (springs.promises.patch.flat, springs.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
+    assert traits_of("vts_ppt").promises.patch.flat is False  # springs that act twice
     assert traits_of("vts_ppt").witness("balance.force") == "tilted"
-    assert traits_of("nts_lm").passes_flat_patch is True
-    assert traits_of("nts_lm").independent_multipliers is False
-    assert traits_of("vts_ppt_lm").passes_flat_patch is None  # λ of which pass?
+    assert traits_of("nts_lm").promises.patch.flat is True
+    assert traits_of("nts_lm").promises.independent_multipliers is False
+    assert traits_of("vts_ppt_lm").promises.patch.flat is None  # λ of which pass?
 
 
 def test_by_name_with_options_and_nested() -> None:

@@ -19,7 +19,7 @@ class Handmade:
     """No force at all; what is tested is overridden."""
 
     def __init__(self, **traits: Any) -> None:
-        self.traits = Traits(**traits)
+        self.traits = Traits().revise(**traits)
         self.penalty = 1.0
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
@@ -52,7 +52,7 @@ class Springs(Handmade):
 
     def area(self, z: Any) -> float:
         along = self.stretch(z)
-        return float(np.sqrt(along @ along)) if self.traits.penalty == "distributed" else 1.0
+        return float(np.sqrt(along @ along)) if self.traits.rules.penalty == "distributed" else 1.0
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         forces = 0 * z
@@ -63,7 +63,7 @@ class Springs(Handmade):
     def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
         along, area = self.stretch(z), self.area(z)
         k = self.penalty * area * np.eye(2)
-        if self.traits.penalty == "distributed":
+        if self.traits.rules.penalty == "distributed":
             k = k + self.penalty * np.outer(along, along) / area
         tangent = np.zeros((z.size, z.size))
         tangent[:4, :4] = np.kron([[1, -1], [-1, 1]], k)

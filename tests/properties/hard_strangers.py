@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 
 
 class PointSprings:
@@ -43,7 +43,11 @@ class PointSprings:
         self.traits = Traits()
         if stated:
             witnesses = {"patch": "c"}
-            self.traits = Traits(passes_flat_patch=False, witnesses=witnesses, area="current", penalty="distributed")
+            self.traits = Traits(
+                promises=Promises(patch=PatchPromises(flat=False)),
+                rules=Rules(area="current", penalty="distributed"),
+                evidence=Evidence(witnesses=witnesses),
+            )
 
     def pair(self, interface: Any, z: Any) -> Any:
         x = z.reshape(-1, 2)

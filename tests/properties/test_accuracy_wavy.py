@@ -14,7 +14,7 @@ from wave_strangers import Heights
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
 from contactverif.run.judge import judge_case
@@ -149,4 +149,4 @@ def test_no_solution_is_undecided() -> None:
 def test_who_converges_and_does_not_lock_promises_the_curved_interface(
     converges: bool | None, locks: bool | None, promise: bool | None
 ) -> None:
-    assert promise_without_locking(Traits(converges=converges, locks=locks)) is promise
+    assert promise_without_locking(Traits(promises=Promises(converges=converges, locks=locks))) is promise

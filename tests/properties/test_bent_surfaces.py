@@ -14,7 +14,7 @@ import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 
@@ -101,7 +101,9 @@ def test_who_reports_nothing_is_judged_by_its_forces(property_id: str) -> None:
 @pytest.mark.parametrize("property_id", BENT)
 def test_a_formulation_that_does_nothing_fails(property_id: str) -> None:
     class Nothing:
-        traits = Traits(passes_kinked_patch=True, penalty="distributed", area="current")
+        traits = Traits(
+            promises=Promises(patch=PatchPromises(kinked=True)), rules=Rules(penalty="distributed", area="current")
+        )
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return 0 * z
@@ -130,7 +132,7 @@ def test_with_a_third_normal_the_error_falls_like_one_over_the_penalty() -> None
 
 def test_a_promise_to_fail_at_kinks_is_broken_by_who_passes() -> None:
     witnesses = {"patch.kinked": "edge of 53°, lower slave"}
-    boaster = with_promises(contactverif_nts.vts_ppt, passes_kinked_patch=False, witnesses=witnesses)
+    boaster = with_promises(contactverif_nts.vts_ppt, kinked=False, witnesses=witnesses)
     (row,) = run([boaster], [load_property("patch.kinked")]).rows
     assert row.unexpected == "stated to fail, but passes"
 

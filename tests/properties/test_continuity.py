@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
@@ -32,7 +32,7 @@ def cases(examples: int) -> tuple[Case, ...]:
 class Cloud:
     """Gauss points of both sides repel one another by a smooth law, so that nothing ever jumps; it has no pairing."""
 
-    traits = Traits(continuity="C1", conserves_force=True)
+    traits = Traits(promises=Promises(continuity="C1", conserves_force=True))
 
     def __init__(self, *, penalty: float) -> None:
         self.penalty = penalty

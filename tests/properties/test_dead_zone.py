@@ -126,13 +126,13 @@ def test_who_is_right_is_not_accused(name: str) -> None:
     [
         (contactverif_nts.vts_me, {}, ""),
         (contactverif_nts.vts_ppt, {}, ""),
-        (contactverif_nts.vts_ppt, {"covers_overhang": None}, ""),
-        (contactverif_nts.vts_ppt, {"covers_overhang": True}, "promised to pass, but fails"),
+        (contactverif_nts.vts_ppt, {"overhang": None}, ""),
+        (contactverif_nts.vts_ppt, {"overhang": True}, "promised to pass, but fails"),
         (contactverif_nts.vts_ppt_balanced, {}, ""),
-        (contactverif_mortar.sts, {"covers_overhang": False}, "crashed"),  # and names no witness
+        (contactverif_mortar.sts, {"overhang": False}, "crashed"),  # and names no witness
         (
             contactverif_mortar.sts,
-            {"covers_overhang": False, "witnesses": {"patch.dead-zone": "dead-zone"}},
+            {"overhang": False, "witnesses": {"patch.dead-zone": "dead-zone"}},
             "stated to fail, but passes",
         ),
     ],
@@ -141,7 +141,7 @@ def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: s
     subject = with_promises(make, **promises)
     (row,) = run([subject], [patch_dead_zone], examples=20, seed=2).rows
     assert row.unexpected == unexpected
-    if subject.traits.covers_overhang is False and not unexpected:
+    if subject.traits.promises.patch.overhang is False and not unexpected:
         assert row.witness is not None
         assert (row.witness.verdict, row.witness.case.name) == (Verdict.FAIL, "dead-zone")
 

@@ -15,7 +15,7 @@ import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
 from contactverif.run.run import run
@@ -75,7 +75,7 @@ def test_a_hard_case_asks_nothing_of_a_given_interface(property_id: str) -> None
 
 
 def test_a_barrier_is_not_asked_about_penetrations_and_touch() -> None:
-    barrier = Traits(enforcement="barrier")
+    barrier = Traits(rules=Rules(enforcement="barrier"))
     assert all(load_property(property_id).refusal(barrier) for property_id in HARD)
 
 
@@ -97,11 +97,9 @@ def test_points_first_far_away_break_the_promise_of_stability() -> None:
         def __init__(self, penalty: float) -> None:
             super().__init__(penalty, places=(0.21132486540518713, 0.7886751345948129))
             self.traits = Traits(
-                passes_flat_patch=False,
-                witnesses={"patch": "c"},
-                area="current",
-                penalty="distributed",
-                translation_stable=True,
+                promises=Promises(patch=PatchPromises(flat=False), translation_stable=True),
+                rules=Rules(area="current", penalty="distributed"),
+                evidence=Evidence(witnesses={"patch": "c"}),
             )
 
     boaster = Subject("boaster", lambda *, penalty: Boaster(penalty))

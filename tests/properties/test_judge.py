@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from fresh_process import PYTHON
 from handmade import Handmade, case, subject
 
 from contactverif.contract.property import Property, Verdict
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties
@@ -81,15 +80,18 @@ def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
 
 def test_states_that_penetrate_are_not_for_barriers() -> None:
     """A barrier is not defined there, and would be accused of its NaN. Multipliers are asked nearly everything."""
-    traits = Traits(passes_flat_patch=True, tangent="exact", gap="closest point", penalty="distributed", area="current")
-    traits = replace(traits, published_forces={"a1": "1 2 1; 2 2"}, force_along="master normal", continuity="C0")
+    traits = Traits(
+        promises=Promises(patch=PatchPromises(flat=True), tangent="exact"),
+        rules=Rules(gap="closest point", penalty="distributed", area="current"),
+    )
+    traits = traits.revise(published_forces={"a1": "1 2 1; 2 2"}, force_along="master normal", continuity="C0")
     nodal = "patch.flat.nodal"
     springs_alone = (nodal, "projection.activity", "stability.stiffness", "continuity", "patch.tilted.nodal")
     multipliers_alone = (nodal, "multipliers.rank", "complementarity", "stability.inf-sup")
     for question in load_properties():
         assert isinstance(question, Property)
         reasons = {
-            enforcement: question.refusal(replace(traits, enforcement=enforcement))
+            enforcement: question.refusal(traits.revise(enforcement=enforcement))
             for enforcement in ("penalty", "multiplier", "barrier")
         }
         assert "barrier" in reasons["barrier"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ def make_far_rounding(*, penalty: float) -> Any:
     def residual(interface: Any, pairing: Any, z: Any) -> Any:
         return inner.residual(interface, pairing, (z / 3) * 3)
 
-    return Changed(inner, residual=residual, traits=replace(inner.traits, translation_stable=True))
+    return Changed(inner, residual=residual, traits=inner.traits.revise(translation_stable=True))
 
 
 @pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-me"])
@@ -63,8 +62,8 @@ def test_a_position_that_is_rounded_far_from_the_origin_is_told() -> None:
 
 
 def test_who_promises_nothing_breaks_nothing() -> None:
-    assert newton_attainable.promise(replace(load_subject("nts").traits, translation_stable=None)) is None
-    assert newton_attainable.promise(replace(load_subject("nts").traits, translation_stable=True)) is True
+    assert newton_attainable.promise(load_subject("nts").traits.revise(translation_stable=None)) is None
+    assert newton_attainable.promise(load_subject("nts").traits.revise(translation_stable=True)) is True
 
 
 def test_a_matrix_without_inverse_is_undecided() -> None:

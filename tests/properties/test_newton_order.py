@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import inf, isnan
 from typing import Any
 
@@ -150,7 +149,7 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
         inner = contactverif_nts.vts_ppt(penalty=penalty)
 
         class Unpaired:
-            traits = replace(load_subject("vts-ppt").traits, batched=False, takes_complex=False)
+            traits = load_subject("vts-ppt").traits.revise(batched=False, takes_complex=False)
 
             def residual(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
                 return inner.residual(interface, inner.pair(interface, z), z)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,7 @@ def make_with_angles(*, penalty: float) -> Any:
     def residual(interface: Any, pairing: Any, z: Any) -> Any:
         return evaluate_one(z) * inner.residual(interface, pairing, z)
 
-    return Changed(inner, residual=residual, traits=replace(inner.traits, batched=False, takes_complex=False))
+    return Changed(inner, residual=residual, traits=inner.traits.revise(batched=False, takes_complex=False))
 
 
 def test_a_power_and_an_angle_are_not_accused() -> None:

@@ -21,7 +21,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.draw import draw_cases
@@ -37,7 +37,7 @@ EXAMPLES = 30
 class LoopOfNodes:
     """A spring at each slave node, on the segment whose middle is nearest: a residual and nothing else."""
 
-    traits = Traits(penalty="nodal")
+    traits = Traits(rules=Rules(penalty="nodal"))
     sides = (("slave", "master"),)
 
     def __init__(self, *, penalty: float) -> None:
@@ -61,7 +61,7 @@ class LoopOfNodes:
 class LoopOfAllNodes(LoopOfNodes):
     """Such springs at the nodes of both surfaces, each with half the penalty."""
 
-    traits = Traits(penalty="nodal", unbiased=True)
+    traits = Traits(promises=Promises(unbiased=True), rules=Rules(penalty="nodal"))
     sides = (("slave", "master"), ("master", "slave"))
 
     def __init__(self, *, penalty: float) -> None:
@@ -69,14 +69,14 @@ class LoopOfAllNodes(LoopOfNodes):
 
 
 RIGHT_ONES: dict[str, tuple[Subject, tuple[str, ...]]] = {
-    "the trapezoidal rule, points first": (with_promises(PointsFirst, passes_normal_patch=True), (NORMAL,)),
+    "the trapezoidal rule, points first": (with_promises(PointsFirst, normal=True), (NORMAL,)),
     "Gauss points along the slave's normal": (
-        with_promises(SlaveNormalAtGaussPoints, passes_normal_patch=True),
+        with_promises(SlaveNormalAtGaussPoints, normal=True),
         (NORMAL,),
     ),
-    "Gauss points about the mean of all nodes": (with_promises(CentredSprings, passes_normal_patch=True), (NORMAL,)),
-    "quarter points in a turned frame": (with_promises(TurnedFrame, passes_single_patch=True), (NORMAL, SINGLE)),
-    "four points that look around": (with_promises(NearbyOnly, passes_single_patch=True), (NORMAL, SINGLE)),
+    "Gauss points about the mean of all nodes": (with_promises(CentredSprings, normal=True), (NORMAL,)),
+    "quarter points in a turned frame": (with_promises(TurnedFrame, single=True), (NORMAL, SINGLE)),
+    "four points that look around": (with_promises(NearbyOnly, single=True), (NORMAL, SINGLE)),
     "textbook cells": (with_promises(ClippedCells), (NORMAL, SINGLE)),
     "textbook mortar": (with_promises(WeightedGaps), (NORMAL, SINGLE)),
     "a loop of nodes": (with_promises(LoopOfNodes), (NODAL,)),
@@ -84,7 +84,7 @@ RIGHT_ONES: dict[str, tuple[Subject, tuple[str, ...]]] = {
     "two passes of two passes": (load_subject("two-pass/two-pass/nts"), (NODAL, PUBLISHED)),
     **{
         f"Gauss springs, {name}": (
-            with_promises(partial(GaussSprings, way=way, before=before), passes_normal_patch=True),
+            with_promises(partial(GaussSprings, way=way, before=before), normal=True),
             (NORMAL,),
         )
         for name, (way, before) in RIGHT.items()
@@ -138,7 +138,7 @@ def test_a_force_lost_elsewhere_is_a_failure_though_an_end_is_lost_too() -> None
             off = np.minimum(np.abs(points.xi), np.abs(1 - points.xi)) > 1e-6
             return replace(points, active=points.active & off, pressure=np.where(off, points.pressure, 0.0))
 
-    question, subject = load_property(NORMAL), with_promises(Forgetful, passes_normal_patch=True)
+    question, subject = load_property(NORMAL), with_promises(Forgetful, normal=True)
     masters = ((case, case.interface.master.segments) for case in draw(NORMAL))
     cases = [case for case, segments in masters if np.intersect1d(*segments.T).size]
     assert len(cases) > 5
@@ -157,7 +157,7 @@ def test_what_is_reported_may_not_be_off_by_little(quantity: str, exponent: int)
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return TurnedFrame(penalty=self.penalty).residual(interface, pairing, z)
 
-    question, subject = load_property(SINGLE), with_promises(Boaster, passes_single_patch=True)
+    question, subject = load_property(SINGLE), with_promises(Boaster, single=True)
     verdicts = [judge_case(question, case, subject).verdict for case in draw(SINGLE)]
     assert Verdict.FAIL in verdicts
 
@@ -173,10 +173,16 @@ def test_the_single_class_tells_vts_me_from_the_others(name: str) -> None:
 
 def test_who_promises_a_larger_class_promises_the_smaller_ones() -> None:
     promises = [load_property(property_id).promise for property_id in (NORMAL, SINGLE)]
-    assert [promise(Traits(passes_flat_patch=True)) for promise in promises] == [True, True]
-    assert [promise(Traits(passes_single_patch=True)) for promise in promises] == [True, True]
-    assert [promise(Traits(passes_normal_patch=True)) for promise in promises] == [True, None]
-    assert [promise(Traits(passes_flat_patch=False)) for promise in promises] == [None, None]
+    assert [promise(Traits(promises=Promises(patch=PatchPromises(flat=True)))) for promise in promises] == [True, True]
+    assert [promise(Traits(promises=Promises(patch=PatchPromises(single=True)))) for promise in promises] == [
+        True,
+        True,
+    ]
+    assert [promise(Traits(promises=Promises(patch=PatchPromises(normal=True)))) for promise in promises] == [
+        True,
+        None,
+    ]
+    assert [promise(Traits(promises=Promises(patch=PatchPromises(flat=False)))) for promise in promises] == [None, None]
 
 
 def test_scenes_of_another_class_are_not_asked_about() -> None:
@@ -250,9 +256,11 @@ def test_the_tables_are_those_of_the_paper(table: Any, case: str, printed: str) 
 
 
 def test_nested_passes_act_four_times() -> None:
-    once, twice = (load_subject(f"{prefix}nts").traits.published_forces["b"] for prefix in ("", "two-pass/two-pass/"))
+    once, twice = (
+        load_subject(f"{prefix}nts").traits.evidence.published_forces["b"] for prefix in ("", "two-pass/two-pass/")
+    )
     here, _ = parse_forces(once)
-    _, there = parse_forces(load_subject("nts").traits.published_forces["b-swapped"])
+    _, there = parse_forces(load_subject("nts").traits.evidence.published_forces["b-swapped"])
     expected = tuple(2 * (a + b) for a, b in zip(here, there, strict=True))
     assert parse_forces(twice)[0] == expected
 

@@ -142,7 +142,7 @@ def test_far_away_only_who_promises_it_must_keep_the_digits_of_a_gap() -> None:
     far = replace(case, z=(case.positions @ [[0.6, 0.8], [-0.8, 0.6]] + 2.0**20).reshape(-1))
 
     class Boaster(PointsFirst):
-        traits = replace(PointsFirst.traits, translation_stable=True)
+        traits = PointsFirst.traits.revise(translation_stable=True)
         places = np.array([-0.3, 0.7])
 
     class Modest(PointsFirst):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from handmade import case
 
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 from contactverif_properties.shared import roundoff
 
 U = 2.0**-53
@@ -40,7 +40,7 @@ def test_where_nothing_penetrates_no_gap_is_rounded() -> None:
 def test_a_stable_formulation_rounds_at_the_diameter_and_any_other_at_its_distance() -> None:
     far = case()
     far = replace(far, interface=far.interface.at(far.interface.nodes + 1e6), z=far.z + 1e6)
-    stable = roundoff.rounding_distance(far, Traits(translation_stable=True))
+    stable = roundoff.rounding_distance(far, Traits(promises=Promises(translation_stable=True)))
     assert stable == far.diameter
     assert roundoff.rounding_distance(far, Traits()) == far.largest_coordinate > 1e6
     assert roundoff.gap_tolerance(far, 0.1, stable) < 1e-4 * roundoff.gap_tolerance(far, 0.1)

@@ -86,7 +86,7 @@ def test_a_point_tied_to_a_segment_that_it_penetrates_and_one_that_it_does_not_a
 class NodalSprings(CentredSprings):
     """Springs of equal stiffness at all points, whatever their areas: the gradient of Σ ε g²/2."""
 
-    traits = replace(CentredSprings.traits, symmetric=True, penalty="nodal", area=None)
+    traits = CentredSprings.traits.revise(symmetric=True, penalty="nodal", area=None)
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         x = z.reshape(-1, 2)
@@ -111,7 +111,7 @@ def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
     class Decides(NodalSprings):
         """It pairs at each state anew, and names no pairing."""
 
-        traits = replace(NodalSprings.traits, takes_complex=False)
+        traits = NodalSprings.traits.revise(takes_complex=False)
         pair = tangent = contact_points = None
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:

@@ -9,7 +9,7 @@ import pytest
 from handmade import Springs, case, subject
 
 from contactverif.contract.property import Verdict
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Rules, Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif_properties.frames import SCALED_FORCES, SCALED_TANGENT, scaling
@@ -36,9 +36,9 @@ def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
 
 def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
     assert "not stated" in scaling.refusal(Traits())
-    assert scaling.refusal(Traits(penalty="nodal")) == ""
-    assert scaling.refusal(Traits(penalty="nodal", enforcement="multiplier")) == ""
-    assert "barrier" in scaling.refusal(Traits(penalty="nodal", enforcement="barrier"))
+    assert scaling.refusal(Traits(rules=Rules(penalty="nodal"))) == ""
+    assert scaling.refusal(Traits(rules=Rules(penalty="nodal", enforcement="multiplier"))) == ""
+    assert "barrier" in scaling.refusal(Traits(rules=Rules(penalty="nodal", enforcement="barrier")))
     result = run([subject(Springs)], [scaling], examples=3, seed=1)
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
     assert result.promises_kept

@@ -18,7 +18,7 @@ from subjects import load_subject
 from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case
 from contactverif.run.run import run
@@ -165,13 +165,17 @@ def test_every_built_in_formulation_is_judged_where_nothing_is_compiled() -> Non
 def test_what_is_exact_follows_the_traits() -> None:
     springs = springs_of(by_differences, takes_longdouble=False)
     assert list(stability_local.measure(cases()[0], springs).values) == [TOTAL_THERE.name]
-    assert "no exact force" in refuse_unknown_forces(Traits(penalty="nodal", area="current"))
+    assert "no exact force" in refuse_unknown_forces(Traits(rules=Rules(penalty="nodal", area="current")))
     assert "no exact force" in refuse_unknown_forces(Traits())
-    assert not refuse_unknown_forces(Traits(takes_longdouble=True))
+    assert not refuse_unknown_forces(Traits(abilities=Abilities(takes_longdouble=True)))
     assert "no exact force" in refuse_unknown_forces(
-        Traits(passes_flat_patch=True, enforcement="multiplier", penalty="nodal")
+        Traits(
+            promises=Promises(patch=PatchPromises(flat=True)), rules=Rules(enforcement="multiplier", penalty="nodal")
+        )
     )
-    assert "barrier" in refuse_unknown_forces(Traits(passes_flat_patch=True, enforcement="barrier"))
+    assert "barrier" in refuse_unknown_forces(
+        Traits(promises=Promises(patch=PatchPromises(flat=True)), rules=Rules(enforcement="barrier"))
+    )
 
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-g", "vts-ppt-balanced", "sts", "mortar", "mortar-lm", "chen-hisada"])

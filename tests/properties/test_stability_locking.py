@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -101,7 +100,7 @@ def test_a_formulation_without_a_pairing_is_not_judged() -> None:
     right = load_subject("mortar").with_penalty(1.0).plugin
 
     class ResidualOnly:
-        traits = replace(right.traits, batched=False)
+        traits = right.traits.revise(batched=False)
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return right.residual(interface, right.pair(interface, z), z)

@@ -12,7 +12,7 @@ from gauss_springs import RIGHT, WRONG, springs_of
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement, Property, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Rules, Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
@@ -38,7 +38,7 @@ def without_pair(make: Any, *, penalty: float) -> Any:
     inner = make(penalty=penalty)
 
     class ResidualOnly:
-        traits = Traits(penalty=inner.traits.penalty, translation_stable=True)
+        traits = Traits(promises=Promises(translation_stable=True), rules=Rules(penalty=inner.traits.rules.penalty))
 
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
             return inner.residual(interface, inner.pair(interface, z), z)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -113,7 +112,7 @@ class ResidualOnly:
 
     def __init__(self, inner: GaussSprings) -> None:
         self.inner = inner
-        self.traits = replace(inner.traits, batched=False)
+        self.traits = inner.traits.revise(batched=False)
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         return self.inner.residual(interface, self.inner.pair(interface, z), z)

@@ -28,7 +28,7 @@ MASTER = {"force_along": "master normal", "local": True}
 SLAVE = {"force_along": "slave normal", "local": True}
 RIGHT_ONES = {
     **{
-        name: with_promises(make, **(SLAVE if make.traits.gap == "slave normal" else MASTER))
+        name: with_promises(make, **(SLAVE if make.traits.rules.gap == "slave normal" else MASTER))
         for name, make in STRANGERS.items()
     },
     **{

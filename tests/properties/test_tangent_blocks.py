@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +37,7 @@ class Plain:
 
     def __init__(self, inner: Any, change: Any = None, *, paired: bool = True) -> None:
         self._inner, self._change, self._paired = inner, change, paired
-        self.traits = replace(inner.traits, takes_complex=False, takes_longdouble=False, batched=False)
+        self.traits = inner.traits.revise(takes_complex=False, takes_longdouble=False, batched=False)
         if hasattr(inner, "n_multipliers"):
             self.n_multipliers = inner.n_multipliers
         if paired:

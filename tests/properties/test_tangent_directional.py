@@ -10,7 +10,7 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 
 from contactverif.contract.property import Verdict
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 from contactverif.run.judge import judge_case
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.tangent_directional import (
@@ -235,8 +235,8 @@ def test_a_true_kink_is_undecided_where_it_would_fail() -> None:
 def test_what_provides_no_tangent_is_not_asked() -> None:
     assert tangent_directional.needs == {"tangent"}
     assert tangent_directional.promise(Traits()) is None
-    assert tangent_directional.promise(Traits(tangent="approximate")) is False
-    assert tangent_directional.promise(Traits(tangent="exact")) is True
+    assert tangent_directional.promise(Traits(promises=Promises(tangent="approximate"))) is False
+    assert tangent_directional.promise(Traits(promises=Promises(tangent="exact"))) is True
 
 
 def test_each_region_moves_by_itself() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
@@ -28,7 +27,7 @@ from contactverif_properties.pushes import allowed_pushes, lift_slave, nodal_pus
 class Springs:
     """A spring at each slave node of a horizontal interface, across to the node of the master below it."""
 
-    traits = Traits(penalty="distributed")
+    traits = Traits(rules=Rules(penalty="distributed"))
 
     def __init__(self, *, penalty: float, at: float = 0.0, closed: bool = True) -> None:
         self.penalty, self.at, self.closed = penalty, at, closed
@@ -85,7 +84,7 @@ def test_nodes_a_rounding_beyond_free_ends_are_undecided(turn: Turn) -> None:
 class Augmented:
     """A mortar whose pressure is λ_j − ε̂ G_j: multipliers beside springs, as in an augmented Lagrangian."""
 
-    traits = replace(mortar_lm(penalty=1.0).traits, tangent=None)
+    traits = mortar_lm(penalty=1.0).traits.revise(tangent=None)
 
     def __init__(self, *, penalty: float) -> None:
         self.multipliers, self.springs = mortar_lm(penalty=penalty), mortar(penalty=penalty)

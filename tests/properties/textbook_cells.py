@@ -5,7 +5,6 @@ A cell is the part of a master segment that the strip of a slave segment cuts ou
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from contactverif.contract.formulation import ContactPoints
 class ClippedCells(Textbook):
     """Springs at five Gauss points of each cell, along the slave's normal; they are reported in the order of gaps."""
 
-    traits = replace(Textbook.traits, gap="cells", passes_flat_patch=True, covers_overhang=True)
+    traits = Textbook.traits.revise(gap="cells", flat=True, overhang=True)
     gauss, shares = np.polynomial.legendre.leggauss(5)
 
     def pair(self, interface: Any, z: Any) -> Any:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Abilities, Promises, Rules, Traits
 
 STEP = 1e-40  # The complex step: no difference is formed, so any step will do.
 
@@ -35,14 +35,9 @@ class Textbook:
     """A formulation whose tangent is computed by a complex step."""
 
     traits = Traits(
-        conserves_force=True,
-        conserves_moment=True,
-        tangent="exact",
-        gap="closest point",
-        area="current",
-        penalty="distributed",
-        translation_stable=True,
-        takes_complex=True,
+        promises=Promises(conserves_force=True, conserves_moment=True, tangent="exact", translation_stable=True),
+        rules=Rules(gap="closest point", area="current", penalty="distributed"),
+        abilities=Abilities(takes_complex=True),
     )
 
     def __init__(self, *, penalty: float) -> None:
@@ -139,7 +134,7 @@ class QuadraticSprings(CentredSprings):
     """Springs whose force grows with the square of the penetration, so that no patch test is promised."""
 
     tau = 0.0
-    traits = replace(Textbook.traits, area=None, penalty=None)
+    traits = Textbook.traits.revise(area=None, penalty=None)
 
     def law(self, gap: Any) -> Any:
         return -self.penalty * gap**2
@@ -148,7 +143,7 @@ class QuadraticSprings(CentredSprings):
 class NodalMultipliers(CentredSprings):
     """A multiplier on each slave node, the force that closes its gap."""
 
-    traits = replace(Textbook.traits, area=None, penalty="nodal", enforcement="multiplier")
+    traits = Textbook.traits.revise(area=None, penalty="nodal", enforcement="multiplier")
     tau = 0.0
 
     def n_multipliers(self, interface: Any) -> int:

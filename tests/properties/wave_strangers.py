@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Rules, Traits
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(2)
 
@@ -23,7 +23,7 @@ class Heights:
     pairing and no tangent.
     """
 
-    traits = Traits(penalty="distributed", converges=True)
+    traits = Traits(promises=Promises(converges=True), rules=Rules(penalty="distributed"))
 
     def __init__(self, penalty: float, constant: bool, reports: str = "") -> None:
         self.penalty, self.constant = penalty, constant

@@ -15,7 +15,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Measurement, Property, PropertyInfo, Quantity, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
@@ -81,7 +81,7 @@ class Negated:
     """A formulation with all signs of its residual turned round."""
 
     def __init__(self, inner: Any) -> None:
-        self.inner, self.traits = inner, Traits(enforcement=inner.traits.enforcement)
+        self.inner, self.traits = inner, Traits(rules=Rules(enforcement=inner.traits.rules.enforcement))
         if hasattr(inner, "n_multipliers"):
             self.n_multipliers = inner.n_multipliers
 

@@ -317,7 +317,7 @@ def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> No
 )
 def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], message: str) -> None:
     def make(*, penalty: float) -> Any:
-        return Traits(**traits)
+        return Traits().revise(**traits)
 
     formulation = subject_of("misspelt", make)
     assert isinstance(formulation, NotLoaded)

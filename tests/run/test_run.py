@@ -57,7 +57,7 @@ ZERO = Property(
     (ERROR,),
     lambda _: sizes(),
     measure_residual,
-    lambda traits: traits.passes_flat_patch,
+    lambda traits: traits.promises.patch.flat,
 )
 
 
@@ -73,7 +73,7 @@ class Plugin:
 
 
 def subject(answer: Callable[[int], Any] = lambda size: 0.0, **traits: Any) -> Subject:
-    return Subject("mine", lambda *, penalty: Plugin(answer, Traits(**traits)))
+    return Subject("mine", lambda *, penalty: Plugin(answer, Traits().revise(**traits)))
 
 
 def from_size(least: int, error: float = 1.0) -> Callable[[int], float]:
@@ -264,7 +264,7 @@ def test_hypothesis_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("promise", [True, False, None])
 @pytest.mark.usefixtures("witnesses")
 def test_a_crash_is_an_outcome_that_fails_the_run(promise: bool | None) -> None:
-    formulation = subject(raising_from(8), passes_flat_patch=promise, witnesses={"patch.zero": "C"})
+    formulation = subject(raising_from(8), flat=promise, witnesses={"patch.zero": "C"})
     row = one_row(formulation)
     assert (row.verdict, row.judged, row.unexpected) == (Verdict.CRASHED, 40, "crashed")
     assert row.reason == "exception: residual: IndexError: segment 8"
@@ -295,7 +295,7 @@ def test_how_it_crashed_is_said(error: BaseException, beginning: str) -> None:
 def test_a_breach_of_the_contract_fails_the_run_whatever_was_promised(
     promise: bool | None, answer: Callable[[int], Any], reason: str
 ) -> None:
-    row = one_row(subject(answer, passes_flat_patch=promise, witnesses={"patch.zero": "C"}))
+    row = one_row(subject(answer, flat=promise, witnesses={"patch.zero": "C"}))
     assert row.verdict is Verdict.FAIL
     assert row.reason.startswith(reason)
     assert row.unexpected == "breaks the contract"
@@ -333,7 +333,7 @@ def test_a_plugin_that_answers_differently_each_time_still_gives_a_case() -> Non
 )
 @pytest.mark.usefixtures("witnesses")
 def test_a_promise_to_fail_is_broken_when_nothing_fails(least: int, verdict: Verdict, unexpected: str) -> None:
-    row = one_row(subject(from_size(least), passes_flat_patch=False, witnesses={"patch.zero": "C"}))
+    row = one_row(subject(from_size(least), flat=False, witnesses={"patch.zero": "C"}))
     assert (row.verdict, row.unexpected) == (verdict, unexpected)
     assert row.witness is not None
     assert row.witness.case.name == "C"
@@ -343,7 +343,7 @@ def test_a_promise_to_fail_is_broken_when_nothing_fails(least: int, verdict: Ver
 
 def test_a_case_of_a_finite_list_is_a_witness_by_its_name_and_is_judged_once() -> None:
     question = replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in (1, 2, 3)))
-    row = one_row(subject(from_size(2), passes_flat_patch=False, witnesses={"patch.zero": "size 2"}), question)
+    row = one_row(subject(from_size(2), flat=False, witnesses={"patch.zero": "size 2"}), question)
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
     assert row.witness is row.outcomes[1]
 
@@ -351,7 +351,7 @@ def test_a_case_of_a_finite_list_is_a_witness_by_its_name_and_is_judged_once() -
 @pytest.mark.usefixtures("witnesses")
 def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() -> None:
     question = replace(ZERO, cases=lambda _: sizes(5))
-    row = one_row(subject(from_size(6), passes_flat_patch=False, witnesses={"patch.zero": "C"}), question)
+    row = one_row(subject(from_size(6), flat=False, witnesses={"patch.zero": "C"}), question)
     assert (row.verdict, row.unexpected, row.reason) == (Verdict.FAIL, "", "error 1, at most 1e-06")
     assert row.shrunk is None
 
@@ -362,18 +362,18 @@ def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() ->
 )
 @pytest.mark.usefixtures("witnesses")
 def test_a_promise_to_fail_needs_a_witness(named: dict[str, str], reason: str) -> None:
-    row = one_row(subject(from_size(2), passes_flat_patch=False, witnesses=named))
+    row = one_row(subject(from_size(2), flat=False, witnesses=named))
     assert (row.verdict, row.unexpected) == (Verdict.CRASHED, "crashed")
     assert row.reason.startswith(reason)
 
 
 @pytest.mark.usefixtures("witnesses")
 def test_only_a_promise_to_fail_has_a_witness() -> None:
-    assert one_row(subject(passes_flat_patch=True, witnesses={"patch.zero": "C"})).witness is None
+    assert one_row(subject(flat=True, witnesses={"patch.zero": "C"})).witness is None
 
 
 def test_a_broken_promise_fails_the_run_and_a_missing_one_does_not() -> None:
-    assert one_row(subject(from_size(5), passes_flat_patch=True)).unexpected == "promised to pass, but fails"
+    assert one_row(subject(from_size(5), flat=True)).unexpected == "promised to pass, but fails"
     assert one_row(subject(from_size(5))).unexpected == ""
 
 
@@ -407,12 +407,12 @@ def test_what_cannot_be_asked_is_a_row_without_cases(question: Property, verdict
 
 
 def test_a_promise_about_a_missing_part_is_broken() -> None:
-    row = one_row(subject(passes_flat_patch=True), replace(ZERO, needs=frozenset({"tangent"})))
+    row = one_row(subject(flat=True), replace(ZERO, needs=frozenset({"tangent"})))
     assert row.unexpected == "promised to pass, but a part that it needs is not provided"
 
 
 def test_a_missing_part_that_no_trait_speaks_of_breaks_no_promise() -> None:
-    row = one_row(subject(passes_flat_patch=True), replace(ZERO, needs=frozenset({"contact_points"})))
+    row = one_row(subject(flat=True), replace(ZERO, needs=frozenset({"contact_points"})))
     assert (row.verdict, row.reason) == (Verdict.NOT_PROVIDED, "contact_points: not provided")
     assert (row.promise, row.unexpected) == (None, "")
 
@@ -425,7 +425,7 @@ def test_the_given_interface_reaches_the_strategy() -> None:
 
 def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:
     known = {"patch.zero": "issue 12"}
-    fails = one_row(subject(from_size(5), passes_flat_patch=True), known=known)
+    fails = one_row(subject(from_size(5), flat=True), known=known)
     assert (fails.verdict, fails.known, fails.unexpected) == (Verdict.FAIL, "issue 12", "")
     assert one_row(subject(raising_from(5)), known=known).unexpected == ""
     assert one_row(subject(lambda size: np.nan), known=known).unexpected == ""

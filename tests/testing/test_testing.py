@@ -47,7 +47,7 @@ KINK = replace(ZERO, id="patch.kink", measure=undecided)
 
 class Plugin:
     def __init__(self, least, promise):
-        self.least, self.traits = least, Traits(passes_flat_patch=promise)
+        self.least, self.traits = least, Traits(flat=promise)
     def residual(self, interface, pairing, z):
         return 1.0 * (len(interface.slave) >= self.least) + 0 * z
 

@@ -87,7 +87,7 @@ class _Runner:
         try:
             timed, tries = solve_with_clock(self.subject, self.instance)
             formulation = self.subject.for_case(self.instance.first_guess)
-            solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.penalty == "nodal")
+            solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.rules.penalty == "nodal")
             solved = is_solved(solution)
             self.record.errors = largest_errors(self.instance, solution) if solved else {}
         except ContractError as error:

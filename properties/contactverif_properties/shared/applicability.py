@@ -14,11 +14,11 @@ def refuse_dependent_multipliers(traits: Traits) -> str:
     Constraints that depend on one another contradict each other on bent surfaces, so Newton's method has nothing to
     converge to.
     """
-    dependent = traits.independent_multipliers is False
+    dependent = traits.promises.independent_multipliers is False
     return "the multipliers are not independent, so there need be no solution, nor one alone" if dependent else ""
 
 
 def refuse_unstated_penalty(traits: Traits) -> str:
     """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
-    known = traits.penalty is not None
+    known = traits.rules.penalty is not None
     return "" if known else "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"

@@ -80,7 +80,7 @@ class Reported:
 
         A kernel that subtracts the centroid first keeps the promise, and rounds points at D.
         """
-        return self.state.diameter if self.traits.translation_stable else self.state.largest_coordinate
+        return self.state.diameter if self.traits.promises.translation_stable else self.state.largest_coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)

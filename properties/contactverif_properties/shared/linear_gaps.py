@@ -23,8 +23,8 @@ _Vector = tuple[Fraction, Fraction]
 
 def knows_linear_total(traits: Traits) -> bool:
     """Return whether the traits say what the total force of a linear gap is."""
-    stated = traits.penalty == "distributed" and None not in (traits.area, traits.force_along)
-    return stated and (traits.gap is not None or traits.enforcement == "multiplier")
+    stated = traits.rules.penalty == "distributed" and None not in (traits.rules.area, traits.rules.force_along)
+    return stated and (traits.rules.gap is not None or traits.rules.enforcement == "multiplier")
 
 
 def slave_forces(case: Case, subject: Subject) -> FloatArray:
@@ -67,16 +67,16 @@ def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
     is `uniform_multiplier` everywhere. The sum is the total of every formulation with these traits.
     """
     interface, (of_master, of_slave) = case.interface, directions(case)
-    lengths = interface.slave.lengths(interface.nodes if traits.area == "reference" else case.positions)
-    depths = -node_gaps(case) / (1.0 if traits.gap in ALONG_MASTER else float(of_master @ of_slave))
+    lengths = interface.slave.lengths(interface.nodes if traits.rules.area == "reference" else case.positions)
+    depths = -node_gaps(case) / (1.0 if traits.rules.gap in ALONG_MASTER else float(of_master @ of_slave))
     pressures = case.penalty * depths
-    if traits.enforcement == "multiplier":
+    if traits.rules.enforcement == "multiplier":
         pressures = np.full_like(pressures, uniform_multiplier(case))
     nodal = np.zeros(interface.n_slave_nodes)
     for (a, b), length in zip(interface.slave.segments, lengths, strict=True):
         nodal[a] += length * (2 * pressures[a] + pressures[b]) / 6
         nodal[b] += length * (pressures[a] + 2 * pressures[b]) / 6
-    return np.outer(nodal, of_master if traits.force_along == "master normal" else of_slave)
+    return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
 
 
 def _longest_segment(case: Case) -> tuple[_Vector, _Vector]:

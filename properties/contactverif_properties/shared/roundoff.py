@@ -68,7 +68,7 @@ def mean_penetration(case: Case, forces: Array) -> float:
 
 def rounding_distance(case: Case, traits: Traits) -> float:
     """Return the distance Z, a length, at which a formulation may round the position of a point."""
-    return case.diameter if traits.translation_stable else case.largest_coordinate
+    return case.diameter if traits.promises.translation_stable else case.largest_coordinate
 
 
 def gap_tolerance(case: Case, penetration: float, distance: float | None = None) -> float:

@@ -70,7 +70,7 @@ QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE)
 
 def measure_once(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
-    if subject.traits.enforcement == "multiplier":
+    if subject.traits.rules.enforcement == "multiplier":
         return measure_with_multipliers(case, subject, case.penalty)
     return measure_at_penalty(case, subject, case.penalty)
 
@@ -100,7 +100,7 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
         points = formulation.contact_points(case.interface, pairing, state.z)
         gap, reported = point_errors(case, points, penalty, pressure)
         values[GAP] = max(values[GAP], gap)
-        if subject.traits.penalty != "nodal":
+        if subject.traits.rules.penalty != "nodal":
             values[PRESSURE] = reported
     roundoff = uniform_tolerances(state, scene, pressure)
     tolerances = dict.fromkeys(values, roundoff.stress)
@@ -176,7 +176,7 @@ class _SaddlePoint:
         tolerance = uniform_tolerances(state, scene, pressure).stress
         tolerances = dict.fromkeys(values, tolerance)
         tolerances[GAP] *= _gap_factor(self.case, self.penalty)
-        if self.subject.traits.penalty == "distributed":
+        if self.subject.traits.rules.penalty == "distributed":
             loaded = self.multipliers != 0  # The multiplier of a node that faces nothing is 0.
             errors = np.abs(multipliers[loaded] / pressure - 1)
             values[MULTIPLIERS] = float(errors.max(initial=0.0))

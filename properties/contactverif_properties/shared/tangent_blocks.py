@@ -126,9 +126,9 @@ def judge_of(case: Case, subject: Subject) -> BlockJudge:
     dtype: type = np.float64
     if formulation.decides_anew(pairing):  # No smaller step is exact where decisions may change with it.
         pass
-    elif subject.traits.takes_complex:
+    elif subject.traits.abilities.takes_complex:
         dtype = np.complex128
-    elif subject.traits.takes_longdouble:
+    elif subject.traits.abilities.takes_longdouble:
         dtype = np.longdouble
     return BlockJudge(
         Differences(formulation, case, pairing), dense(tangent), pattern_of(tangent), groups_of(case), dtype

@@ -80,7 +80,7 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
     uniform = np.full(count, case.penalty * case.parameter("penetration"))
     state = case.with_multipliers(uniform)
     transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
-    if subject.traits.penalty == "nodal":
+    if subject.traits.rules.penalty == "nodal":
         multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
         mean = float(np.abs(multipliers).mean())
         largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
@@ -132,7 +132,7 @@ def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
     transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
     exact = consistent_forces(case, pressure).reshape(-1)
     nearest: FloatArray = optimize.nnls(transfer, exact)[0]  # The formulation would release one below 0.
-    if subject.traits.penalty != "nodal":
+    if subject.traits.rules.penalty != "nodal":
         uniform[~transfer.any(axis=0)] = 0.0
         errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]
         if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):

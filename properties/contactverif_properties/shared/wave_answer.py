@@ -53,7 +53,7 @@ def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -
     total = -float((uniform.bodies[0].load * uniform.displacements(before[:n_free])[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
     springs = abs(total) / (MEAN_PRESSURE**2 * LENGTH) - bodies
-    nodal = subject.traits.penalty == "nodal" or "contact_points" not in formulation.provides
+    nodal = subject.traits.rules.penalty == "nodal" or "contact_points" not in formulation.provides
     return InterfaceAnswer(
         compliance=wave_work(uniform, wavy, before[:n_free], after[:n_free]),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),

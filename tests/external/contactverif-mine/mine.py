@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactverif import Traits
+from contactverif import Abilities, PatchPromises, Promises, Rules, Traits
 
 
 class NodeToSegment:
@@ -68,13 +68,9 @@ class Exact(SegmentToSegment):
     """The segment-to-segment residual, with promises and an exact tangent."""
 
     traits = Traits(
-        passes_flat_patch=True,
-        conserves_force=True,
-        conserves_moment=True,
-        tangent="exact",
-        area="current",
-        penalty="distributed",
-        takes_complex=True,
+        promises=Promises(patch=PatchPromises(flat=True), conserves_force=True, conserves_moment=True, tangent="exact"),
+        rules=Rules(area="current", penalty="distributed"),
+        abilities=Abilities(takes_complex=True),
     )
 
     def tangent(self, interface, pairing, z):

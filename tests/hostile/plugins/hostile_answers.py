@@ -347,7 +347,7 @@ def traits_of_another_kind(right: Any) -> Any:
 @answers("traits", ends=CAUGHT)
 def traits_changed_afterwards(answer: Any) -> Any:
     """State promises whose values were exchanged after they had been checked."""
-    for name in ("passes_flat_patch", "penalty", "enforcement", "symmetric"):
+    for name in ("flat", "penalty", "enforcement", "symmetric"):
         object.__setattr__(answer, name, "\x1b[2Jtrue")
     object.__setattr__(answer, "witnesses", 7)
     return answer

@@ -60,7 +60,7 @@ def say_no_words() -> None:
 @before("residual", ends=EITHER)
 def say_loaded_again() -> None:
     """Tell the harness in the middle of a case that a formulation with other promises was loaded."""
-    _say(LOADED, {"passes_flat_patch": True, "enforcement": "multiplier", "nonsense": 1}, ["pair", "nonsense"])
+    _say(LOADED, {"flat": True, "enforcement": "multiplier", "nonsense": 1}, ["pair", "nonsense"])
 
 
 @before("residual", ends=EITHER)
