@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
-    from contactverif.contract.traits import Traits
+    from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
     from contactverif.mechanics.mesh_bodies import body_from_mesh
     from contactverif.mechanics.newton import solve
     from contactverif.mechanics.scene import Scene

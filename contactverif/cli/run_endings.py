@@ -54,7 +54,7 @@ def _end_journal(journal: Journal, *, complete: bool) -> None:
 
 
 class End(NamedTuple):
-    """What a run came to."""
+    """The files, the exit status and the gaps of a run."""
 
     files: OutputFiles  # Those that were written.
     gap: str  # What was not judged; empty if nothing is missing.

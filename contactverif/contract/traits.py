@@ -47,7 +47,7 @@ class PatchPromises:
 
 @dataclass(frozen=True, slots=True)
 class Promises:
-    """What holds for all cases (``True``, or a word), or not for a case that shows so (``False``).
+    """Statements about all cases (``True``, or a word), or about a case that shows a fault (``False``).
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Rules:
 
 @dataclass(frozen=True, slots=True)
 class Abilities:
-    """What a formulation takes.
+    """The kinds of states that a formulation takes.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What a formulation states about itself; the harness checks every statement.
+    """All that a formulation states about itself; the harness checks every statement.
 
     Every trait is optional. ``None`` promises nothing. ``True``, or a word, is a promise that holds for all cases.
     ``False`` says "does not"; it needs a case that shows so, the witness of the property that checks the promise.

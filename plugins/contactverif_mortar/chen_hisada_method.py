@@ -253,7 +253,7 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
             abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
             evidence=Evidence(
                 witnesses={"patch.dead-zone": "dead-zone", "symmetric": "offset-c", "swap": "tilted"},
-                source="Chen & Hisada, as described by Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
+                source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
             ),
         ),
         check_penalty(penalty),

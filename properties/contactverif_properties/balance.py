@@ -95,10 +95,12 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
     return _judge(MOMENT_IMBALANCE, moment, state.diameter, state, forces, subject.traits)
 
 
-def _judge(quantity: Quantity, lost: float, arm: float, state: Case, forces: FloatArray, traits: Traits) -> Measurement:
-    """Return what is lost of the forces (n_nodes, 2), or of their moment, over Σ|R| of the slave times the arm."""
+def _judge(
+    quantity: Quantity, remainder: float, arm: float, state: Case, forces: FloatArray, traits: Traits
+) -> Measurement:
+    """Return what remains of the forces (n_nodes, 2), or of their moment, over Σ|R| of the slave times the arm."""
     tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, traits))
-    imbalance = ratio(lost, arm * sum_slave_forces(state, forces))
+    imbalance = ratio(remainder, arm * sum_slave_forces(state, forces))
     return Measurement([quantity.check(imbalance, tolerance)], idle=not forces.any())
 
 

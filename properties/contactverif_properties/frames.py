@@ -145,7 +145,7 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
         change = tangent_there - turn @ tangent @ turn.T
         changes.append(Change("tangent", TURNED_TANGENT, change, float(np.abs(tangent).max())))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
-    both = [(state, formulation, its, largest) for state, its in ((case, pairing), (there, pairing_there))]
+    both = [(state, formulation, of_state, largest) for state, of_state in ((case, pairing), (there, pairing_there))]
     return Measurement(*judge_changes(changes, tolerance, both), idle=not forces[:n].any())
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 line = socket.socket(fileno=int(os.environ["CONTACTVERIF_SOCKET"]))
 stream = line.makefile("rb")
-kept = {}  # {number: a penalty, an interface or a pairing}
+items = {}  # {number: a penalty, an interface or a pairing}
 
 
 def pack(array):
@@ -48,11 +48,11 @@ METHODS = {"pair": pair, "residual": residual, "tangent": tangent}
 
 
 def answer(question, method, formulation, interface, pairing, z, warm):
-    arguments = kept[formulation], kept[interface], kept.get(pairing), unpack(z)
+    arguments = items[formulation], items[interface], items.get(pairing), unpack(z)
     start, processor = time.perf_counter(), time.process_time()
     arrays = METHODS[method](*arguments)
     if method == "pair":
-        kept[question] = arrays
+        items[question] = arrays
     seconds = time.perf_counter() - start, time.process_time() - processor
     return ["answer", question, {name: pack(array) for name, array in arrays.items()}, *seconds]
 
@@ -69,13 +69,13 @@ def reply(kind, *content):
         return ["loaded", question, {}, [*METHODS]] if name == "springs" else ["unloaded", question, "no such springs"]
     if kind == "forget":
         for number in content[0]:
-            kept.pop(number, None)
+            items.pop(number, None)
     elif kind == "make":
-        kept[content[0]] = content[1]
+        items[content[0]] = content[1]
     elif kind == "interface":
-        kept[content[0]] = [unpack(array) for array in content[1:]]
+        items[content[0]] = [unpack(array) for array in content[1:]]
     elif kind == "pairing":
-        kept[content[0]] = {name: unpack(array) for name, array in content[1].items()}
+        items[content[0]] = {name: unpack(array) for name, array in content[1].items()}
     return None
 
 

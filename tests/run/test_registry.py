@@ -311,8 +311,11 @@ def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> No
 @pytest.mark.parametrize(
     ("traits", "message"),
     [
-        ({"tangent": "exactly"}, "Traits.tangent: found 'exactly'; needed one of 'exact', 'approximate', None"),
-        ({"witnesses": ["a1"]}, "Traits.witnesses: found a list; needed {property id: name of a case}"),
+        (
+            {"tangent": "exactly"},
+            "Traits.promises.tangent: found 'exactly'; needed one of 'exact', 'approximate', None",
+        ),
+        ({"witnesses": ["a1"]}, "Traits.evidence.witnesses: found a list; needed {property id: name of a case}"),
     ],
 )
 def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], message: str) -> None:
