@@ -205,7 +205,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """All that a formulation states about itself; the harness checks every statement.
+    """The statements of a formulation about itself; the harness checks every one.
 
     Every trait is optional. ``None`` promises nothing. ``True``, or a word, is a promise that holds for all cases.
     ``False`` says "does not"; it needs a case that shows so, the witness of the property that checks the promise.
