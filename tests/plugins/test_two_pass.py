@@ -207,8 +207,8 @@ def test_what_it_promises() -> None:
         "takes_complex",
         "enforcement",
     )
-    assert all(getattr(springs, name) == getattr(inner, name) for name in unchanged)
-    assert (springs.promises.patch.flat, springs.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
+    assert all(springs.by_name()[name] == inner.by_name()[name] for name in unchanged)
+    assert (springs.promises.patch.flat, springs.rules.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
     assert traits_of("vts_ppt").promises.patch.flat is False  # springs that act twice
     assert traits_of("vts_ppt").witness("balance.force") == "tilted"
     assert traits_of("nts_lm").promises.patch.flat is True

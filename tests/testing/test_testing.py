@@ -19,7 +19,7 @@ from dataclasses import replace
 from hypothesis import strategies as st
 from contactverif.run import registry
 from contactverif.contract.case import Case
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
 
@@ -40,14 +40,15 @@ def cases(interface):
 def undecided(case, subject):
     return Measurement([ERROR.check(1.0, 0.0)], "a kink")
 
-ZERO = Property("patch.zero", "patch", "No force at rest.", (ERROR,), cases, measured, lambda it: it.passes_flat_patch)
+PROMISE = lambda traits: traits.promises.patch.flat
+ZERO = Property("patch.zero", "patch", "No force at rest.", (ERROR,), cases, measured, PROMISE)
 TANGENT = replace(ZERO, id="tangent.zero", needs=frozenset({"tangent"}), promise=lambda traits: None)
 CURVED = replace(ZERO, id="patch.curved", applicable=lambda traits: "flat only")
 KINK = replace(ZERO, id="patch.kink", measure=undecided)
 
 class Plugin:
     def __init__(self, least, promise):
-        self.least, self.traits = least, Traits(flat=promise)
+        self.least, self.traits = least, Traits(Promises(PatchPromises(flat=promise)))
     def residual(self, interface, pairing, z):
         return 1.0 * (len(interface.slave) >= self.least) + 0 * z
 
