@@ -8,7 +8,8 @@ from importlib.metadata import entry_points
 import pytest
 from fresh_process import PYTHON
 
-from contactverif.run import registry  # Imports numpy before pytester notes which modules to forget again.
+# They import numpy and hypothesis before pytester notes which modules to forget again.
+from contactverif.run import hypothesis_draws, registry  # noqa: F401
 
 pytest_plugins = ["pytester"]
 
