@@ -283,11 +283,14 @@ class Traits:
         ContractError
             If there is no such trait, or it does not take the value.
         """
-        if strangers := changes.keys() - self.by_name():
-            raise ContractError(f"Traits: found {', '.join(sorted(strangers))}; needed {', '.join(self.by_name())}")
-        revised = _revise(self, changes)
-        assert isinstance(revised, Traits)
-        return revised
+        if strangers := changes.keys() - _GROUPS.keys():
+            raise ContractError(f"Traits: found {', '.join(sorted(strangers))}; needed {', '.join(_GROUPS)}")
+        revised: dict[str, Any] = {}
+        for name, value in changes.items():
+            revised.setdefault(_GROUPS[name], {})[name] = value
+        if patch := revised.pop("patch", None):
+            revised.setdefault("promises", {})["patch"] = replace(self.promises.patch, **patch)
+        return replace(self, **{group: replace(getattr(self, group), **values) for group, values in revised.items()})
 
     def by_name(self) -> dict[str, Any]:
         """Return ``{name: value}`` of the traits of all groups."""
@@ -299,16 +302,6 @@ def _flatten(group: Any) -> Iterator[tuple[str, Any]]:
     for entry in fields(group):
         value = getattr(group, entry.name)
         yield from _flatten(value) if is_dataclass(value) else [(entry.name, value)]
-
-
-def _revise(group: Any, changes: Mapping[str, Any]) -> Any:
-    """Return a group with the changes that concern it."""
-    values = {entry.name: getattr(group, entry.name) for entry in fields(group)}
-    revised = {
-        name: _revise(value, changes) if is_dataclass(value) else changes.get(name, value)
-        for name, value in values.items()
-    }
-    return replace(group, **revised)
 
 
 def _listed_values(kind: type) -> dict[str, tuple[object, ...]]:
@@ -337,3 +330,5 @@ def _check_values(group: Any, path: str) -> None:
 
 _VALUES_OF_TYPES: dict[Any, tuple[object, ...]] = {bool: (True, False), type(None): (None,)}
 _VALUES = {kind: _listed_values(kind) for kind in (PatchPromises, Promises, Rules, Abilities)}
+_PARTS = {"patch": PatchPromises, "promises": Promises, "rules": Rules, "abilities": Abilities, "evidence": Evidence}
+_GROUPS = {entry.name: group for group, kind in _PARTS.items() for entry in fields(kind) if entry.name != "patch"}

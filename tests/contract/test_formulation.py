@@ -11,7 +11,7 @@ import pytest
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.traits import Promises, Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
 
@@ -148,3 +148,21 @@ def test_no_contact_points() -> None:
 def test_broken_contact_points(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(MisuseError, match=message):
         points(**changed)
+
+
+def test_a_trait_is_revised_by_its_name_whatever_its_group() -> None:
+    traits = Traits(Promises(PatchPromises(flat=True), symmetric=True), Rules(penalty="nodal"))
+    revised = traits.revise(flat=False, symmetric=None, area="current", batched=True, source="a paper")
+    assert revised.by_name() == traits.by_name() | {
+        "flat": False,
+        "symmetric": None,
+        "area": "current",
+        "batched": True,
+        "source": "a paper",
+    }
+    assert traits.promises.patch.flat
+    assert traits.revise() == traits
+    with pytest.raises(ContractError, match="Traits: found flatt; needed flat, normal, "):
+        traits.revise(flatt=True)
+    with pytest.raises(ContractError, match=r"Traits.rules.area: found 'here'; needed one of 'reference', 'current'"):
+        traits.revise(area="here")
