@@ -85,7 +85,7 @@ def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
         answer = _READ + function(path)
     except MemoryError:
         answer = _FAILED + f"reading it takes more than {limits.memory} MB of memory".encode()
-    except BaseException as error:
+    except BaseException as error:  # A damaged file can make its library raise anything; the parent tells the user.
         reason = " ".join(str(error).split())[:_LONGEST_REASON] or type(error).__name__
         answer = _FAILED + reason.encode(errors="replace")
     channel.send(answer)

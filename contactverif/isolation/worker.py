@@ -99,7 +99,7 @@ class Desk:
         # is kept, and told when something is asked that needs what is missing.
         try:
             self._store[request.number] = self._item(request)
-        except BaseException as error:
+        except BaseException as error:  # A plugin may raise what it likes in its constructor.
             self._store[request.number] = error
         return None
 

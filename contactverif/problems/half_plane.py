@@ -87,19 +87,6 @@ def surface_displacements(pressure: LinePressure, x: FloatArray, young: float, p
     return np.stack([along, into], axis=-1) * (1 - poisson**2) / young
 
 
-def mcewan_stresses(x: FloatArray, depth: FloatArray, half_width: float, peak: float) -> FloatArray:
-    """Return the stresses σ_xx, σ_ηη and σ_xη (..., 3) under Hertz' pressure in closed form (McEwan; Johnson, 4.49)."""
-    inside = half_width**2 - x**2 + depth**2
-    root = np.hypot(inside, 2 * x * depth)
-    m = np.sqrt((root + inside) / 2)
-    n = np.copysign(np.sqrt(np.maximum(root - inside, 0.0) / 2), x)
-    square = np.maximum(m**2 + n**2, np.finfo(float).tiny)
-    share = (depth**2 + n**2) / square
-    normal = [m * (1 + share) - 2 * depth, m * (1 - share)]
-    shear = n * (m**2 - depth**2) / square
-    return -peak / half_width * np.stack([*normal, shear], axis=-1)
-
-
 def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
     """Return the nodal forces (m, n, 2) of the half-plane's stresses on both sides and on the far edge of a box.
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, log2, pi, sqrt
+from math import ceil, log2, pi
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -272,8 +272,3 @@ def _fit(half_width: float, pressure: Callable[[FloatArray], FloatArray], levels
     factors = (np.arange(TERMS) + 0.5) * weights[:, None] * legendre.legvander(points, TERMS - 1)
     half = pressure(gaps) @ factors
     return LinePressure(half_width, edges, np.concatenate([half[::-1] * (-1.0) ** np.arange(TERMS), half]))
-
-
-def hertz_peak(force: float, radius: float, stiffness: float) -> float:
-    """Return the peak √(F E*/πR) of Hertz' pressure under a given force (Johnson, 4.45)."""
-    return sqrt(force * stiffness / (pi * radius))

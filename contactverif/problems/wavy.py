@@ -297,31 +297,25 @@ _PRESSURE_RATE = Bound(
     limits={"": 0.9},
     reason="Constant pressures on segments have the rate 1.",
 )
+_FORCE_RATE = partial(Bound, name="rate of forces", kinds=FORCES, rate=True)
+_MOTION_RATE = partial(Bound, name="rate of displacements", kinds=MOTIONS, rate=True)
+_LAST_PRESSURE = partial(Bound, name="pressure error on the finest mesh", kinds=(PRESSURE,), of_best="kh/√24")
 WAVY_STUDIES = Studies(
     cases=flat_cases,
     read=WavyStudy.from_case,
     series=_SERIES,
     bounds=(
-        Bound(
-            name="rate of forces",
-            kinds=FORCES,
-            rate=True,
+        _FORCE_RATE(
             limits={"": 1.1, "coarser slave": 0.8},
             reason="Right ones: at least 1.22, as a coarser slave 0.95; wrong ones: at most 0.42 and 0.58.",
         ),
-        Bound(
-            name="rate of displacements",
-            kinds=MOTIONS,
-            rate=True,
+        _MOTION_RATE(
             limits={"": 1.8, "finer slave": 1.6, "coarser slave": 1.6},
             reason="The rate of linear elements is 2; right ones: at least 1.89 and 1.72.",
         ),
         _PRESSURE_RATE,
-        Bound(
-            name="pressure error on the finest mesh",
-            kinds=(PRESSURE,),
+        _LAST_PRESSURE(
             limits={"": 2.0},
-            of_best="kh/√24",
             reason="The best pressure that is constant on each segment h is off by kh/√24 of the wave; twice that is "
             "allowed.",
         ),
@@ -332,26 +326,17 @@ CURVED_STUDIES = Studies(
     read=WavyStudy.from_case,
     series=_SERIES,
     bounds=(
-        Bound(
-            name="rate of forces",
-            kinds=FORCES,
-            rate=True,
+        _FORCE_RATE(
             limits={"": 1.0},
             reason="Right ones: at least 1.13.",
         ),
-        Bound(
-            name="rate of displacements",
-            kinds=MOTIONS,
-            rate=True,
+        _MOTION_RATE(
             limits={"": 1.8},
             reason="The rate of linear elements is 2; right ones: at least 1.89.",
         ),
         _PRESSURE_RATE,
-        Bound(
-            name="pressure error on the finest mesh",
-            kinds=(PRESSURE,),
+        _LAST_PRESSURE(
             limits={"": 4.0},
-            of_best="kh/√24",
             reason="Twice that of `accuracy.wavy`: facets that cross add as much as constant pressures do.",
         ),
     ),

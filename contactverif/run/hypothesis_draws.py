@@ -44,7 +44,7 @@ Fails = Callable[[Case], bool]
 
 PATIENCE = 100  # The number of choices in a row that make no new case before a strategy counts as having no other.
 # The probabilities with which a case repeats an integer, and with which it makes the simplest choice. Each case has one
-# of these pairs. Some errors show only where lengths, slopes or depths are equal, others best in a small mesh.
+# of these pairs: some errors show only where lengths, slopes or depths are equal, others best in a small mesh.
 # Hypothesis' engine, too, makes such cases on purpose.
 REPEAT_AND_SIMPLE = ((0.0, 0.0), (0.0, 0.0), (0.5, 0.0), (0.9, 0.0), (0.0, 0.5))
 _NARROW = 2**10  # The widest range of integers from which each is drawn as often as any other.
@@ -295,7 +295,7 @@ def _shrink(
             raise _LimitReached
         try:
             failed = fails(case)
-        except Exception as error:
+        except Exception as error:  # Hypothesis would take it for the failure that it shrinks.
             raise _ForeignError(error) from None
         if failed:
             raise _Failed

@@ -67,7 +67,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
     except ContractError as error:
         return outcome(Verdict.FAIL, f"breaks the contract: {error}", breach=True)
-    except Exception as error:
+    except Exception as error:  # A mistake of the judge, which is not hidden.
         error.add_note(f"while judging {question.id} of {subject.name} on {case!r}")
         raise
     return replace(outcome(verdict, reason), measurement=measurement)

@@ -231,7 +231,7 @@ def _load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
         return entries[0].load()
     except KeyboardInterrupt:
         raise
-    except BaseException as error:
+    except BaseException as error:  # A plugin may raise anything while it is imported.
         return NotLoaded(name, describe_error(error))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.problems.half_plane import displacements, mcewan_stresses, stresses, surface_displacements
+from contactverif.problems.half_plane import displacements, stresses, surface_displacements
 from contactverif.problems.line_pressure import LinePressure, hertz_pressure, layer_contact
 
 YOUNG, POISSON = 2.0, 0.3
@@ -29,6 +29,19 @@ def _slopes(field: object, x: FloatArray, depth: FloatArray) -> tuple[FloatArray
         return result
 
     return slope(STEP, 0.0), slope(0.0, STEP)
+
+
+def mcewan_stresses(x: FloatArray, depth: FloatArray, half_width: float, peak: float) -> FloatArray:
+    """Return the stresses σ_xx, σ_ηη and σ_xη (..., 3) under Hertz' pressure in closed form (McEwan; Johnson, 4.49)."""
+    inside = half_width**2 - x**2 + depth**2
+    root = np.hypot(inside, 2 * x * depth)
+    m = np.sqrt((root + inside) / 2)
+    n = np.copysign(np.sqrt(np.maximum(root - inside, 0.0) / 2), x)
+    square = np.maximum(m**2 + n**2, np.finfo(float).tiny)
+    share = (depth**2 + n**2) / square
+    normal = [m * (1 + share) - 2 * depth, m * (1 - share)]
+    shear = n * (m**2 - depth**2) / square
+    return -peak / half_width * np.stack([*normal, shear], axis=-1)
 
 
 @pytest.mark.parametrize(("least", "bound"), [(1.0, 1e-11), (0.25, 1e-8), (0.1, 1e-4)])
