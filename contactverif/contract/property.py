@@ -327,19 +327,22 @@ class Property(PropertyInfo):
         *,
         id: str,
         family: str,
-        summary: str,
         quantities: tuple[Quantity, ...],
         cases: Callable[[Any], Any],
         promise: Callable[[Traits], bool | None],
         **others: Unpack[OtherAttributes],
     ) -> Callable[[Measure], Property]:
-        """Return a decorator that makes a property of the function that measures; its docstring is the question.
+        """Return a decorator that makes a property of the function that measures.
 
-        The arguments are the attributes of the property. A property that is made so can be pickled.
+        The first line of its docstring is the summary, and what follows is the question. The arguments are the other
+        attributes of the property. A property that is made so can be pickled.
         """
-        return lambda measure: cls(
-            id, family, summary, quantities, cases, measure, promise, question=getdoc(measure) or "", **others
-        )
+
+        def make(measure: Measure) -> Property:
+            summary, _, question = (getdoc(measure) or "").partition("\n\n")
+            return cls(id, family, summary, quantities, cases, measure, promise, question=question, **others)
+
+        return make
 
     @property
     def info(self) -> PropertyInfo:

@@ -88,7 +88,7 @@ def property_page(question: Property) -> str:
 def _answers(question: Property) -> list[str]:
     """Return the paragraphs about question, reason, judgement and undecided cases."""
     answers = []
-    for paragraph in question.question.split("\n\n")[1:]:
+    for paragraph in question.question.split("\n\n"):
         title, body = re.fullmatch(r"(?:\*\*([^*]+)\.\*\* )?(.*)", paragraph, re.DOTALL).groups()  # type: ignore[union-attr]
         answers.append((f"**{title}.** " if title else "") + plain(body) + "\n")
     return answers

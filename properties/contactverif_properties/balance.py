@@ -43,13 +43,12 @@ WORK = Quantity(
 @Property.define(
     id="balance.force",
     family="balance",
-    summary="The forces on slave and master add up to zero on tilts, kinks and curves.",
     quantities=(FORCE_IMBALANCE,),
     cases=Cases.random(any_cases),
     promise=lambda traits: traits.promises.conserves_force,
 )
 def force_balance(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the forces on slave and master add up to zero.
+    """The forces on slave and master add up to zero on tilts, kinks and curves.
 
     **Question.** In a random state with tilts, kinks and curves, is the sum of all nodal forces zero?
 
@@ -71,13 +70,12 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="balance.moment",
     family="balance",
-    summary="The moments of the forces on slave and master add up to zero on tilts, kinks and curves.",
     quantities=(MOMENT_IMBALANCE,),
     cases=Cases.random(any_cases),
     promise=lambda traits: traits.promises.conserves_moment,
 )
 def moment_balance(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the moments of the forces on slave and master add up to zero.
+    """The moments of the forces on slave and master add up to zero on tilts, kinks and curves.
 
     **Question.** In a random state with tilts, kinks and curves, is the sum of the moments of all nodal forces zero?
 
@@ -107,13 +105,12 @@ def _judge(
 @Property.define(
     id="symmetric",
     family="invariants",
-    summary="The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.",
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),
     promise=lambda traits: traits.promises.symmetric,
 )
 def symmetric(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the tangent is symmetric, and the forces have a potential.
+    """The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.
 
     **Question.** Is K = Kᵀ in a random state? And do the forces do no work when the nodes run through a small closed
     loop, with the pairing frozen?

@@ -52,14 +52,13 @@ def refuse_unstated_continuity(traits: Traits) -> str:
 @Property.define(
     id="continuity",
     family="invariants",
-    summary="Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.",
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),
     promise=promise_continuity,
     applicable=refuse_unstated_continuity,
 )
 def continuity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether forces jump while a slave slides over the vertices of the master.
+    """Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.
 
     **Question.** A slave slides along a bent master by the length of one of its segments, so that each of its points
     passes about one vertex. Do the forces change continuously, or with a continuous slope, as the trait `continuity`

@@ -80,7 +80,6 @@ def exact_forces(studies: Studies, case: Case) -> FloatArray:
 @Property.define(
     id="accuracy.wavy",
     family="accuracy",
-    summary="Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.",
     quantities=WAVY_STUDIES.quantities,
     cases=Cases.from_list(WAVY_STUDIES.cases),
     promise=lambda traits: traits.promises.converges,
@@ -90,7 +89,7 @@ def exact_forces(studies: Studies, case: Case) -> FloatArray:
     exact=partial(exact_forces, WAVY_STUDIES),
 )
 def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
-    """Ask whether forces, pressures and displacements converge to an exact solution in which the pressure varies.
+    """Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.
 
     **Question.** Two wavy bodies are pressed together until they touch everywhere. On finer and finer meshes that do
     not match, how fast do nodal forces, reported pressures and displacements come near to the exact ones?
@@ -139,7 +138,6 @@ def promise_without_locking(traits: Traits) -> bool | None:
 @Property.define(
     id="accuracy.wavy-curved",
     family="accuracy",
-    summary="Wavy bodies converge to the exact solution on a curved interface too, at a high penalty as well.",
     quantities=CURVED_STUDIES.quantities,
     cases=Cases.from_list(CURVED_STUDIES.cases),
     promise=promise_without_locking,
@@ -149,7 +147,7 @@ def promise_without_locking(traits: Traits) -> bool | None:
     exact=partial(exact_forces, CURVED_STUDIES),
 )
 def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
-    """Ask whether that still holds where the interface stays curved, so that facets of both meshes cross.
+    """Wavy bodies converge to the exact solution on a curved interface too, at a high penalty as well.
 
     **Question.** The bodies of `accuracy.wavy` fit along a wave of 1e-6 of their size. Do nodal forces, pressures and
     displacements converge there too, at a moderate and at a high penalty?
@@ -175,7 +173,6 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="accuracy.hertz",
     family="accuracy",
-    summary="Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.",
     quantities=HERTZ_STUDIES.quantities,
     cases=Cases.from_list(HERTZ_STUDIES.cases),
     promise=lambda traits: traits.promises.converges,
@@ -185,7 +182,7 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     exact=partial(exact_forces, HERTZ_STUDIES),
 )
 def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a contact that has an edge converges to Hertz' solution as meshes are refined.
+    """Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.
 
     **Question.** A parabola is pressed on a flat. Do nodal forces on both sides, reported pressures, the peak and the
     half-width converge to those of the exact solution as both meshes become finer?
@@ -246,14 +243,13 @@ def arc_cases() -> tuple[Case, ...]:
 @Property.define(
     id="accuracy.arc",
     family="accuracy",
-    summary="Springs between two concentric arcs press with ε̂ d, and reported pressures say so.",
     quantities=(SLAVE, MASTER, FORCES, SUM, PRESSURE),
     cases=Cases.from_list(arc_cases),
     promise=lambda traits: None if refuse_unknown_total(traits) else True,
     applicable=refuse_unknown_total,
 )
 def accuracy_arc(case: Case, subject: Subject) -> Measurement:
-    """Ask whether springs between two concentric arcs press as they do between flats.
+    """Springs between two concentric arcs press with ε̂ d, and reported pressures say so.
 
     **Question.** Two concentric arcs penetrate each other by the same depth d everywhere. Do the forces and the
     reported pressures tend to those of a uniform pressure ε̂ d as the mesh is refined, whether the slave is convex or

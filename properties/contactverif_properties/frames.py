@@ -38,14 +38,13 @@ TURNED_TANGENT = Quantity("error of the tangent after a rotation", "1", SEGMENT_
 @Property.define(
     id="scaling",
     family="invariants",
-    summary="Another unit of length changes nothing, so no absolute tolerance is hidden.",
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
     promise=lambda traits: True,
     applicable=refuse_unstated_penalty,
 )
 def scaling(case: Case, subject: Subject) -> Measurement:
-    """Ask whether another unit of length changes nothing.
+    """Another unit of length changes nothing, so no absolute tolerance is hidden.
 
     **Question.** All lengths are multiplied by 2^k, for a random k from −60 to 60. Are the forces 2^k times the old
     ones, and is the tangent the same, for a penalty that changes with its unit?
@@ -103,14 +102,13 @@ def turn_state(case: Case) -> tuple[Case, FloatArray]:
 @Property.define(
     id="objectivity",
     family="invariants",
-    summary="Turning and shifting the state turns the forces and the tangent with it.",
     quantities=(TURNED_FORCES, TURNED_TANGENT),
     cases=Cases.random(smooth_cases),
     promise=lambda traits: True,
     usual_undecided=0.003,
 )
 def objectivity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether forces and tangent turn with the state.
+    """Turning and shifting the state turns the forces and the tangent with it.
 
     **Question.** A random state is turned by a random angle and shifted. Are the forces and the tangent the old ones,
     turned?

@@ -77,11 +77,10 @@ _define = partial(Property.define, family="hard", quantities=(DIRECTION, TOTAL, 
 
 @_define(
     id="hard.convex-kink",
-    summary="A slave node that passes a convex master vertex within 1e-12 feels no wild force.",
     cases=Cases.from_list(convex_kink_states),
 )
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a slave node that crosses the bisector of a convex vertex feels a sound force on either side.
+    """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
     **Question.** The master is a roof with a kink of 0.1, 0.5 or 1.5 rad, and the slave is a parallel roof below it.
     Its vertex is on the bisector, or 1e-3 to 1e-12 to either side. Is the total force what the gap says, and does it
@@ -104,11 +103,10 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.concave-corner",
-    summary="A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.",
     cases=Cases.from_list(concave_corner_states),
 )
 def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a corner that sits in a re-entrant corner is pushed by both faces.
+    """A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.
 
     **Question.** The corner of the slave penetrates both faces of a 90° corner of the master. Its node is equally far
     from both, or nearer to one by a rounding. Are both faces felt, and is the node counted once?
@@ -129,11 +127,10 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.free-end",
-    summary="At a free end the force is between that of the inner segments and that of all; beyond it is 0.",
     cases=Cases.from_list(free_end_states),
 )
 def hard_free_end(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a slave that ends at, past or beyond the master's free end feels a sound force.
+    """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
     **Question.** The first node of the slave is at the free end of a flat master, a rounding beside it, or up to half a
     segment past it; or the slave is wholly outside. Is the total force between that of the segments that surely face
@@ -156,11 +153,10 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.steep-slave",
-    summary="A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.",
     cases=Cases.from_list(steep_slave_states),
 )
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a slave segment that stands on the master, or faces away from it, gives a sound force.
+    """A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.
 
     **Question.** A slave segment is at 89.9°, 90° or 180° to the master that it penetrates: it stands on it, with
     either side in front, or lies in it with its back to it. Is the force finite, bounded, and no pull?
@@ -195,7 +191,6 @@ PULLING = Quantity("pull across the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "A s
 @Property.define(
     id="hard.touch",
     family="hard",
-    summary="Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.",
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     cases=Cases.from_list(touching_states),
     promise=lambda traits: True,
@@ -203,7 +198,7 @@ PULLING = Quantity("pull across the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "A s
     applicable=lambda traits: "a barrier is infinite in touch" if traits.rules.enforcement == "barrier" else "",
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:
-    """Ask whether surfaces that just touch give neither a force nor nonsense.
+    """Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.
 
     **Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. Is the force
     no more than roundoff makes it, and is the tangent that of a spring across the surface, or of none?

@@ -89,11 +89,10 @@ _define = partial(
 
 @_define(
     id="hard.offset",
-    summary="Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.",
     cases=Cases.from_list(offset_states),
 )
 def hard_offset(case: Case, subject: Subject) -> Measurement:
-    """Ask whether forces stay right far from the origin, where gaps are small differences of large coordinates.
+    """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
 
     **Question.** A flat interface with lengths near 1 lies 1e6, 1e8 or 2^10 away from the origin, and penetrates by
     1e-6, 1e-9, or one step of the doubles. Are the forces those of the gap that the stored numbers say?
@@ -117,11 +116,10 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.deep",
-    summary="A penetration of half a segment or two segments gives the forces of that penetration.",
     cases=Cases.from_list(deep_states),
 )
 def hard_deep(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a deep penetration gives the forces of that penetration.
+    """A penetration of half a segment or two segments gives the forces of that penetration.
 
     **Question.** A flat slave penetrates a flat master by half a segment, and by two segments. Are the forces those of
     the pressure ε̂ |g|?
@@ -139,11 +137,10 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.node-hit",
-    summary="A point over a master node, or beside it by one rounding, is counted once.",
     cases=Cases.from_list(node_hit_states),
 )
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a point that hits a master node, or misses it by one rounding, is counted once.
+    """A point over a master node, or beside it by one rounding, is counted once.
 
     **Question.** A slave node, a quarter point or the middle of a slave segment lies over a master node exactly, or one
     rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Are the forces as if nothing were special there?
@@ -161,11 +158,10 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="hard.search",
-    summary="Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.",
     cases=Cases.from_list(search_states),
 )
 def hard_search(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the search finds the right master segment where other surfaces are near.
+    """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
 
     **Question.** The slave lies on a flat part of the master. Something else is near: a node that is nearer than those
     of the right segment, the other side of a thin plate or of a sharp wedge, a second body behind the first, or the

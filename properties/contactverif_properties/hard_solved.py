@@ -71,11 +71,10 @@ _define_patch = partial(
 
 @_define_patch(
     id="hard.c",
-    summary="Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.",
     cases=Cases.from_list(case_c),
 )
 def hard_c(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the reference paper's case C, and its variant off the kink, give exact forces and stresses.
+    """Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.
 
     **Question.** Two slave segments of 2 and two of 4 lie on four master segments of 3. One area of competence covers
     two master segments, and its virtual slave node is exactly on a master node (C), or beside it (C′). Are the forces
@@ -96,11 +95,10 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
 
 @_define_patch(
     id="hard.contrast",
-    summary="A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.",
     cases=Cases.from_list(contrast_scenes),
 )
 def hard_contrast(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the choice of the slave matters where stiffness and mesh differ much.
+    """A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.
 
     **Question.** A block with 8 segments lies on one with 2. Either is the slave, and either is softer by 1e6, or they
     are equally stiff. Is the stress of a uniform pressure exact at 10 E/h and at 1e5 E/h?
@@ -118,11 +116,10 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
 
 @_define_patch(
     id="hard.short-segment",
-    summary="One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.",
     cases=Cases.from_list(lambda: tiny_segment_states() + tiny_segment_scenes()),
 )
 def hard_short_segment(case: Case, subject: Subject) -> Measurement:
-    """Ask whether one tiny segment among ordinary ones spoils forces or stresses.
+    """One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.
 
     **Question.** An interface of length 12 has a segment of 1.2e-5 on the slave, on the master, on both facing each
     other, or at the end. Are forces and stresses still those of a uniform pressure, at ε̂ = 1, 1e4 and 1e8?
@@ -142,11 +139,10 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
 
 @_define_patch(
     id="hard.stiff",
-    summary="Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.",
     cases=Cases.from_list(stiff_scenes),
 )
 def hard_stiff(case: Case, subject: Subject) -> Measurement:
-    """Ask whether very stiff springs between very unequal bodies spoil the stress.
+    """Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.
 
     **Question.** The penalty is 1e4 or 1e10 E/h, E that of the softer body, and E of the master is 1e-6, 1 or 1e6 times
     that of the slave. Is the stress of a uniform pressure still as exact as the condition of the matrix allows?
@@ -178,14 +174,13 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
 
 @_define(
     id="hard.dead-zone",
-    summary="A uniform pressure stays exact where the master covers 1e-1 to 1e-12 of a slave segment.",
     quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
     cases=Cases.from_list(vanishing_overlap_scenes),
     promise=lambda traits: True if traits.promises.patch.overhang else None,
     exact=forces_to_draw,
 )
 def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the patch test holds where the master covers almost nothing of the last slave segment.
+    """A uniform pressure stays exact where the master covers 1e-1 to 1e-12 of a slave segment.
 
     **Question.** The master ends inside a slave segment, of which it covers 1e-1 to 1e-12. Is the stress of a uniform
     pressure exact?
@@ -256,14 +251,13 @@ NO_FORCE = replace(NO_STRESS, name="force without a load")
 
 @_define(
     id="hard.zero-load",
-    summary="Two bodies that touch without a load stay without stress, wherever Newton's method starts.",
     quantities=(NO_STRESS, NO_FORCE),
     cases=Cases.from_list(unloaded_scenes),
     promise=lambda traits: True,
     applicable=refuse_dependent_multipliers,
 )
 def hard_zero_load(case: Case, subject: Subject) -> Measurement:
-    """Ask whether two bodies that touch without a load stay at rest.
+    """Two bodies that touch without a load stay without stress, wherever Newton's method starts.
 
     **Question.** Two blocks touch each other and carry no load. They start in touch, pushed into each other, or lifted.
     Does Newton's method end in a state without stress, and is rest in touch a solution?

@@ -78,13 +78,12 @@ def reflect(points: FloatArray) -> FloatArray:
 @Property.define(
     id="mirror",
     family="invariants",
-    summary="The mirror image of a state has the mirror image of its forces and of its tangent.",
     quantities=IN_MIRROR,
     cases=Cases.random(smooth_cases),
     promise=lambda traits: True,
 )
 def mirror(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the mirror image of a state has the mirror image of its forces.
+    """The mirror image of a state has the mirror image of its forces and of its tangent.
 
     **Question.** A random state is mirrored, and its segments run the other way, so that the bodies stay on the left.
     Are the forces and the tangent the old ones, mirrored?
@@ -107,13 +106,12 @@ def mirror(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="swap",
     family="invariants",
-    summary="Slave and master may exchange their roles.",
     quantities=WITH_ROLES_EXCHANGED,
     cases=Cases.random(smooth_cases),
     promise=lambda traits: traits.promises.unbiased,
 )
 def swap(case: Case, subject: Subject) -> Measurement:
-    """Ask whether slave and master may exchange their roles.
+    """Slave and master may exchange their roles.
 
     **Question.** The slave of a random state becomes the master, and the master the slave. Are the forces on each node
     the old ones?
@@ -145,14 +143,13 @@ def renumbering_cases(
 @Property.define(
     id="renumbering",
     family="invariants",
-    summary="Other numbers of nodes and segments, or another seam of a closed chain, change nothing.",
     quantities=IN_OTHER_NUMBERS,
     cases=Cases.by_kind(renumbering_cases),
     promise=lambda traits: True,
     kinds=(ANY, CLOSED),
 )
 def renumbering(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the numbers of nodes and segments matter.
+    """Other numbers of nodes and segments, or another seam of a closed chain, change nothing.
 
     **Question.** Nodes and segments of a random state get other numbers. On closed rings the numbers go round, so that
     the seam, where the last segment meets the first, is elsewhere. Are the forces on each node the old ones?
@@ -202,14 +199,13 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
 @Property.define(
     id="remote",
     family="invariants",
-    summary="A body that touches nothing, far away or behind the master, changes nothing.",
     quantities=BESIDE_OTHERS,
     cases=Cases.by_kind(remote_cases),
     promise=lambda traits: True,
     kinds=(FAR, BEHIND),
 )
 def remote(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a body that touches nothing changes anything.
+    """A body that touches nothing, far away or behind the master, changes nothing.
 
     **Question.** A pair of bodies, in contact with each other, is added far from a random state. Or a second body is
     added behind the master, where no slave point comes near it. Are forces and tangent those of before?

@@ -53,7 +53,6 @@ REDUNDANT = Quantity(
 @Property.define(
     id="complementarity",
     family="multipliers",
-    summary="All multipliers of a solution press, and the scale of the contact decision does not change the solution.",
     quantities=(TENSION, CHANGE),
     cases=Cases.random(solid_cases),
     promise=lambda traits: (
@@ -64,7 +63,7 @@ REDUNDANT = Quantity(
     bodies=True,
 )
 def complementarity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether all multipliers of a solution press, and the scale of the contact decision changes nothing.
+    """All multipliers of a solution press, and the scale of the contact decision does not change the solution.
 
     **Question.** A tilted block is pressed on another, in many cases so that contact ends inside the interface. In the
     solution, is every multiplier λ ≥ 0? Does the same solution follow with another scale c of the decision λ − c g ≥ 0?
@@ -105,7 +104,6 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="multipliers.rank",
     family="multipliers",
-    summary="The constraints are independent, so that the multipliers are unique.",
     quantities=(REDUNDANT,),
     cases=Cases.random(block_cases),
     promise=lambda traits: traits.promises.independent_multipliers,
@@ -113,7 +111,7 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     bodies=True,
 )
 def multiplier_rank(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the constraints of the multipliers are independent, so that the multipliers are unique.
+    """The constraints are independent, so that the multipliers are unique.
 
     **Question.** In the exact solution of two blocks under a uniform pressure, how many multipliers are redundant?
 

@@ -91,7 +91,6 @@ class Attained:
 @Property.define(
     id="newton.attainable",
     family="newton",
-    summary="Far from the origin, residual and accuracy are limited by the stored positions alone.",
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),
     promise=lambda traits: traits.promises.translation_stable,
@@ -100,7 +99,7 @@ class Attained:
     usual_undecided=0.002,
 )
 def newton_attainable(case: Case, subject: Subject) -> Measurement:
-    """Ask what residual and what accuracy Newton's method attains far from the origin.
+    """Far from the origin, residual and accuracy are limited by the stored positions alone.
 
     **Question.** A scene is solved, moved by an exact way of 2^0 to 2^20 segments, and solved again from its own
     solution. At which residual does Newton's method come to rest, how far from the solution, and how much of that is

@@ -69,7 +69,6 @@ def history(trace: Trace) -> dict[str, FloatArray]:
 @Property.define(
     id="newton.history",
     family="newton",
-    summary="Once the pairing has settled, Newton's method falls to roundoff in a few iterations.",
     quantities=(FINAL_ITERATIONS,),
     cases=Cases.random(solid_cases),
     series=SERIES,
@@ -80,7 +79,7 @@ def history(trace: Trace) -> dict[str, FloatArray]:
     usual_undecided=0.004,
 )
 def newton_history(case: Case, subject: Subject) -> Measurement:
-    """Ask whether Newton's method falls to roundoff in a few iterations once the pairing has settled.
+    """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
 
     **Question.** A whole scene is solved. From the first iterate that has the final pairing and a residual of at most
     1e-4 of the first, how many iterations lead down to roundoff?
@@ -162,7 +161,6 @@ def _allowed_iterations(trace: Trace, begin: int) -> int:
 @Property.define(
     id="newton.order",
     family="newton",
-    summary="One Newton step from near a solution ends at a distance of second order.",
     quantities=(ORDER,),
     cases=Cases.random(solid_cases),
     promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
@@ -172,7 +170,7 @@ def _allowed_iterations(trace: Trace, begin: int) -> int:
     usual_undecided=0.004,
 )
 def newton_order(case: Case, subject: Subject) -> Measurement:
-    """Ask whether one step of Newton's method from near a solution ends at a distance of second order.
+    """One Newton step from near a solution ends at a distance of second order.
 
     **Question.** A Newton step starts at a small distance from the solution of a random scene, with the pairing of the
     solution. How fast does the distance after the step fall with the distance before it?

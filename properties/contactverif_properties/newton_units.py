@@ -46,7 +46,6 @@ def refuse(traits: Traits) -> str:
 @Property.define(
     id="newton.units",
     family="newton",
-    summary="Newton's method takes the same steps in other units of length and force.",
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
     promise=lambda traits: True,
@@ -54,7 +53,7 @@ def refuse(traits: Traits) -> str:
     bodies=True,
 )
 def newton_units(case: Case, subject: Subject) -> Measurement:
-    """Ask whether Newton's method takes the same steps in other units.
+    """Newton's method takes the same steps in other units of length and force.
 
     **Question.** A scene is solved. At each iterate the same step is taken with all lengths multiplied by 2^k and all
     moduli by 4^j, penalty and loads with them. Are pairing and next iterate the same?

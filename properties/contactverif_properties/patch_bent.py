@@ -90,7 +90,6 @@ def promise_mean(traits: Traits) -> bool | None:
 @Property.define(
     id="patch.curved",
     family="patch",
-    summary="Two rings that are shrunk onto each other find Lamé's pressure, whichever is the slave.",
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE),
     cases=Cases.from_list(rings),
     promise=promise_mean,
@@ -98,7 +97,7 @@ def promise_mean(traits: Traits) -> bool | None:
     bodies=True,
 )
 def patch_curved(case: Case, subject: Subject) -> Measurement:
-    """Ask whether two rings that are shrunk onto each other find Lamé's pressure.
+    """Two rings that are shrunk onto each other find Lamé's pressure, whichever is the slave.
 
     **Question.** Two elastic rings do not fit by δ = c/150, and the interface is a circle of radius c. Do the mean of
     the forces and the mean of the reported pressures tend to the exact pressure as the mesh is refined, whichever ring
@@ -240,7 +239,6 @@ def forces_to_draw(case: Case) -> FloatArray:
 @Property.define(
     id="patch.kinked",
     family="patch",
-    summary="A uniform pressure stays exact on an interface with a kink.",
     quantities=(STRESS, SLAVE, MASTER, PRESSURE, CUT, FALL),
     cases=Cases.from_list(kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
@@ -248,7 +246,7 @@ def forces_to_draw(case: Case) -> FloatArray:
     exact=forces_to_draw,
 )
 def patch_kinked(case: Case, subject: Subject) -> Measurement:
-    """Ask whether two blocks find a uniform pressure on an interface with a kink.
+    """A uniform pressure stays exact on an interface with a kink.
 
     **Question.** The interface of two blocks of one material is a broken line, and the same pressure acts on all sides.
     Are the stress, the forces on both sides and the reported pressure the exact ones, on both sides of the kink?

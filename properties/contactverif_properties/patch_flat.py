@@ -48,14 +48,13 @@ _define = partial(Property.define, family="patch")
 
 @_define(
     id="patch.flat.transmission",
-    summary="A uniform penetration of a flat interface gives the exact nodal forces on both sides.",
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
     promise=lambda traits: traits.promises.patch.flat,
     exact=forces_of_penetration,
 )
 def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a uniform penetration of a flat interface gives the exact nodal forces on both sides.
+    """A uniform penetration of a flat interface gives the exact nodal forces on both sides.
 
     **Question.** Two flat surfaces with different meshes penetrate each other by the same depth everywhere. Are the
     nodal forces the consistent forces of the pressure ε̂ |g|, on the slave and on the master?
@@ -90,7 +89,6 @@ def refuse_unknown_total(traits: Traits) -> str:
 
 @_define(
     id="patch.flat.resultant",
-    summary="A uniform penetration of a flat interface gives the total force penalty × penetration × area.",
     quantities=(TOTAL,),
     cases=Cases.random(flat_cases),
     promise=lambda traits: None if refuse_unknown_total(traits) else True,
@@ -98,7 +96,7 @@ def refuse_unknown_total(traits: Traits) -> str:
     usual_undecided=0.004,  # Eleven of 3330 cases of right formulations, all of one that takes the last of ties.
 )
 def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a uniform penetration of a flat interface gives the right total force.
+    """A uniform penetration of a flat interface gives the total force penalty × penetration × area.
 
     **Question.** Two flat surfaces penetrate each other by the same depth everywhere. Is the total force on the slave
     the penalty times the penetration times the slave's area, in the configuration that the traits name?
@@ -217,12 +215,11 @@ _define_class = partial(
 
 @_define_class(
     id="patch.flat.normal",
-    summary="Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.",
     cases=Cases.random(normal_cases),
     promise=promise_normal,
 )
 def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
-    """Ask for exact forces, gaps and pressures on flat meshes whose inner master nodes all lie on slave nodes.
+    """Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.
 
     **Question.** Two flat surfaces penetrate each other by the same depth everywhere. The master covers the slave, and
     each inner master node lies on a slave node, as in cases A1 and A2. Are the nodal forces on both sides, the reported
@@ -249,12 +246,11 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
 
 @_define_class(
     id="patch.flat.single",
-    summary="They are exact too where inner master nodes lie in the middle of slave segments.",
     cases=Cases.random(single_cases),
     promise=promise_single,
 )
 def patch_flat_single(case: Case, subject: Subject) -> Measurement:
-    """Ask for exact forces, gaps and pressures on flat meshes with master nodes on slave nodes and on midpoints.
+    """They are exact too where inner master nodes lie in the middle of slave segments.
 
     **Question.** Two flat surfaces penetrate each other by the same depth everywhere. The master covers the slave, and
     each inner master node lies on a slave node or in the middle of a slave segment, as in case B. Are the nodal forces
@@ -276,7 +272,6 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.flat.nodal",
-    summary="Nodal springs push each node with their stiffness times the gap, shared by the lever rule.",
     quantities=(FORCE, GAP, REPORTED_FORCE),
     cases=Cases.random(overhung_cases),
     promise=lambda traits: True if traits.rules.penalty == "nodal" and traits.rules.enforcement == "penalty" else None,
@@ -284,7 +279,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     applicable=lambda traits: "" if traits.rules.penalty == "nodal" else "there are no nodal springs",
 )
 def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the springs of a nodal method give ε |g| at each node, shared by the lever rule, on flat surfaces.
+    """Nodal springs push each node with their stiffness times the gap, shared by the lever rule.
 
     **Question.** Two flat surfaces penetrate each other by the same depth everywhere. Does each slave node get the
     force ε |g| of its spring, and each master node what the lever rule makes of those?
@@ -325,7 +320,6 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.flat.published",
-    summary="The forces that the traits state of named flat cases, right or wrong, come out exactly.",
     quantities=(STATED,),
     cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
     promise=lambda traits: True if traits.evidence.published_forces else None,
@@ -333,7 +327,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     least_contact=0.0,  # Nothing is asked on a case of which nothing is stated, and one table is better than none.
 )
 def patch_flat_published(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the forces that a formulation states of itself on named flat cases come out, right or wrong.
+    """The forces that the traits state of named flat cases, right or wrong, come out exactly.
 
     **Question.** The trait `published_forces` gives the nodal forces of a uniform penetration on named cases, as
     fractions: those of the reference paper for A1, A2, B and C, or an author's own. Does the formulation give just

@@ -82,12 +82,11 @@ _define_at_two_penalties = partial(
 
 @_define_at_two_penalties(
     id="patch.flat.solve",
-    summary="Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.",
     cases=Cases.random(block_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
-    """Ask whether two elastic blocks under a uniform pressure find the exact stress, at a moderate and a high penalty.
+    """Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.
 
     **Question.** Two random elastic blocks on rollers are pressed together. Are the stress, the forces on both sides,
     the gap and the reported pressure the exact ones?
@@ -113,12 +112,11 @@ def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define_at_two_penalties(
     id="patch.flat.normal.solve",
-    summary="Two blocks find the exact stress, forces and gap where each inner master node lies on a slave node.",
     cases=_scenes_of_class(normal_scenes, midpoints=False),
     promise=promise_normal,
 )
 def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
-    """Ask two elastic blocks for exact stress, forces, gap and pressure where inner master nodes lie on slave nodes.
+    """Two blocks find the exact stress, forces and gap where each inner master node lies on a slave node.
 
     **Question.** Two elastic blocks, or a block and a rigid floor, are pressed together. Each inner master node lies on
     a slave node. Are stress, forces on both sides, gap and reported pressure exact at a moderate and at a high penalty?
@@ -140,12 +138,11 @@ def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define_at_two_penalties(
     id="patch.flat.single.solve",
-    summary="Two blocks find them too where inner master nodes lie in the middle of slave segments.",
     cases=_scenes_of_class(single_scenes, midpoints=True),
     promise=promise_single,
 )
 def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
-    """Ask two elastic blocks for the exact stress, forces, gap and pressure with master nodes on nodes and midpoints.
+    """Two blocks find them too where inner master nodes lie in the middle of slave segments.
 
     **Question.** Two elastic blocks are pressed together. Each inner master node lies on a slave node or in the middle
     of a slave segment. Are stress, forces on both sides, gap and reported pressure exact at a moderate and at a high
@@ -168,13 +165,12 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.variants",
-    summary="A uniform pressure stays exact with a rigid master, unequal materials, an inclined interface or a punch.",
     quantities=(*QUANTITIES, MULTIPLIERS),
     cases=Cases.random(variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_variants(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the solved patch test holds in unusual set-ups: rigid, unequal, inclined, slid, or under a punch.
+    """A uniform pressure stays exact with a rigid master, unequal materials, an inclined interface or a punch.
 
     **Question.** Does a uniform pressure stay exact on a rigid master, with materials whose stiffness differs by 1e-6
     to 1e6, inclined by 1° to 179°, slid to 200 positions, and under a punch that is narrower than its base?
@@ -197,13 +193,12 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
 
 @_define(
     id="patch.dead-zone",
-    summary="A uniform pressure stays exact where the slave overhangs the master inside a slave segment.",
     quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
     promise=lambda traits: traits.promises.patch.overhang,
 )
 def patch_dead_zone(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the solved patch test holds where the slave overhangs the master inside a slave segment.
+    """A uniform pressure stays exact where the slave overhangs the master inside a slave segment.
 
     **Question.** The master ends inside a slave segment. Do the contact forces end where the master ends?
 

@@ -41,12 +41,11 @@ FARTHER = Quantity("distance beyond the nearest segment", "1", "4u", LOCAL_REASO
 
 @define_projection(
     id="projection.segment",
-    summary="Each contact point is measured against the master segment that the stated rule names.",
     quantities=(FARTHER,),
     applicable=refuse_without_rule,
 )
 def projection_segment(case: Case, subject: Subject) -> Measurement:
-    """Ask whether each contact point is measured against the right master segment.
+    """Each contact point is measured against the master segment that the stated rule names.
 
     **Question.** A formulation states by which rule a point gets its master segment: the closest one, or the nearest
     that its slave segment sees along its normal. Does each point that it reports have a segment by that rule?
@@ -102,12 +101,11 @@ _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 @define_projection(
     id="projection.place",
-    summary="Position, ξ, normal and gap of each contact point are those of its place.",
     quantities=(GAP, XI, NORMAL, POSITION),
     applicable=refuse_without_rule,
 )
 def projection_place(case: Case, subject: Subject) -> Measurement:
-    """Ask whether ξ, gap, normal and position of each contact point are right.
+    """Position, ξ, normal and gap of each contact point are those of its place.
 
     **Question.** A contact point lies at c on a slave segment and is measured against a master segment. Are its
     position, its foot ξ, its normal and its gap those of that place, by the rule that the formulation states?
@@ -183,12 +181,11 @@ def refuse_other_decisions(traits: Traits) -> str:
 
 @define_projection(
     id="projection.activity",
-    summary="A contact point is active exactly where its gap is closed and its foot is on the master.",
     quantities=(WRONG,),
     applicable=refuse_other_decisions,
 )
 def projection_activity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether contact is where the gap is closed and the foot is on the master.
+    """A contact point is active exactly where its gap is closed and its foot is on the master.
 
     **Question.** Is a contact point active exactly where its gap is not open and its foot lies on the surface?
 

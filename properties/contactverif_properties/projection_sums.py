@@ -36,12 +36,11 @@ SUM = Quantity(
 
 @define_projection(
     id="projection.area",
-    summary="Areas of competence and weights add up to the slave's length, or to what of it is covered.",
     quantities=(WEIGHT, ENDS, SUM),
     applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
 )
 def projection_area(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the areas of competence add up to the slave's length, or to what of it is covered.
+    """Areas of competence and weights add up to the slave's length, or to what of it is covered.
 
     **Question.** Each contact point stands for a length of the slave, its weight. Do the weights add up, and are the
     ends of the areas where the weights say?
@@ -203,11 +202,10 @@ LAW = Quantity("pressure against −ε̂ × gap", "1", "8u", "The gap may be for
 
 @define_projection(
     id="projection.forces",
-    summary="The pressures at the contact points are the forces on the slave, and their gaps are what the places show.",
     quantities=(UNIT, FORCES, FOOT, LAW),
 )
 def projection_forces(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the contact points account for the forces.
+    """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
 
     **Question.** Are the pressures at the contact points, over their weights and along their normals, the forces that
     the formulation puts on the slave?

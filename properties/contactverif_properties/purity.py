@@ -54,13 +54,12 @@ ONE_TANGENT = Quantity(
 @Property.define(
     id="purity",
     family="invariants",
-    summary="An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.",
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
     promise=lambda traits: True,
 )
 def purity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether an answer depends on nothing but the question.
+    """An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.
 
     **Question.** Calls are repeated, reordered, interleaved and batched. Is the answer to the same question always the
     same, and are the inputs left as they are?

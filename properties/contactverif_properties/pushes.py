@@ -98,14 +98,13 @@ def _slave_places(case: Case) -> FloatArray:
 @Property.define(
     id="unilateral",
     family="invariants",
-    summary="Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.",
     quantities=(OPEN, DISTANT, PULL_OF_POINT),
     cases=Cases.by_kind(pushing_cases),
     kinds=(FLAT, ANY_SHAPE),
     promise=lambda traits: True,
 )
 def unilateral(case: Case, subject: Subject) -> Measurement:
-    """Ask whether contact pushes, is where the surfaces penetrate, and nowhere else.
+    """Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.
 
     **Question.** A flat interface is lifted until all gaps are open, and until all but one end is open. Is there no
     force across an open gap, none far from the contact zone, and some where the surfaces penetrate? Does that force
@@ -222,7 +221,6 @@ def _forces(formulation: CheckedFormulation, case: Case) -> Array:
 @Property.define(
     id="nodal-push",
     family="invariants",
-    summary="Every node is pushed, none is pulled.",
     quantities=(PULL_OF_NODE,),
     cases=Cases.by_kind(pushing_cases),
     kinds=(FLAT, ANY_SHAPE),
@@ -230,7 +228,7 @@ def _forces(formulation: CheckedFormulation, case: Case) -> Array:
     usual_undecided=0.002,
 )
 def nodal_push(case: Case, subject: Subject) -> Measurement:
-    """Ask whether contact pushes every single node.
+    """Every node is pushed, none is pulled.
 
     **Question.** Is the force on each slave node one that pushes it out of the master, and the force on each master
     node one that pushes it out of the slave?

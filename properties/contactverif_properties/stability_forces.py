@@ -48,13 +48,12 @@ SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
 @Property.define(
     id="stability.translation",
     family="stability",
-    summary="A part far from the origin gets the same forces as the same part at the origin.",
     quantities=(FORCES, TANGENT, SEARCH),
     cases=Cases.random(translated_cases),
     promise=lambda traits: traits.promises.translation_stable,
 )
 def stability_translation(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a part far from the origin gets the same forces as the same part at the origin.
+    """A part far from the origin gets the same forces as the same part at the origin.
 
     **Question.** State and reference are moved by up to 2^20, while segments have lengths of 1 to 4. The move is exact:
     no coordinate is rounded. Do forces and tangent stay what they were?
@@ -116,7 +115,6 @@ def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[
 @Property.define(
     id="stability.local",
     family="stability",
-    summary="Forces are as exact as the positions allow, whatever the gap and the distance from the origin.",
     quantities=(FORCES_THERE, TOTAL_THERE),
     cases=Cases.by_kind(local_cases),
     kinds=KINDS,
@@ -124,7 +122,7 @@ def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[
     applicable=refuse_unknown_forces,
 )
 def stability_local(case: Case, subject: Subject) -> Measurement:
-    """Ask whether forces are as exact as the positions allow, on flat states whose exact forces are rationals.
+    """Forces are as exact as the positions allow, whatever the gap and the distance from the origin.
 
     **Question.** A turned flat interface penetrates by 10⁻² to 10⁻⁸ of a segment, near the origin or far from it. The
     penetration is uniform, or linear along a straight slave. Are the forces as near to the exact ones as rounding the
@@ -266,13 +264,12 @@ def move_swept(case: Case) -> Case:
 @Property.define(
     id="stability.sweep",
     family="stability",
-    summary="Small gaps, short segments and a place far away cost no more digits than the condition number says.",
     quantities=(SWEPT_ROUNDINGS,),
     cases=Cases.from_list(stability_states),
     promise=lambda traits: traits.promises.translation_stable,
 )
 def stability_sweep(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the error of the forces stays in proportion to the condition number, on named states that get harder.
+    """Small gaps, short segments and a place far away cost no more digits than the condition number says.
 
     **Question.** A flat interface lies turned and far from the origin, with gaps down to 1e-12, segments down to 1e-9
     and offsets up to 1e9. Is the error of each nodal force at most sixteen times what rounding the positions relative

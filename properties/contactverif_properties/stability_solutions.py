@@ -112,7 +112,6 @@ class _TurnedSystem:
 @Property.define(
     id="stability.stiffness",
     family="stability",
-    summary="The contact forces of a solution keep their digits as far as the penalty lets them, up to 1e12 E/h.",
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
     promise=lambda traits: traits.promises.translation_stable,
@@ -121,7 +120,7 @@ class _TurnedSystem:
     bodies=True,
 )
 def stability_stiffness(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the contact forces of a solution keep their digits as far as the penalty lets them.
+    """The contact forces of a solution keep their digits as far as the penalty lets them, up to 1e12 E/h.
 
     **Question.** Two blocks under a uniform pressure are solved with ε̂h/E from 1e-2 to 1e12. Is the error of each
     contact force at most sixteen times what rounding the positions would change?
@@ -245,7 +244,6 @@ def _conditioning(state: Case, system: System, pairing: Pairing | None, forces: 
 @Property.define(
     id="stability.inf-sup",
     family="stability",
-    summary="The bodies resist every pressure of the multipliers, as much on a fine mesh as on a coarse one.",
     quantities=(ZEROS, SLOPE),
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
     cases=Cases.from_list(refinement_cases),
@@ -255,7 +253,7 @@ def _conditioning(state: Case, system: System, pairing: Pairing | None, forces: 
     bodies=True,
 )
 def inf_sup(case: Case, subject: Subject) -> Measurement:
-    """Ask whether every pressure of the multipliers is resisted by the bodies, however fine the mesh.
+    """The bodies resist every pressure of the multipliers, as much on a fine mesh as on a coarse one.
 
     **Question.** Two blocks touch. How much does a pressure of unit size move them, if it is the one that moves them
     least? Does that number β stay above zero as both meshes are refined?
@@ -312,7 +310,6 @@ def promise_smoothness(traits: Traits) -> bool | None:
 @Property.define(
     id="stability.locking",
     family="stability",
-    summary="With stiff springs the interface is no stiffer and its pressure no rougher than with matching meshes.",
     quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),
     cases=Cases.from_list(wave_cases),
@@ -321,7 +318,7 @@ def promise_smoothness(traits: Traits) -> bool | None:
     bodies=True,
 )
 def locking(case: Case, subject: Subject) -> Measurement:
-    """Ask whether an interface of springs stays as compliant, and its pressure as smooth, as the springs become stiff.
+    """With stiff springs the interface is no stiffer and its pressure no rougher than with matching meshes.
 
     **Question.** A block is pressed on another with meshes of 8 and 12 segments, and a pressure that varies as one wave
     is added. As the penalty rises from 10 to 1e8 E/h, does the interface become stiffer than matching meshes do? Does

@@ -49,14 +49,13 @@ def _tolerance(case: Case, traits: Traits) -> float:
 @Property.define(
     id="patch.tilted.resultant",
     family="patch",
-    summary="A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.",
     quantities=(OFF_NORMAL, TOTAL),
     cases=Cases.random(tilted_cases),
     promise=lambda traits: True if traits.rules.force_along else None,
     applicable=refuse_unknown_direction,
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a tilted slave gets the force of its gap.
+    """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
 
     **Question.** A straight slave is tilted against a flat master by 3° to 35°, and penetrates it with all its length.
     Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits name?
@@ -107,14 +106,13 @@ def refuse_unknown_integral(traits: Traits) -> str:
 @Property.define(
     id="patch.tilted.nodal",
     family="patch",
-    summary="Each node of a straight, tilted slave gets the exact integral of its linear gap.",
     quantities=(NODAL,),
     cases=Cases.random(tilted_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
     applicable=refuse_unknown_integral,
 )
 def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a tilted slave's nodes share the force of a linear gap exactly.
+    """Each node of a straight, tilted slave gets the exact integral of its linear gap.
 
     **Question.** A straight slave is tilted against a flat master and penetrates it with all its length, so that the
     gap is linear. Is the force on each node of the slave ε̂ ∫ N_i |g| ds?
@@ -136,13 +134,12 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="locality.bend",
     family="invariants",
-    summary="A bend of the master's unloaded neighbours changes neither forces nor tangent.",
     quantities=AFTER_A_BEND,
     cases=Cases.random(bent_end_cases),
     promise=lambda traits: traits.promises.local,
 )
 def locality_bend(case: Case, subject: Subject) -> Measurement:
-    """Ask whether a bend elsewhere changes the forces.
+    """A bend of the master's unloaded neighbours changes neither forces nor tangent.
 
     **Question.** A slave lies on a flat part of the master. The unloaded segments on both sides of that part turn about
     its ends by −0.3 to 0.9 rad. Are forces and tangent those of before?

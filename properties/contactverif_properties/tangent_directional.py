@@ -54,14 +54,13 @@ COMPLEX = Quantity(
 @Property.define(
     id="tangent.directional",
     family="tangent",
-    summary="The tangent is the derivative of the residual on a frozen pairing.",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),
     promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
     needs=frozenset({"tangent"}),
 )
 def tangent_directional(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the tangent is the derivative of the residual on a frozen pairing.
+    """The tangent is the derivative of the residual on a frozen pairing.
 
     **Question.** Along some directions, does the tangent give the same change as differences of the residual?
 

@@ -41,14 +41,13 @@ def promise_exact_tangent(traits: Traits) -> bool | None:
 @Property.define(
     id="tangent.sparsity",
     family="tangent",
-    summary="Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.",
     quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
     cases=Cases.random(smooth_cases),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
 )
 def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
-    """Ask whether each block of the tangent is right on its own, and whether its pattern lacks an entry.
+    """Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.
 
     **Question.** Every unknown moves by itself. Is the change of each nodal force the entry of the tangent, and has the
     tangent an entry wherever a force changes?
@@ -79,14 +78,13 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
 @Property.define(
     id="tangent.long",
     family="tangent",
-    summary="Each block of the tangent of a long interface is the derivative of the residual.",
     quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
     cases=Cases.from_list(long_states),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
 )
 def tangent_long(case: Case, subject: Subject) -> Measurement:
-    """Ask whether the tangent of a long interface is right in each of its blocks.
+    """Each block of the tangent of a long interface is the derivative of the residual.
 
     **Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments
     on few, and few on many. Is each block of the tangent the derivative of the residual?

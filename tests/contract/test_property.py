@@ -140,16 +140,19 @@ def test_only_a_decision_counts_as_judged() -> None:
 
 
 @Property.define(
-    id="a.definition", family="a", summary="asks", quantities=(MOST,), promise=lambda traits: None,
+    id="a.definition", family="a", quantities=(MOST,), promise=lambda traits: None,
     cases=Cases.from_list(lambda: (named_case("a1"),)), asks=frozenset({"penalty"}),
 )  # fmt: skip
 def definition(case: Case, subject: Subject) -> Measurement:
-    """Ask nothing."""
+    """Nothing is wrong.
+
+    **Question.** Is anything?
+    """
     return Measurement()
 
 
 def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> None:
-    assert definition.question == "Ask nothing."
+    assert (definition.summary, definition.question) == ("Nothing is wrong.", "**Question.** Is anything?")
     assert pickle.loads(pickle.dumps(definition)) is definition
     other = pickle.loads(pickle.dumps(replace(definition, id="another")))
     assert (other.id, other.measure) == ("another", definition.measure)
