@@ -55,12 +55,12 @@ class Quantity:
     ----------
     name : str
         A short name, in words.
-    unit : str
-        The unit of value and tolerance; "1" for a ratio.
     tolerance : str
         The formula, as it is printed; its symbols are explained in docs/concepts/tolerances.md.
     reason : str
         The reason for that formula.
+    unit : str
+        The unit of value and tolerance; "1" for a ratio.
     sense : Literal['at most', 'at least']
         The relation of value to tolerance in a pass.
 
@@ -71,10 +71,10 @@ class Quantity:
     """
 
     name: str
-    unit: str
     tolerance: str
     reason: str
-    sense: Literal["at most", "at least"] = "at most"
+    unit: str = field(default="1", kw_only=True)
+    sense: Literal["at most", "at least"] = field(default="at most", kw_only=True)
 
     def __post_init__(self) -> None:
         refuse("quantity", self.name, self.unit)

@@ -121,7 +121,7 @@ class Bound:
     def quantity(self) -> Quantity:
         """The number as a property declares it."""
         limits = ", ".join(f"{group} {limit:g}{self.of_best}".lstrip() for group, limit in self.limits.items())
-        return Quantity(self.name, "1", limits, self.reason, "at least" if self.rate else "at most")
+        return Quantity(self.name, limits, self.reason, sense="at least" if self.rate else "at most")
 
     def limit(self, group: str) -> float:
         """Return the limit for a group of studies."""

@@ -31,12 +31,9 @@ N_LOOPS = 3
 N_POINTS = 16  # Points on a loop: the error of the trapezoidal rule falls like (r/ℓ)^16.
 # The radius of a loop over the shortest segment. The smaller ones are for a kink within a larger loop.
 RADII = (2.0**-10, 2.0**-15, 2.0**-20)
-ASYMMETRY = Quantity("asymmetry of the tangent", "1", "u(8Z/min(g, ℓ) + 4N)", SEGMENT_REASON)
+ASYMMETRY = Quantity("asymmetry of the tangent", "u(8Z/min(g, ℓ) + 4N)", SEGMENT_REASON)
 WORK = Quantity(
-    "work in a closed loop",
-    "1",
-    "64 u Z/r",
-    "Positions are rounded to uZ, and forces change with them over the radius r.",
+    "work in a closed loop", "64 u Z/r", "Positions are rounded to uZ, and forces change with them over the radius r."
 )
 
 

@@ -24,13 +24,11 @@ ALLOWED, ALLOWED_OF_SLOPE = 2.0**-12, 2.0**-10  # Shares of the largest change o
 DIFFERENCE = 2.0**-26  # The step of the central difference along the way.
 FORCE = Quantity(
     "jump of a force",
-    "1",
     "2^-12 Δ + u(8Z/min(g, ℓ) + 4N)",
     "After 20 halvings, a continuous force changes by 2^-20 of its change Δ over a step, and by roundoff.",
 )
 SLOPE = Quantity(
     "jump of a slope",
-    "1",
     "2^-10 Δ + 2^26 u(8Z/min(g, ℓ) + 4N)",
     "After 16 halvings, a continuous slope changes by 2^-16 of its change Δ over a step; differences raise roundoff.",
 )

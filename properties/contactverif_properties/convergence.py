@@ -220,16 +220,15 @@ REFINEMENTS = (8, 16, 32)  # The last one is judged.
 TOTAL, NODAL = 4e-3, 1.2e-2  # Three times the largest error of a right formulation.
 
 _REASON = "Straight segments differ from an arc by the square of their length; three times the largest measured error."
-SLAVE = Quantity("error of the total force on the slave", "1", f"{TOTAL:g}", _REASON)
-MASTER = Quantity("error of the total force on the master", "1", f"{TOTAL:g}", _REASON)
+SLAVE = Quantity("error of the total force on the slave", f"{TOTAL:g}", _REASON)
+MASTER = Quantity("error of the total force on the master", f"{TOTAL:g}", _REASON)
 FORCES = Quantity(
     "error of the slave's nodal forces",
-    "1",
     f"{NODAL:g}",
     "A node's share of a segment differs by the length of the segment; three times the largest measured error.",
 )
-SUM = Quantity("error of the sum of reported pressures", "1", f"{TOTAL:g}", _REASON)
-PRESSURE = Quantity("error of the reported pressures", "1", f"{TOTAL:g}", _REASON)
+SUM = Quantity("error of the sum of reported pressures", f"{TOTAL:g}", _REASON)
+PRESSURE = Quantity("error of the reported pressures", f"{TOTAL:g}", _REASON)
 
 
 @cache

@@ -28,11 +28,11 @@ from contactverif_properties.shared.same_answer import Change, judge_changes
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
 SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
-SCALED_FORCES = Quantity("error of the forces in another unit", "1", SCALED_TOLERANCE, POWERS_OF_TWO)
-SCALED_TANGENT = Quantity("error of the tangent in another unit", "1", SCALED_TOLERANCE, POWERS_OF_TWO)
+SCALED_FORCES = Quantity("error of the forces in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
+SCALED_TANGENT = Quantity("error of the tangent in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
 LARGEST_EXPONENT = 60
-TURNED_FORCES = Quantity("error of the forces after a rotation", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
-TURNED_TANGENT = Quantity("error of the tangent after a rotation", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+TURNED_FORCES = Quantity("error of the forces after a rotation", SEGMENT_TOLERANCE, SEGMENT_REASON)
+TURNED_TANGENT = Quantity("error of the tangent after a rotation", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
 
 @Property.define(

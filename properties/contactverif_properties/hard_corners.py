@@ -32,10 +32,10 @@ from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
 from contactverif_properties.shared.uniform_pressure import uniform_forces
 
 _TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
-DIRECTION = Quantity("part outside the normals", "1", _TOLERANCE, SEGMENT_REASON)
-TOTAL = Quantity("excess of the total", "1", _TOLERANCE, SEGMENT_REASON)
+DIRECTION = Quantity("part outside the normals", _TOLERANCE, SEGMENT_REASON)
+TOTAL = Quantity("excess of the total", _TOLERANCE, SEGMENT_REASON)
 TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
-SIZE = Quantity("force over ε̂ D L", "1", "4", f"No gap is longer than D; {TWO_PASSES}")
+SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASSES}")
 
 
 def measure_bounded(case: Case, subject: Subject) -> Measurement:
@@ -175,17 +175,14 @@ def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
 
 
 DEPTH = 64.0  # The depth d over u X. It is eight times what a gap is rounded to, so that each has its sign.
-FORCE = Quantity(
-    "force in touch", "1", "4 (8u + |g|/X)", "A gap is rounded to 8uX, and springs act in two passes at most."
-)
+FORCE = Quantity("force in touch", "4 (8u + |g|/X)", "A gap is rounded to 8uX, and springs act in two passes at most.")
 SLIDING = Quantity(
     "stiffness along the surface",
-    "1",
     "64 u X/ℓ + 4(|g| + d)/ℓ",
     "Rounding the ends of a segment turns its normal by uX/ℓ. d = 64 u X is the depth of the state.",
 )
-PRESSING = Quantity("stiffness across the surface", "1", "4", TWO_PASSES.capitalize())
-PULLING = Quantity("pull across the surface", "1", "64 u X/ℓ + 4|g|/ℓ", "A spring resists, and never helps.")
+PRESSING = Quantity("stiffness across the surface", "4", TWO_PASSES.capitalize())
+PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring resists, and never helps.")
 
 
 @Property.define(

@@ -241,7 +241,6 @@ def _rank(case: Case, subject: Subject) -> dict[str, float]:
 ITERATIONS = 10  # From touch, Newton's method ends at once or wanders; then rest itself is judged.
 NO_STRESS = Quantity(
     "stress without a load",
-    "1",
     f"({CONDITION_TOLERANCE}) S/ℓ + 64 u (X/ℓ)(1 + ε̂ ℓ/E)",
     "Displacements and gaps are rounded like coordinates X, which strains the shortest segment ℓ. "
     "The step from a start that is S away is solved as exactly as the condition of the matrix allows.",

@@ -30,21 +30,18 @@ SCALE_RATIO = 8.0  # The first scale c over the second one.
 TOLERANCE = "max(1e3 u/cond, 30 u X)/ℓ"
 TENSION = Quantity(
     "largest tension of a multiplier",
-    "1",
     TOLERANCE,
     "A negative multiplier is released. It is measured as the length that changes the forces by as much. "
     "The linear system is solved to 1e3 u/cond, and positions are rounded to 30 u X.",
 )
 CHANGE = Quantity(
     "change with another scale c",
-    "1",
     TOLERANCE,
     "The scale of the decision λ − c g ≥ 0 does not change a solution. "
     "The linear system is solved to 1e3 u/cond, and positions are rounded to 30 u X.",
 )
 REDUNDANT = Quantity(
     "redundant multipliers",
-    "1",
     "0",
     "A dependent constraint leaves a zero singular value, which is below 8 n u of the largest one for n unknowns.",
 )

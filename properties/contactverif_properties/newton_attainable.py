@@ -41,13 +41,11 @@ N_STEPS = 3  # From the solution near the origin, with the matrix there, a step 
 ADDED = forces_quantity("roundings that the formulation adds")
 RESIDUAL = Quantity(
     "attained residual",
-    "1",
     "1 (times its roundoff)",
     "A stored position is rounded to uX twice, and the bodies' forces to u(|S| |q| + |g|); 8 roundings allow for it.",
 )
 ERROR = Quantity(
     "attained error of the solution",
-    "1",
     "1 (times what that residual makes of it)",
     "A residual r moves the solution by J⁻¹ r.",
 )

@@ -40,7 +40,6 @@ SPARE = 3  # Iterations allowed beyond those that double the digits.
 SERIES = {"residual": "N", "energy norm": "N m", "changes of the pairing": "1", "reciprocal condition": "1"}
 FINAL_ITERATIONS = Quantity(
     "final iterations",
-    "1",
     "⌈log2(log ρ_end / log ρ)⌉ + 3",
     "Once the pairing has settled and the residual is at ρ ≤ 1e-4 of the first, each step doubles the digits. "
     "Three iterations are to spare.",
@@ -53,10 +52,9 @@ EXACT = 1e-2  # A floor up to this share of the shortest distance cannot hide li
 LINEAR, QUADRATIC = 1.1, 1.9  # A slope up to the first is linear, one from the second on is quadratic.
 ORDER = Quantity(
     "order of one Newton step",
-    "1",
     "1.9",
     "From states of the same pairing, |u1 − u*| falls like |u0 − u*|², less what is left of the third power.",
-    "at least",
+    sense="at least",
 )
 
 

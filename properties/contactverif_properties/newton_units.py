@@ -31,7 +31,6 @@ STEP_ROUNDINGS = 1e3  # A linear system is solved to so many roundoffs over its 
 POSITION_ROUNDINGS = 30.0  # A position, and a difference quotient, are rounded to so many roundoffs.
 STEPS = Quantity(
     "difference of a step in other units",
-    "1",
     "1 (times what roundoff does)",
     "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew, and the "
     "matrix passes that on by its condition.",

@@ -38,12 +38,11 @@ BOUND = 4e-3  # Nearly twice the largest value of a right formulation, a thirtie
 _SECOND_ORDER = (
     "Straight segments have an error of second order, which two meshes take away; what is left is below 2.4e-3."
 )
-SLAVE_MEAN = Quantity("error of the mean force on the slave", "1", f"{BOUND:g}", _SECOND_ORDER)
-MASTER_MEAN = Quantity("error of the mean force on the master", "1", f"{BOUND:g}", _SECOND_ORDER)
-REPORTED = Quantity("error of the mean reported pressure", "1", f"{BOUND:g}", _SECOND_ORDER)
+SLAVE_MEAN = Quantity("error of the mean force on the slave", f"{BOUND:g}", _SECOND_ORDER)
+MASTER_MEAN = Quantity("error of the mean force on the master", f"{BOUND:g}", _SECOND_ORDER)
+REPORTED = Quantity("error of the mean reported pressure", f"{BOUND:g}", _SECOND_ORDER)
 BESIDE = Quantity(
     "mean reported pressure against the forces",
-    "1",
     f"{BOUND:g}",
     "Both are of the same solution; normals of segments and of nodes differ by their half angle.",
 )
@@ -194,24 +193,21 @@ SLOPE = 0.95  # Decades by which the error falls over a decade of the penalty; 0
 
 _TOLERANCE = "4 (g/ℓ) tan(φ/2) + u (8X/g + 4N)"
 _REASON = "The kink moves along a facet by g tan(φ/2), gaps are differences of positions, and N forces are summed."
-STRESS = Quantity("stress error", "1", _TOLERANCE, _REASON)
-SLAVE = Quantity("slave force error", "1", _TOLERANCE, _REASON)
-MASTER = Quantity("master force error", "1", _TOLERANCE, _REASON)
+STRESS = Quantity("stress error", _TOLERANCE, _REASON)
+SLAVE = Quantity("slave force error", _TOLERANCE, _REASON)
+MASTER = Quantity("master force error", _TOLERANCE, _REASON)
 PRESSURE = Quantity(
     "reported pressure error",
-    "1",
     f"{_TOLERANCE} + p (1 + ν)(1 − 2ν)/E",
     f"{_REASON} Lengths of the reference are longer than current ones by the contraction of the blocks.",
 )
 CUT = Quantity(
     "stress error, three normals",
-    "1",
     f"max({SHARE:g} E/(ε̂ ℓ), {_TOLERANCE})",
     "Springs give way unequally, by 1/ε̂ over ℓ/E.",
 )
 FALL = Quantity(
     "fall of the stress error over a decade of ε̂",
-    "1",
     f"{SLOPE}",
     "The error is of first order in 1/ε̂; its part of second order is left.",
     sense="at least",

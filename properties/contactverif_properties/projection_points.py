@@ -36,7 +36,7 @@ def refuse_without_rule(traits: Traits) -> str:
 
 # Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
 OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
-FARTHER = Quantity("distance beyond the nearest segment", "1", "4u", LOCAL_REASON)
+FARTHER = Quantity("distance beyond the nearest segment", "4u", LOCAL_REASON)
 
 
 @define_projection(
@@ -87,15 +87,14 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
     )
 
 
-GAP = Quantity("error of the gap", "1", "4u", LOCAL_REASON)
-XI = Quantity("error of ξ", "1", "4u", FOOT_REASON)
+GAP = Quantity("error of the gap", "4u", LOCAL_REASON)
+XI = Quantity("error of ξ", "4u", FOOT_REASON)
 NORMAL = Quantity(
     "error of the normal",
-    "1",
     "8u (1 + D/ℓ)",
     "A difference, a root and a division are rounded, and ends at uD turn a segment.",
 )
-POSITION = Quantity("error of the position", "1", "4u", "Two products and their sum are rounded, relative to X.")
+POSITION = Quantity("error of the position", "4u", "Two products and their sum are rounded, relative to X.")
 _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
@@ -165,9 +164,7 @@ def _size(errors: FloatArray, active: BoolArray) -> FloatArray:
 
 
 LARGE_UNIT = 2.0**-32
-WRONG = Quantity(
-    "wrong decisions", "1", "0", "A decision is right or wrong; what roundoff or a rule decides is left out."
-)
+WRONG = Quantity("wrong decisions", "0", "A decision is right or wrong; what roundoff or a rule decides is left out.")
 
 
 def refuse_other_decisions(traits: Traits) -> str:

@@ -27,11 +27,9 @@ from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.roundoff import sum_slave_forces
 
 ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
-WEIGHT = Quantity("weight against the area's ends", "1", "16u", ENDS_REASON)
-ENDS = Quantity("area outside its segment, its point or its neighbour", "1", "16u", ENDS_REASON)
-SUM = Quantity(
-    "error of the sum of weights", "1", "64u", "As above; nodes that are covered by less than that are left out."
-)
+WEIGHT = Quantity("weight against the area's ends", "16u", ENDS_REASON)
+ENDS = Quantity("area outside its segment, its point or its neighbour", "16u", ENDS_REASON)
+SUM = Quantity("error of the sum of weights", "64u", "As above; nodes that are covered by less than that are left out.")
 
 
 @define_projection(
@@ -184,20 +182,18 @@ def _overlaps(points: ContactPoints) -> FloatArray:
 
 
 STRAIGHT = 2.0**-26  # Normals of a straight slave, whose nodes are rounded far away, differ by less than this.
-UNIT = Quantity("length of the normal less 1", "1", "8u", "A difference, a root and a division are rounded.")
+UNIT = Quantity("length of the normal less 1", "8u", "A difference, a root and a division are rounded.")
 FORCES = Quantity(
     "pressures against the slave's forces",
-    "1",
     "u(8D/min(g, ℓ) + 4N) + Δn",
     "Both are sums of N rounded gaps and normals; a straight slave is rounded too.",
 )
 FOOT = Quantity(
     "position − foot against gap × normal",
-    "1",
     "16u",
     "Each vector is a sum of rounded products, and a segment whose ends are rounded turns by uD/ℓ.",
 )
-LAW = Quantity("pressure against −ε̂ × gap", "1", "8u", "The gap may be formed anew for the pressure.")
+LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
 
 
 @define_projection(

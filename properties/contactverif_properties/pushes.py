@@ -36,12 +36,12 @@ FAR = 2.0  # A distance in longest segments: the shapes of a mortar method reach
 FLAT, ANY_SHAPE = "flat", "any shape"
 N_MOVES = 64  # So many moves that a slave of two nodes that hang at free ends is moved off them in one of them.
 REASON = "An open contact is left out, not rounded away."
-OPEN = Quantity("force across an open gap", "1", "0", REASON)
-DISTANT = Quantity("force far from the contact zone", "1", "0", REASON)
-PULL_OF_POINT = Quantity("pull of a contact point", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+OPEN = Quantity("force across an open gap", "0", REASON)
+DISTANT = Quantity("force far from the contact zone", "0", REASON)
+PULL_OF_POINT = Quantity("pull of a contact point", SEGMENT_TOLERANCE, SEGMENT_REASON)
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
-PULL_OF_NODE = Quantity("pull of a node", "1", SEGMENT_TOLERANCE, SEGMENT_REASON)
+PULL_OF_NODE = Quantity("pull of a node", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
 
 @random_source("contactverif_properties.shared.openings.pushing_cases")

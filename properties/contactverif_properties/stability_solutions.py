@@ -48,26 +48,22 @@ CONSTANT, SEGMENT, ZERO_COUNT, MULTIPLIER_COUNT = "inf-sup constant", "slave seg
 N_FITTED = 3  # The finest meshes: on coarse ones the ends of the interface count as much as its inside.
 ZEROS = Quantity(
     "pressures that move nothing",
-    "1",
     "0",
     "Of such a pressure nothing says how large it is. A singular value below √u of the largest one counts as zero.",
 )
 SLOPE = Quantity(
     "slope of log β against log h",
-    "1",
     "0.1",
     "A constant has a slope of 0, and constraints that a mesh cannot follow have a slope of 1.",
 )
 MOST_DRIFT, MOST_ROUGHNESS = 0.01, 2.0
 DRIFT = Quantity(
     "drift of the compliance",
-    "1",
     "0.01",
     "Without locking it was at most 0.001 at any penalty, with locking at least 0.33 at the highest.",
 )
 ROUGHNESS = Quantity(
     "roughness of the pressure",
-    "1",
     "2",
     "Without locking it was at most 1.2 at any penalty, with springs between the nodes at least 90 at the highest.",
 )

@@ -32,20 +32,17 @@ SHORTEST_BENDING = 2.0**-10  # Over less than this share of ℓ, differences dec
 SLOPE = 1.9
 CENTRAL = Quantity(
     "error against a central difference",
-    "1",
     "30 (uS/ℓ)^(2/3)",
     "Truncation (h/ℓ)² and roundoff uS/h are equal at h = ℓ (uS/ℓ)^(1/3). The factor 30 is for the third derivative.",
 )
 TAYLOR = Quantity(
     "slope of the Taylor remainder",
-    "1",
     "1.9",
     "The remainder |R(x+hd) − R − hKd| falls like h², less what is left of h³.",
-    "at least",
+    sense="at least",
 )
 COMPLEX = Quantity(
     "error against a complex step",
-    "1",
     "1e-11 + 64 uS/ℓ",
     "A complex step has no truncation. Rounding the ends of a segment turns it by uS/ℓ.",
 )

@@ -93,7 +93,7 @@ def test_cases_and_results_hold_clean_text(text: str) -> None:
     case = _case(text)
     measurement = Measurement(undecided=text, broken=text, finding=Finding(text, remark=text))
     outcome = Outcome(case, Verdict.FAIL, text, measurement)
-    info = PropertyInfo("id", "family", text, (Quantity("q", "1", text, text),))
+    info = PropertyInfo("id", "family", text, (Quantity("q", text, text),))
     row = Row(text, info, Verdict.FAIL, None, known=text, reason=text, shrunk=outcome)
     run = Run((row,), (NotLoaded(text, text),), {text: {}}, {text: text}, (text,))
     words = [case.name, case.kind, *case.parameters, measurement.undecided, measurement.broken]
@@ -111,7 +111,7 @@ def test_cases_and_results_hold_clean_text(text: str) -> None:
 def test_names_that_others_refer_to_are_refused(name: str) -> None:
     text = TEXTS[name]
     with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
-        Quantity(text, "1", "", "")
+        Quantity(text, "", "")
     with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
         PropertyInfo(text, "family", "", ())
     with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):

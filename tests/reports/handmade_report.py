@@ -11,8 +11,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 
-ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding of the gap, and of N sums")
-SLOPE = Quantity("slope", "1", "1.9", "a remainder of second order", "at least")
+ERROR = Quantity("force error", "u(8X/|g| + 4N)", "rounding of the gap, and of N sums")
+SLOPE = Quantity("slope", "1.9", "a remainder of second order", sense="at least")
 
 
 def question(id_: str = "patch.flat.transmission", family: str = "patch", *quantities: Quantity) -> Property:

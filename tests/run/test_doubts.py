@@ -23,7 +23,7 @@ from contactverif.testing.failure_text import explain
 from contactverif_mortar import mortar_lm
 from contactverif_nts import nts, nts_ar
 
-ERROR = Quantity("error", "1", "1e-6", "a number for a test")
+ERROR = Quantity("error", "1e-6", "a number for a test")
 
 
 def numbered_cases(count: int) -> tuple[Case, ...]:

@@ -26,7 +26,7 @@ from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])
-ERROR = Quantity("error", "1", "1e-6", "a number for a test")
+ERROR = Quantity("error", "1e-6", "a number for a test")
 
 
 def a_case(penalty: int) -> Case:

@@ -57,7 +57,7 @@ def n_cases(result: Run) -> int:
     return sum(len(row.outcomes) + (row.witness is not None) for row in result.rows)
 
 
-ERROR, OTHER = Quantity("error", "1", "ξ", "a reason"), Quantity("other", "N", "", "", "at least")
+ERROR, OTHER = Quantity("error", "ξ", "a reason"), Quantity("other", "", "", sense="at least", unit="N")
 
 
 def outcome(number: float) -> Outcome:

@@ -27,7 +27,7 @@ from contactverif.run.profiles import PROFILES
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress
 
-ERROR = Quantity("error", "1", "1e-6", "a number for a test")
+ERROR = Quantity("error", "1e-6", "a number for a test")
 
 
 def a_case(size: int, name: str = "") -> Case:

@@ -33,8 +33,8 @@ from contactverif_reports.html.comparison_page import changes_page, comparison_p
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
-ERROR = Quantity("force error", "1", "u(8X/|g| + 4N)", "rounding")
-SLOPE = Quantity("order of one Newton step", "1", "1.9", "second order", "at least")
+ERROR = Quantity("force error", "u(8X/|g| + 4N)", "rounding")
+SLOPE = Quantity("order of one Newton step", "1.9", "second order", sense="at least")
 TOLERANCE = 2.0**-40  # A power of two, so that margins are exact.
 
 

@@ -50,12 +50,12 @@ TANGENT_REASON = (
 
 def forces_quantity(name: str) -> Quantity:
     """Return a quantity for an ω of the residual."""
-    return Quantity(name, "1", "16 (times what rounding the positions relative to their centroid does)", FORCES_REASON)
+    return Quantity(name, "16 (times what rounding the positions relative to their centroid does)", FORCES_REASON)
 
 
 def tangent_quantity(name: str) -> Quantity:
     """Return a quantity for an error of the tangent in units of u D max(max|K|/ℓ, max|dK/dx|)."""
-    return Quantity(name, "1", "16 (times u D max(max|K|/ℓ, max|dK/dx|))", TANGENT_REASON)
+    return Quantity(name, "16 (times u D max(max|K|/ℓ, max|dK/dx|))", TANGENT_REASON)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -115,9 +115,9 @@ def ratio(part: float, whole: float) -> float:
 
 def gap_quantity(name: str) -> Quantity:
     """Return a dimensionless quantity that only the rounding of gaps may keep from zero."""
-    return Quantity(name, "1", GAP_TOLERANCE, GAP_REASON)
+    return Quantity(name, GAP_TOLERANCE, GAP_REASON)
 
 
 def stated_gap_quantity(name: str) -> Quantity:
     """Return a quantity as `gap_quantity` does; how gaps are rounded follows from the traits (`rounding_distance`)."""
-    return Quantity(name, "1", STATED_GAP_TOLERANCE, STATED_GAP_REASON)
+    return Quantity(name, STATED_GAP_TOLERANCE, STATED_GAP_REASON)

@@ -60,8 +60,8 @@ class Carry:
 def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
     """Return the quantities of `compare`, the changes of forces and tangent; `situation` ends their names."""
     return (
-        Quantity(f"change of the forces {situation}", "1", TOLERANCE, SEGMENT_REASON),
-        Quantity(f"change of the tangent {situation}", "1", TOLERANCE, SEGMENT_REASON),
+        Quantity(f"change of the forces {situation}", TOLERANCE, SEGMENT_REASON),
+        Quantity(f"change of the tangent {situation}", TOLERANCE, SEGMENT_REASON),
     )
 
 

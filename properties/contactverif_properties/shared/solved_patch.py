@@ -44,24 +44,21 @@ REASON = (
     "A gap p/ε̂ is a difference of positions X, and a node balances about 8 springs to 8 roundoffs. "
     "Displacements U are rounded, which makes stresses M U/ℓ on the shortest segment."
 )
-STRESS = Quantity("stress error", "1", STRESS_TOLERANCE, REASON)
-SLAVE_FORCES = Quantity("slave force error", "1", STRESS_TOLERANCE, REASON)
-MASTER_FORCES = Quantity("master force error", "1", STRESS_TOLERANCE, REASON)
+STRESS = Quantity("stress error", STRESS_TOLERANCE, REASON)
+SLAVE_FORCES = Quantity("slave force error", STRESS_TOLERANCE, REASON)
+MASTER_FORCES = Quantity("master force error", STRESS_TOLERANCE, REASON)
 GAP = Quantity(
     "gap error",
-    "1",
     f"({STRESS_TOLERANCE}) (1 + ε̂ ΣH/M)",
     f"{REASON} Where no spring measures a height, the bodies hold it, and they give way by ΣH/M under a unit pressure.",
 )
 PRESSURE = Quantity(
     "pressure error",
-    "1",
     PRESSURE_TOLERANCE,
     f"{REASON} The shortest segment carries what the force of the longest one lacks.",
 )
 MULTIPLIERS = Quantity(
     "multiplier error",
-    "1",
     f"({STRESS_TOLERANCE})/s",
     f"{REASON} s is the smallest singular value of the loads of unit multipliers on the bodies over the largest one.",
 )

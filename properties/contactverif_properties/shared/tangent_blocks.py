@@ -37,20 +37,16 @@ SHORTEST_BENDING = 2.0**-10  # Over less than this share of ℓ, differences dec
 
 BLOCK = Quantity(
     "error of a block against a difference",
-    "1",
     "(30 + 32 s) (uS/ℓ)^(2/3) + 1024 s uS/ℓ",
     "Truncation and roundoff of a difference, as in tangent.directional; roundoff is in proportion to s, the largest "
     "block of the row or the column over this one. In long double u is smaller.",
 )
 COMPLEX_BLOCK = Quantity(
     "error of a block against a complex step",
-    "1",
     "1e-11 + 1024 s uS/ℓ",
     "A complex step has no truncation; s is the largest block of the row or the column over this one.",
 )
-LACKING = Quantity(
-    "entries that the pattern lacks", "1", "0", "A derivative that is not zero needs an entry in the matrix."
-)
+LACKING = Quantity("entries that the pattern lacks", "0", "A derivative that is not zero needs an entry in the matrix.")
 
 
 MOST_REPEATED = 3  # So many moves of a long interface that look wrong are taken apart, the worst first.

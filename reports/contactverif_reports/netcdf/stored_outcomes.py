@@ -241,7 +241,7 @@ def read_info(dataset: Group) -> PropertyInfo:
     KeyError
         If an attribute or variable is missing.
     """
-    columns = ("quantity", "quantity_units", "tolerance_formula", "tolerance_reason", "sense")
+    columns = ("quantity", "tolerance_formula", "tolerance_reason", "quantity_units", "sense")
     needs = str(dataset.attrs["needs"])
     _labels(dataset, "quantity")
     strangers = set(_names(dataset, "sense")) - {"at most", "at least"}
@@ -251,7 +251,10 @@ def read_info(dataset: Group) -> PropertyInfo:
         str(dataset.attrs["property_id"]),
         str(dataset.attrs["family"]),
         str(dataset.attrs["summary"]),
-        tuple(Quantity(*row) for row in zip(*(_names(dataset, name) for name in columns), strict=True)),
+        tuple(
+            Quantity(*words, unit=unit, sense=sense)
+            for *words, unit, sense in zip(*(_names(dataset, name) for name in columns), strict=True)
+        ),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
         series=dict(zip(_labels(dataset, "series"), _names(dataset, "series_units"), strict=True)),
         kinds=tuple(_labels(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
