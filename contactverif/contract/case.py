@@ -115,8 +115,8 @@ class Case:
     @property
     def shortest_segment(self) -> float:
         """The length of the shortest current segment of both sides; ℓ in the tolerances."""
-        interface = self.interface
-        return float(min(surface.lengths(self.positions).min() for surface in (interface.slave, interface.master)))
+        interface, positions = self.interface, self.positions
+        return float(min(interface.slave.lengths(positions).min(), interface.master.lengths(positions).min()))
 
     @property
     def slave_length(self) -> float:

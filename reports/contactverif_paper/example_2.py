@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
@@ -27,6 +26,7 @@ from contactverif_paper.paper_formulations import NTS_AR, VTS_G, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
 PRINTED_PEAK, PRINTED_ITERATIONS = 1.61e6, 4
@@ -166,7 +166,7 @@ def _draw_meshes(axes: Axes, bodies: tuple[Body, ...], box: FloatArray, width: f
     axes.set_axis_off()
 
 
-def datasets(example: Example2) -> dict[str, xr.Dataset]:
+def datasets(example: Example2) -> dict[str, Group]:
     """Return pressures, half-widths and iterations."""
     attributes = {
         "figure": "Figs. 37, 38",
@@ -175,7 +175,7 @@ def datasets(example: Example2) -> dict[str, xr.Dataset]:
         "winkler": np.array(example.winkler),
         "comment": f"hertz, winkler: largest pressure ({schema.STRESS}) and half-width ({schema.LENGTH})",
     }
-    return {"": xr.Dataset(variables_of(example) | variables_of(example.solutions, "formulation"), attrs=attributes)}
+    return {"": Group(variables_of(example) | variables_of(example.solutions, "formulation"), attrs=attributes)}
 
 
 def mesh_lines(body: Body, box: FloatArray, tolerance: float) -> list[FloatArray]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray, IntArray
@@ -24,6 +23,7 @@ from contactverif_paper.paper_columns import Column, Formulations, variables_of
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_ME, VTS_PPT, REFERENCE_AREAS)
 EXPLAINED = (VTS_ME, REFERENCE_AREAS)
@@ -118,11 +118,11 @@ def plot(study: PeakStudy) -> Figure:
     return figure
 
 
-def datasets(study: PeakStudy) -> dict[str, xr.Dataset]:
+def datasets(study: PeakStudy) -> dict[str, Group]:
     """Return the study."""
     solutions = variables_of(study.solutions, "formulation mesh")
     columns = {name: solutions[name] for name in ("largest", "half_width")}
-    return {"": xr.Dataset(variables_of(study) | columns)}
+    return {"": Group(variables_of(study) | columns)}
 
 
 def _solve_size(factor: float) -> DiskSolution:

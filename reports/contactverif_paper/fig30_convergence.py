@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
@@ -31,6 +30,7 @@ from contactverif_paper.paper_formulations import BASIC, VTS_ME, VTS_PPT, PaperF
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_ME, BASIC, VTS_PPT)
 YOUNG, PRESSURE = 1e4, 100.0
@@ -281,10 +281,10 @@ def _plot_history(axes: Axes, history: History) -> None:
     axes.axhspan(0, history.floor, color="0.92", zorder=0, linewidth=0)
 
 
-def datasets(convergence: Convergence) -> dict[str, xr.Dataset]:
+def datasets(convergence: Convergence) -> dict[str, Group]:
     """Return histories, rates and counts."""
     variables = variables_of(convergence) | variables_of(convergence.histories, "ratio formulation")
-    return {"": xr.Dataset(variables, attrs={"figure": "Fig. 30", "scene": "c"})}
+    return {"": Group(variables, {"figure": "Fig. 30", "scene": "c"})}
 
 
 ITEM = Item(

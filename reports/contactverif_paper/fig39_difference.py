@@ -11,18 +11,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper.disk_solutions import difference, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, new_panels, use_round_ticks
-from contactverif_paper.paper_columns import Column, to_dataset
+from contactverif_paper.paper_columns import Column, to_group
 from contactverif_paper.paper_formulations import VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 
 REFINE = (1, 2)
 MESHES = ("our base meshes", "meshes twice as fine")
@@ -96,10 +96,10 @@ def plot(differences: tuple[Difference, ...]) -> Figure:
     return figure
 
 
-def datasets(differences: tuple[Difference, ...]) -> dict[str, xr.Dataset]:
+def datasets(differences: tuple[Difference, ...]) -> dict[str, Group]:
     """Return the differences, a group for each mesh."""
     groups = zip(("base", "fine"), MESHES, differences, strict=True)
-    return {group: to_dataset(row, figure="Fig. 39", comment=mesh) for group, mesh, row in groups}
+    return {group: to_group(row, figure="Fig. 39", comment=mesh) for group, mesh, row in groups}
 
 
 ITEM = Item(

@@ -15,7 +15,6 @@ from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
@@ -36,6 +35,7 @@ from contactverif_paper.paper_formulations import (
 )
 from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 EXACT = PaperFormulation("exact", "")
@@ -151,11 +151,11 @@ def force_page_table(table: ForceTable) -> PageTable:
     )
 
 
-def force_dataset(table: ForceTable, figure: str) -> xr.Dataset:
+def force_dataset(table: ForceTable, figure: str) -> Group:
     """Return the fractions as numerators and denominators (formulation, node)."""
     comment = "forces of a uniform pressure p = 1, over p, in rationals; the first row is exact; from left to right"
     variables = variables_of(table.all_rows, "formulation") | variables_of(table)
-    return xr.Dataset(variables, attrs={"figure": figure, "comment": comment})
+    return Group(variables, {"figure": figure, "comment": comment})
 
 
 def _forces(case: Case, formulation: PaperFormulation, slave: IntArray, master: IntArray, printed: Fractions) -> Forces:

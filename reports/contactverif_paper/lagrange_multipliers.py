@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
@@ -27,6 +26,7 @@ from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.patch_solutions import PRINTED_COLUMN
 from contactverif_reports.html.pages import number
+from contactverif_reports.netcdf.groups import Group
 
 NTS = PaperFormulation("NTS", "nts-lm")
 TWO_PASS = PaperFormulation("two-pass NTS", "two-pass/nts-lm")
@@ -195,9 +195,9 @@ def _cell(test: MultiplierTest) -> Cell:
     return Cell((text,), tuple(details), f"row {'good' if test.passes else 'bad'}")
 
 
-def datasets(tests: Sequence[MultiplierTest]) -> dict[str, xr.Dataset]:
+def datasets(tests: Sequence[MultiplierTest]) -> dict[str, Group]:
     """Return a row for each test."""
-    return {"": xr.Dataset(variables_of(tests, "row"), attrs={"comment": "patch tests with Lagrange multipliers"})}
+    return {"": Group(variables_of(tests, "row"), {"comment": "patch tests with Lagrange multipliers"})}
 
 
 def _test(formulation: PaperFormulation, name: str, scene: Scene) -> MultiplierTest:

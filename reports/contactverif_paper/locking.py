@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
@@ -27,7 +26,7 @@ from contactverif.problems.wave_blocks import (
     wave_cases,
 )
 from contactverif_paper.figure_style import add_legend, line_style, new_panels
-from contactverif_paper.paper_columns import Column, Formulations, to_dataset
+from contactverif_paper.paper_columns import Column, Formulations, to_group
 from contactverif_paper.paper_formulations import (
     MORTAR,
     NTS_AR,
@@ -39,6 +38,7 @@ from contactverif_paper.paper_formulations import (
     subject_of,
 )
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_PPT, TWO_PASS, STS, NTS_AR, MORTAR)
 WITH_PRESSURES = (STS, MORTAR)  # Their pressures in real contact are drawn.
@@ -133,10 +133,10 @@ def plot(result: Locking) -> Figure:
     return figure
 
 
-def datasets(result: Locking) -> dict[str, xr.Dataset]:
+def datasets(result: Locking) -> dict[str, Group]:
     """Return compliance, roughness, and the pressures of real contact."""
     contacts = zip(WITH_PRESSURES, result.contacts, strict=True)
-    return {"": to_dataset(result)} | {row.name: to_dataset(contact) for row, contact in contacts}
+    return {"": to_group(result)} | {row.name: to_group(contact) for row, contact in contacts}
 
 
 ITEM = Item(

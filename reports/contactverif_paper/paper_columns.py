@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
-import xarray as xr
 
 from contactverif_paper.paper_formulations import PaperFormulation
+from contactverif_reports.netcdf.groups import Group, Variable
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 WORDS = "words"  # Stands in place of a unit where a field holds words.
@@ -34,7 +34,7 @@ class Column:
     name: str = ""  # The name of the variable; empty: that of the field.
     pad: float = np.nan  # Stands behind the end of a row that is shorter than others.
 
-    def variable(self, values: Sequence[Any], dims: str, shape: tuple[int, ...]) -> xr.Variable:
+    def variable(self, values: Sequence[Any], dims: str, shape: tuple[int, ...]) -> Variable:
         """Return the variable of the field's values in all cells of a table of that shape; None is a missing cell."""
         values = [None if value is None else _part(value, self.part) for value in values]
         axes = [*dims.split(), *self.dims.split()]
@@ -75,12 +75,12 @@ def values_column(axis: str, units: str, meaning: str, fill: float | None = None
 Formulations = Annotated[tuple[PaperFormulation, ...], name_columns("formulation")]
 
 
-def to_dataset(data: Any, **attributes: Any) -> xr.Dataset:
-    """Return the columns of an object as a dataset."""
-    return xr.Dataset(variables_of(data), attrs=attributes)
+def to_group(data: Any, **attributes: Any) -> Group:
+    """Return the columns of an object as a group."""
+    return Group(variables_of(data), attributes)
 
 
-def variables_of(rows: Any, dims: str = "", *, kind: type | None = None) -> dict[str, xr.Variable]:
+def variables_of(rows: Any, dims: str = "", *, kind: type | None = None) -> dict[str, Variable]:
     """Return the columns of an object, or of nested sequences of objects along `dims`, as variables.
 
     None stands for a missing object. `kind` is needed where there may be no object at all.

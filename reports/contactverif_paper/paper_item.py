@@ -17,10 +17,10 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Annotated, Any
 
-import xarray as xr
 from matplotlib.figure import Figure
 
-from contactverif_paper.paper_columns import WORDS, Column, to_dataset
+from contactverif_paper.paper_columns import WORDS, Column, to_group
+from contactverif_reports.netcdf.groups import Group
 
 Progress = Callable[[str], None]  # The callback that reports what comes next, in a few words.
 OURS = "ours"  # The source of a figure that the paper does not have.
@@ -118,9 +118,9 @@ class Item:
     title: str  # The heading of its section on the page.
     compute: Callable[[Progress], Any]  # Computes its data and calls `Progress` `n_steps` times.
     statements: Callable[[Any], tuple[Statement, ...]]  # Compares the data with what the paper says.
-    # Returns its numbers: {group below its own: dataset}, with "" for its own group. The default is the columns of its
+    # Returns its numbers: {name below its own: group}, with "" for its own group. The default is the columns of its
     # data, with `attributes`.
-    datasets: Callable[[Any], Mapping[str, xr.Dataset]] | None = None
+    datasets: Callable[[Any], Mapping[str, Group]] | None = None
     attributes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     figures: tuple[PaperFigure, ...] = ()  # Its figures, in order.
     tables: Callable[[Any], tuple[PageTable, ...]] = lambda _: ()  # Fills its tables.
@@ -130,9 +130,9 @@ class Item:
     n_steps: int = 1  # The number of times that `compute` reports progress.
     slow: bool = False  # True if it takes long enough for the tests to skip it.
 
-    def groups(self, data: Any) -> Mapping[str, xr.Dataset]:
+    def groups(self, data: Any) -> Mapping[str, Group]:
         """Return its numbers by group."""
-        return self.datasets(data) if self.datasets else {"": to_dataset(data, **self.attributes)}
+        return self.datasets(data) if self.datasets else {"": to_group(data, **self.attributes)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib
-import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -21,11 +20,11 @@ from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, Pa
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.write_tree import write_tree
 
 TITLE = "contactverif: the reference paper, computed again"
 REFERENCE = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
-_WORTH_COMPRESSING = 4096  # Bytes: the filter costs 2 kB for each variable.
 NUMBERS, PAGE = "paper.nc", "paper.html"
 MARKS: Mapping[Agreement, str] = {
     Agreement.AGREES: "✓",
@@ -72,18 +71,16 @@ def write(
     return tuple(paths)
 
 
-def tree_of(paper: Paper) -> xr.DataTree:
+def tree_of(paper: Paper) -> dict[str, Group]:
     """Return the groups of `paper.nc`: one for each item, one of all statements, one that lists the figures."""
     root = {name: schema.text(value) for name, value in paper.provenance.items()}
     root |= {"Conventions": schema.CONVENTIONS, "title": TITLE, "references": REFERENCE, "comment": schema.UNITS_NOTE}
     statements = "the paper's statements beside what was computed"
     figures = "the figures, in the order of the page"
     groups = {
-        "/": xr.Dataset(attrs=root),
-        "/statements": xr.Dataset(
-            variables_of(paper.statements, "statement", kind=Statement), attrs={"comment": statements}
-        ),
-        "/figures": xr.Dataset(variables_of(paper.figures, "figure", kind=PaperFigure), attrs={"comment": figures}),
+        "/": Group(attrs=root),
+        "/statements": Group(variables_of(paper.statements, "statement", kind=Statement), {"comment": statements}),
+        "/figures": Group(variables_of(paper.figures, "figure", kind=PaperFigure), {"comment": figures}),
     }
     for result in paper.results:
         for name, dataset in result.item.groups(result.data).items():
@@ -91,15 +88,7 @@ def tree_of(paper: Paper) -> xr.DataTree:
             if path in groups:
                 raise ValueError(f"{path}: two items have this group")
             groups[path] = dataset
-    return xr.DataTree.from_dict({path: _without_small_filters(group) for path, group in groups.items()})
-
-
-def _without_small_filters(group: xr.Dataset) -> xr.Dataset:
-    """Store small variables uncompressed."""
-    for variable in group.variables.values():
-        if variable.nbytes < _WORTH_COMPRESSING:
-            variable.encoding = {k: v for k, v in variable.encoding.items() if k not in ("zlib", "complevel")}
-    return group
+    return groups
 
 
 def page(paper: Paper, figures: Mapping[str, Markup]) -> str:

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import xarray as xr
-
 from contactverif_paper.force_transmission import (
     ForceTable,
     force_dataset,
@@ -19,11 +17,12 @@ from contactverif_paper.force_transmission import (
     force_statement,
     force_table,
 )
-from contactverif_paper.paper_columns import name_columns, to_dataset, variables_of
+from contactverif_paper.paper_columns import name_columns, to_group, variables_of
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_paper.patch_plots import plot_meshes, plot_penetrations, plot_pressures, shown_formulations
 from contactverif_paper.patch_solutions import PatchSetup, PatchSolution, patch_solution
+from contactverif_reports.netcdf.groups import Group
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,21 +105,21 @@ def _statements(printed: PrintedForces | None, study: Study | None, tests: Patch
     return tuple(statements)
 
 
-def _datasets(printed: PrintedForces | None, study: Study | None, tests: PatchTests) -> dict[str, xr.Dataset]:
+def _datasets(printed: PrintedForces | None, study: Study | None, tests: PatchTests) -> dict[str, Group]:
     datasets = {"patch": _patch_dataset(tests.patches)}
     if printed and tests.forces:
         datasets["forces"] = force_dataset(tests.forces, printed.figure)
     if study:
-        datasets[study.name] = to_dataset(tests.study, **study.attributes)
+        datasets[study.name] = to_group(tests.study, **study.attributes)
     return datasets
 
 
-def _patch_dataset(patches: tuple[PatchSolution, ...]) -> xr.Dataset:
+def _patch_dataset(patches: tuple[PatchSolution, ...]) -> Group:
     """Return pressures, stress errors and displacements; nothing stands where a figure does not show a formulation."""
     rows = tuple(shown_formulations(patches))
     cells = [[{curve.formulation: curve for curve in patch.curves}.get(row) for row in rows] for patch in patches]
     comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"
-    return xr.Dataset(
+    return Group(
         {column.name: column.variable([rows], "", ()) for column in name_columns("formulation")}
         | variables_of([patch.setup for patch in patches], "scene")
         | variables_of(patches, "scene")

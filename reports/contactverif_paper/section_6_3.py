@@ -15,18 +15,18 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.studies.evaluation_cost import measure_costs
-from contactverif_paper.paper_columns import Column, Formulations, to_dataset
+from contactverif_paper.paper_columns import Column, Formulations, to_group
 from contactverif_paper.paper_formulations import STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.section_6_2 import FORMULATIONS as TANGENT_FORMULATIONS
 from contactverif_paper.section_6_2 import ROUNDOFF, Tangents, tangents
 from contactverif_reports.html.pages import number
+from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (
     PaperFormulation("VTS-ME", "vts-me:n=1"),
@@ -198,13 +198,13 @@ def tables(section: Section63) -> tuple[PageTable, ...]:
     )
 
 
-def datasets(section: Section63) -> dict[str, xr.Dataset]:
+def datasets(section: Section63) -> dict[str, Group]:
     """Return the counts, and the times in a group of their own."""
-    cost = to_dataset(section.cost)
+    cost = to_group(section.cost)
     return {
-        "terms": to_dataset(section.terms),
-        "cost": cost.drop_vars(["residual", "tangent"]),
-        "timing": cost.drop_vars("entries"),
+        "terms": to_group(section.terms),
+        "cost": Group({name: cost[name] for name in cost if name not in ("residual", "tangent")}, cost.attrs),
+        "timing": Group({name: cost[name] for name in cost if name != "entries"}, cost.attrs),
     }
 
 

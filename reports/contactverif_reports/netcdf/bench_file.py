@@ -10,14 +10,14 @@ import os
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
+from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.schema import NONE, RATIO, SECONDS, text
-from contactverif_reports.netcdf.stored_groups import Group, read_groups
+from contactverif_reports.netcdf.stored_groups import read_groups
 from contactverif_reports.netcdf.variables import codes, numbers, words
 from contactverif_reports.netcdf.write_tree import write_tree
 
@@ -33,16 +33,14 @@ def write_bench(results: BenchResults, path: str | os.PathLike[str]) -> None:
         write_tree(bench_tree(results), part)
 
 
-def bench_tree(results: BenchResults) -> xr.DataTree:
-    """Return the file as a tree: the root, and the group `timing`."""
+def bench_tree(results: BenchResults) -> dict[str, Group]:
+    """Return the groups of the file: the root, and `timing`."""
     attributes = {name: text(value) or NONE for name, value in results.provenance.items()}
     attributes |= {"title": TITLE, "bench_schema": BENCH_SCHEMA, "Conventions": "CF-1.11"}
     attributes |= {
         "not_loaded": "\n".join(f"{name}: {text(reason)}" for name, reason in results.not_loaded.items()) or NONE
     }
-    return xr.DataTree.from_dict(
-        {"/": xr.Dataset(_labels(results) | _runs(results), attrs=attributes), "/timing": _timing(results)}
-    )
+    return {"/": Group(_labels(results) | _runs(results), attributes), "/timing": _timing(results)}
 
 
 def read_bench(path: str | os.PathLike[str]) -> BenchResults:
@@ -139,7 +137,7 @@ def _runs(results: BenchResults) -> dict[str, Any]:
     }
 
 
-def _timing(results: BenchResults) -> xr.Dataset:
+def _timing(results: BenchResults) -> Group:
     parts = "; ".join(map(": ".join, PARTS.items()))
     table = {
         "part": words(["part"], list(PARTS), "part of the time", parts),
@@ -153,7 +151,7 @@ def _timing(results: BenchResults) -> xr.Dataset:
             ["cell", "repeat"], results.yardstick, "time of a fixed piece of work in the same repeats", SECONDS
         ),
     }
-    return xr.Dataset(table, attrs={"comment": "the only numbers that depend on a clock"})
+    return Group(table, {"comment": "the only numbers that depend on a clock"})
 
 
 def _results(root: Group, timing: Group) -> BenchResults:

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import CaseSummary
 from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Variable
 from contactverif_reports.netcdf.variables import codes, flags, numbers, words
 
-Table = dict[str, xr.Variable]
+Table = dict[str, Variable]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,9 @@ class SharedNames:
         details, parameters = dict[str, None](), dict[str, None]()
         kinds, n_iterates, n_components = set[str](), 0, 0
         for outcome in outcomes:
-            kinds.add(outcome.case_or_summary.kind)
-            parameters |= dict.fromkeys(outcome.summary.parameters)
+            case = outcome.case_or_summary
+            kinds.add(case.kind)
+            parameters |= dict.fromkeys(name for name, values in case.parameters.items() if np.size(values) == 1)
             if outcome.measurement is not None:
                 details |= dict.fromkeys(outcome.measurement.details)
                 n_iterates = max([n_iterates, *map(len, outcome.measurement.series.values())])
@@ -194,11 +195,11 @@ class OutcomeVariables:
         """Return what kind of case each is: sizes, penalty, and parameters that are one number."""
         summaries = [None if outcome is None else outcome.summary for outcome in self._outcomes]
 
-        def count(read: Callable[[CaseSummary], int], long_name: str) -> xr.Variable:
+        def count(read: Callable[[CaseSummary], int], long_name: str) -> Variable:
             counts = [-1 if summary is None else read(summary) for summary in summaries]
             return numbers(self._dims, self._array(counts, np.int32), long_name, "1", fill=-1)
 
-        def real(read: Callable[[CaseSummary], float], long_name: str, unit: str) -> xr.Variable:
+        def real(read: Callable[[CaseSummary], float], long_name: str, unit: str) -> Variable:
             reals = [schema.NOT_MEASURED if summary is None else read(summary) for summary in summaries]
             return numbers(self._dims, self._array(reals, np.float64), long_name, unit, fill=schema.NOT_MEASURED)
 
@@ -244,7 +245,7 @@ class OutcomeVariables:
                 values[number, place[name]] = value
         return values
 
-    def _numbers(self, axis: str, values: FloatArray, long_name: str, unit: str, comment: str) -> xr.Variable:
+    def _numbers(self, axis: str, values: FloatArray, long_name: str, unit: str, comment: str) -> Variable:
         """Return numbers along the dimensions and one more."""
         shaped = values.reshape(*self._shape, values.shape[1])
         return numbers([*self._dims, axis], shaped, long_name, unit, comment, fill=schema.NOT_MEASURED)

@@ -29,8 +29,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.stored_cases import case_of_group, read_named_cases
-from contactverif_reports.netcdf.stored_groups import Group, read_groups
+from contactverif_reports.netcdf.stored_groups import read_groups
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
 from contactverif_reports.netcdf.summary_group import root_attributes
 

@@ -1,4 +1,4 @@
-"""The whole report as an `xarray.DataTree`, before it is a file, and in it the group of each property."""
+"""The groups of a whole report, before it is a file, and among them the group of each property."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.property import Outcome, PropertyInfo
 from contactverif.contract.result import Row, Run
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group, Variable
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates
 from contactverif_reports.netcdf.stored_cases import counterexample_groups, named_case_groups
 from contactverif_reports.netcdf.summary_group import root_attributes, summary_group, timing_group
@@ -19,25 +19,25 @@ from contactverif_reports.netcdf.variables import join, numbers, words
 CASES_OF_A_BLOCK = 10_000
 
 
-def tree_of(run: Run, *, with_named_cases: bool = False) -> xr.DataTree:
+def tree_of(run: Run, *, with_named_cases: bool = False) -> dict[str, Group]:
     """Return all groups of the report of a run, if wanted with each named case that a formulation fails."""
-    groups = {"/": xr.Dataset(attrs=root_attributes(run)), f"/{schema.SUMMARY}": summary_group(run)}
+    groups = {"/": Group(attrs=root_attributes(run)), f"/{schema.SUMMARY}": summary_group(run)}
     properties = run.properties
     for id_, name in schema.group_names(properties).items():
         *folders, _ = name.removeprefix("/").split("/")
         for depth in range(1, len(folders) + 1):
             comment = {"comment": f"properties whose ids begin with {'.'.join(folders[:depth])}"}
-            groups.setdefault(f"/{'/'.join(folders[:depth])}", xr.Dataset(attrs=comment))
+            groups.setdefault(f"/{'/'.join(folders[:depth])}", Group(attrs=comment))
         rows = {row.formulation: row for row in run.rows if row.property_id == id_}
         groups[name] = property_group(properties[id_], rows, run.formulations)
     groups |= counterexample_groups(run)
     if with_named_cases:
         groups |= named_case_groups(run)
     groups[f"/{schema.TIMING}"] = timing_group(run)
-    return xr.DataTree.from_dict(groups)
+    return groups
 
 
-def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Sequence[str]) -> xr.Dataset:
+def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Sequence[str]) -> Group:
     """Return the group of a property, with the dimensions `formulation`, `case` and `quantity`."""
     outcomes = [rows[name].outcomes if name in rows else () for name in formulations]
     witnesses = [rows[name].witness if name in rows else None for name in formulations]
@@ -64,12 +64,12 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
         "comment": "one property: every random case of every formulation; names that begin with witness_ are of the "
         "named case with which a formulation proves that it fails",
     }
-    return xr.Dataset(table, attrs=attributes)
+    return Group(table, attributes)
 
 
 def _cases(
     info: PropertyInfo, rows: Sequence[Sequence[Outcome]], n_cases: int, names: SharedNames
-) -> dict[str, xr.Variable]:
+) -> dict[str, Variable]:
     """Return the variables along `formulation` and `case`. The outcomes of a block of cases are in memory at a time."""
     tables = []
     for first in range(0, max(n_cases, 1), CASES_OF_A_BLOCK):
@@ -83,7 +83,7 @@ def _cases(
     return tables[0] if len(tables) == 1 else join(tables, "case")
 
 
-def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> dict[str, xr.Variable]:
+def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> dict[str, Variable]:
     """Return how many cases of each kind were planned, judged, and so on."""
     counted = ("planned", "judged", "failed", "undecided", "idle")
     counts = np.zeros((len(rows), len(kinds), len(counted)), dtype=np.int32)

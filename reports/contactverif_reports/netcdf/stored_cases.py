@@ -11,15 +11,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group, Variable
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
-from contactverif_reports.netcdf.stored_groups import Group
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 _FOLDER = f"/{schema.NAMED_CASES}"
@@ -44,7 +43,7 @@ _ARRAYS = {  # {array: (dimensions, long name, unit)}
 }
 
 
-def counterexample_groups(run: Run) -> dict[str, xr.Dataset]:
+def counterexample_groups(run: Run) -> dict[str, Group]:
     """Return `counterexamples`, and for each one a group with its mesh and in it a group with its arrays."""
     examples = counterexamples(run)
     folder = f"/{schema.COUNTEREXAMPLES}"
@@ -52,17 +51,16 @@ def counterexample_groups(run: Run) -> dict[str, xr.Dataset]:
         "the smallest case found for each failure, each a UGRID mesh with the verdict on it; its group `case` rebuilds "
         "it exactly. To judge one again: contactverif replay REPORT --case ID"
     )
-    groups = {folder: xr.Dataset(attrs={"comment": comment, "ids": " ".join(examples) or schema.NONE})}
+    groups = {folder: Group(attrs={"comment": comment, "ids": " ".join(examples) or schema.NONE})}
     for id_, example in examples.items():
         groups[f"{folder}/{id_}"] = _mesh(example)
         groups[f"{folder}/{id_}/{schema.CASE}"] = case_group(example.case)
     return groups
 
 
-def _mesh(example: Counterexample) -> xr.Dataset:
+def _mesh(example: Counterexample) -> Group:
     """Return the case as a UGRID-1.0 topology of dimension 1, with the outcome on it."""
     case, interface, info = example.case, example.case.interface, example.row.info
-    on_nodes = {"mesh": "mesh", "location": "node", "coordinates": "node_x node_y"}
     edges = np.vstack([interface.slave.segments, interface.master.segments])
     sides = [0] * len(interface.slave) + [1] * len(interface.master)
     table = {
@@ -74,17 +72,17 @@ def _mesh(example: Counterexample) -> xr.Dataset:
         "current_x": numbers(["node"], case.positions[:, 0], "current position, x", schema.LENGTH),
         "current_y": numbers(["node"], case.positions[:, 1], "current position, y", schema.LENGTH),
     }
-    table["mesh"].attrs |= {
-        "cf_role": "mesh_topology",
-        "topology_dimension": np.int32(1),
-        "node_coordinates": "node_x node_y",
-        "edge_node_connectivity": "edge_nodes",
-        "edge_dimension": "edge",
-    }
-    table["edge_nodes"].attrs |= {"cf_role": "edge_node_connectivity", "start_index": np.int64(0)}
-    table["side"].attrs |= {"mesh": "mesh", "location": "edge"}
+    table["mesh"].attrs.update(
+        cf_role="mesh_topology",
+        topology_dimension=np.int32(1),
+        node_coordinates="node_x node_y",
+        edge_node_connectivity="edge_nodes",
+        edge_dimension="edge",
+    )
+    table["edge_nodes"].attrs.update(cf_role="edge_node_connectivity", start_index=np.int64(0))
+    table["side"].attrs.update(mesh="mesh", location="edge")
     for current in ("current_x", "current_y"):
-        table[current].attrs |= on_nodes
+        table[current].attrs.update(mesh="mesh", location="node", coordinates="node_x node_y")
     names = SharedNames.from_outcomes(info, [example.outcome])
     names = replace(names, parameters=(), kinds=())  # They are among the arrays.
     table |= coordinates(info, names)
@@ -100,21 +98,21 @@ def _mesh(example: Counterexample) -> xr.Dataset:
         "case_kind": case.kind or schema.NONE,
         "replay": f"contactverif replay REPORT --case {example.id}",
     }
-    return xr.Dataset(table, attrs={key: schema.text(value) for key, value in attributes.items()})
+    return Group(table, {key: schema.text(value) for key, value in attributes.items()})
 
 
-def case_group(case: Case) -> xr.Dataset:
+def case_group(case: Case) -> Group:
     """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
-    table: dict[str, xr.Variable] = {}
+    table: dict[str, Variable] = {}
     for safe, (name, values) in zip(safe_names(arrays), arrays.items(), strict=True):
         variable = _array(safe, name, values)
         variable.attrs[ARRAY_NAME] = schema.text(name)
         table[safe] = variable
-    return xr.Dataset(table, attrs={"comment": "contactverif.Case.from_arrays makes the case of these"})
+    return Group(table, {"comment": "contactverif.Case.from_arrays makes the case of these"})
 
 
-def _array(safe: str, name: str, values: NDArray[Any]) -> xr.Variable:
+def _array(safe: str, name: str, values: NDArray[Any]) -> Variable:
     parameter = name.removeprefix("parameter_")
     dims, long_name, units = _ARRAYS.get(
         name,
@@ -137,7 +135,7 @@ def case_of_group(dataset: Group) -> Case:
     return case
 
 
-def named_case_groups(run: Run) -> dict[str, xr.Dataset]:
+def named_case_groups(run: Run) -> dict[str, Group]:
     """Return `named_cases`, and in it a group with the arrays of each case.
 
     The attribute `property_id` would make a group that of a property, so a case says `case_of` instead.
@@ -146,14 +144,12 @@ def named_case_groups(run: Run) -> dict[str, xr.Dataset]:
         "the named cases that a formulation fails; to judge one again: contactverif replay REPORT --case "
         "FORMULATION.PROPERTY.CASE"
     )
-    groups = {_FOLDER: xr.Dataset(attrs={"comment": comment})}
+    groups = {_FOLDER: Group(attrs={"comment": comment})}
     for example in named_failures(run).values():
         name = f"{_FOLDER}/{typeable(f'{example.property_id}.{example.case.name}')}"
         if name not in groups:
             group = case_group(example.case)
-            for variable in group.variables.values():  # The filter costs 2 kB for each of these small arrays.
-                variable.encoding = {"_FillValue": None} if variable.dtype.kind != "S" else {}
-            groups[name] = group.assign_attrs(case_of=schema.text(example.property_id))
+            groups[name] = Group(group, {**group.attrs, "case_of": schema.text(example.property_id)})
     return groups
 
 

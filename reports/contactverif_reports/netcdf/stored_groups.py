@@ -1,4 +1,4 @@
-"""The groups of a netCDF file as plain arrays: what the reader of reports sees instead of the file.
+"""The reading of the groups of a netCDF file.
 
 A child process opens the file and sends its groups as bytes, so that a damaged file can harm only the child.
 
@@ -13,8 +13,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -26,47 +24,12 @@ from contactverif.contract.errors import MisuseError
 from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
 from contactverif.isolation.ordinary import check_ordinary
 from contactverif.isolation.packed import PackedArray
+from contactverif_reports.netcdf.groups import Group, Variable
 
 # zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20
 LONGEST_TEXT = 1 << 20  # Characters of an attribute. The longest that we write say what each formulation provides.
 _MAGIC = b"\x89HDF\r\n\x1a\n"  # The first bytes of each netCDF-4 file.
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A variable of a group."""
-
-    dims: tuple[str, ...]  # The names of its dimensions.
-    values: NDArray[Any]  # Its entries, read-only.
-    attrs: Mapping[str, Any]  # Its attributes: words, or arrays of numbers.
-
-
-@dataclass(frozen=True)
-class Group(Mapping[str, Variable]):
-    """A group: a mapping from names to variables."""
-
-    attrs: Mapping[str, Any]  # Its attributes: words, or arrays of numbers.
-    variables: Mapping[str, Variable]  # Its variables by name.
-
-    def __getitem__(self, name: str) -> Variable:
-        return self.variables[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.variables)
-
-    def __len__(self) -> int:
-        return len(self.variables)
-
-    @cached_property
-    def sizes(self) -> Mapping[str, int]:
-        """The lengths of all dimensions of its variables."""
-        sizes: dict[str, int] = {}
-        for name, variable in self.variables.items():
-            for dim, length in zip(variable.dims, variable.values.shape, strict=True):
-                if sizes.setdefault(dim, length) != length:
-                    raise ValueError(f"{name} is {length} long along {dim}, others {sizes[dim]}")
-        return sizes
 
 
 def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, decode: bool = True) -> dict[str, Group]:
@@ -106,7 +69,7 @@ class _PackedGroup(msgspec.Struct, array_like=True):
 
     def unpack(self, *, decode: bool) -> Group:
         variables = {name: variable.unpack(decode=decode) for name, variable in self.variables.items()}
-        return Group(_unpack_attributes(self.attrs), variables)
+        return Group(variables, _unpack_attributes(self.attrs))
 
 
 def _unpack_attributes(attributes: Mapping[str, str | PackedArray]) -> dict[str, Any]:

@@ -24,8 +24,8 @@ from contactverif.contract.property import (
     Verdict,
 )
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.outcome_variables import safe_names
-from contactverif_reports.netcdf.stored_groups import Group
 
 _REALS = ("penalty", "largest_coordinate", "shortest_segment")
 # The kind of numpy's types of each variable; all others hold reals.

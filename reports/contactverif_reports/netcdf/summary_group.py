@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import ClosestNumber, Result, Row, Run
 from contactverif_reports.netcdf import schema
+from contactverif_reports.netcdf.groups import Group, Variable
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 _ROW = ("formulation", "property")
-Table = dict[str, xr.Variable]
+Table = dict[str, Variable]
 
 
 class _Grid:
@@ -29,11 +29,11 @@ class _Grid:
         """Return one entry for each row, and `missing` where there is no row."""
         return [[missing if row is None else read(row) for row in line] for line in self._rows]
 
-    def count(self, read: Callable[[Row], int], long_name: str) -> xr.Variable:
+    def count(self, read: Callable[[Row], int], long_name: str) -> Variable:
         """Return a variable of numbers of cases."""
         return numbers(_ROW, np.array(self.each(read, 0), dtype=np.int32), long_name, "1")
 
-    def words(self, read: Callable[[Row], str], long_name: str, comment: str = "") -> xr.Variable:
+    def words(self, read: Callable[[Row], str], long_name: str, comment: str = "") -> Variable:
         """Return a variable of words, empty where there is no row."""
         return words(_ROW, self.each(read, ""), long_name, comment)
 
@@ -77,7 +77,7 @@ def _counts(run: Run) -> dict[str, int]:
     }
 
 
-def summary_group(run: Run) -> xr.Dataset:
+def summary_group(run: Run) -> Group:
     """Return counts, verdicts, promises, closest numbers, what the formulations provide, and what did not load."""
     table, attributes = _not_loaded(run)
     attributes["comment"] = (
@@ -94,7 +94,7 @@ def summary_group(run: Run) -> xr.Dataset:
         )
     if run.rows:
         table |= _rows(grid, run) | _closest(grid)
-    return xr.Dataset(table, attrs=attributes)
+    return Group(table, attributes)
 
 
 def _rows(grid: _Grid, run: Run) -> Table:
@@ -224,11 +224,11 @@ def _closest(grid: _Grid) -> Table:
     }
 
 
-def timing_group(run: Run) -> xr.Dataset:
+def timing_group(run: Run) -> Group:
     """Return the seconds of every row and case, the only numbers that depend on a clock."""
     attributes = {"comment": "wall clock; all that two runs with the same seed may differ in"}
     if not run.rows:
-        return xr.Dataset(attrs=attributes)
+        return Group(attrs=attributes)
     grid = _Grid(run)
     n_cases = max(len(row.outcomes) for row in run.rows)
     nothing = [np.nan] * n_cases
@@ -248,4 +248,4 @@ def timing_group(run: Run) -> xr.Dataset:
         schema.SECONDS,
         fill=np.nan,
     )
-    return xr.Dataset(table, attrs=attributes)
+    return Group(table, attributes)

@@ -1,61 +1,55 @@
-"""The writing of a tree of groups into a netCDF file: all variables are declared first, and filled afterwards.
+"""The writing of groups into a netCDF file: all variables are declared first, and filled afterwards.
 
-xarray declares and fills in turns. After each turn the netCDF library writes the description of all variables again, so
-that the time grows with the square of their number: a report with 1900 variables took 20 s, and now takes 1 s.
+In turns, the netCDF library would write the description of all variables again at each turn, so that the time grows
+with the square of their number. xarray does so, and a report with 1900 variables took 20 s.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import netCDF4
 import numpy as np
-import xarray as xr
+
+from contactverif_reports.netcdf.groups import Group, Variable
+
+_WORTH_COMPRESSING = 4096  # The bytes from which on a variable is compressed, which costs 2 kB of bookkeeping.
 
 
-def write_tree(tree: xr.DataTree, path: str | os.PathLike[str]) -> None:
-    """Write a tree as `xarray.DataTree.to_netcdf` does, into a new file.
+def write_tree(groups: Mapping[str, Group], path: str | os.PathLike[str]) -> None:
+    """Write groups into a new file.
 
     Parameters
     ----------
-    tree : xr.DataTree
-        The groups. Their variables are numbers or bytes; their encodings may have `_FillValue`, `zlib` and `complevel`.
+    groups : Mapping[str, Group]
+        {path of the group: group}, ``"/"`` first. A dimension of a group is that of a group above if it has its length.
     path : str | os.PathLike[str]
         The file. One that is there is replaced.
     """
     with netCDF4.Dataset(os.fspath(path), "w", format="NETCDF4") as file:
-        file.set_auto_mask(False)
         declared = []
-        for node in tree.subtree:
-            group = file if node.path == "/" else file.createGroup(node.path)
-            variables, attributes = xr.conventions.encode_dataset_coordinates(node.to_dataset(inherit=False))
-            group.setncatts(attributes)
-            for name, variable in variables.items():
-                encoded = xr.conventions.encode_cf_variable(variable, name=name)
-                declared.append(_declare(group, str(name), encoded))
-        for target, values in declared:
-            target[...] = values
+        for name, group in groups.items():
+            target = file.createGroup(name)  # "/" is the file itself.
+            target.setncatts(group.attrs)
+            declared += [_declare(target, name, variable) for name, variable in group.items()]
+        for variable, values in declared:
+            variable[...] = values
 
 
-def _declare(group: Any, name: str, variable: xr.Variable) -> tuple[Any, np.ndarray[Any, Any]]:
+def _declare(group: Any, name: str, variable: Variable) -> tuple[Any, np.ndarray[Any, Any]]:
     """Return a new, empty variable of a group, and the values that belong into it."""
-    values, dims = np.asarray(variable.values), tuple(str(dim) for dim in variable.dims)
+    values, dims, attributes = variable.values, variable.dims, dict(variable.attrs)
+    compressed = values.ndim > 0 and values.nbytes >= _WORTH_COMPRESSING
     if values.dtype.kind == "S":
         width = values.dtype.itemsize
         values = np.ascontiguousarray(values)[..., np.newaxis].view("S1").reshape(*values.shape, width)
-        dims += (f"string{width}",)
+        dims = (*dims, f"string{width}")
     for dim, size in zip(dims, values.shape, strict=True):
         _declare_dimension(group, dim, size)
-    attributes, encoding = dict(variable.attrs), variable.encoding
-    target = group.createVariable(
-        name,
-        values.dtype,
-        dims,
-        zlib=encoding.get("zlib", False),
-        complevel=encoding.get("complevel", 4),
-        fill_value=attributes.pop("_FillValue", None),
-    )
+    fill = attributes.pop("_FillValue", None)
+    target = group.createVariable(name, values.dtype, dims, zlib=compressed, complevel=4, fill_value=fill)
     target.set_auto_maskandscale(False)
     target.set_auto_chartostring(False)
     target.setncatts(attributes)
