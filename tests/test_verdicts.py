@@ -59,7 +59,9 @@ SEED = 0  # The profile `ci` has the same, so this asks what `contactverif verif
 @cache
 def judge_all(property_id: str) -> Mapping[str, Row]:
     """Return the row of each formulation over the same 100 random cases, with the smallest mesh of those that fail."""
-    result = run([load_subject(name) for name in FAILS], [load_property(property_id)], examples=100, seed=SEED)
+    result = run(
+        [load_subject(name) for name in FAILS], [load_property(property_id)], examples=100, seed=SEED, shrink="all"
+    )
     assert result.promises_kept
     return {row.formulation: row for row in result.rows}
 

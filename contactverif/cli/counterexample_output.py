@@ -30,11 +30,8 @@ def failing_examples(run: Run) -> list[Counterexample]:
 def counterexample_text(example: Counterexample, report: Path | None) -> Text:
     """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
     row, outcome = example.row, example.outcome
-    description = f"the case {outcome.case.name}" if outcome.case.name else "the smallest case found"
-    if outcome.case.kind:
-        description += f" ({outcome.case.kind})"
     return indent_below(
-        f"{row.formulation}, {row.property_id}: {row.result}, {description}",
+        f"{row.formulation}, {row.property_id}: {row.result}, {example.label}",
         *_numbers(row.info, outcome),
         *as_text(outcome.case).splitlines(),
         *([] if report is None else [example.replay_command(str(report))]),

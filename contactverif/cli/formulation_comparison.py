@@ -81,6 +81,7 @@ def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
                 profile=job.profile,
                 interface=job.interface,
                 scene=job.scene,
+                shrink=job.options.sampling.shrink or "new",
                 progress=bar.show_progress,
                 executor=executor,
                 journal=journal,

@@ -10,8 +10,10 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.campaign_command import CAMPAIGN
+from contactverif.cli.shared_options import SHRINK_HELP
 from contactverif.cli.verify_command import run_job
 from contactverif.cli.verify_job import new_job, options_of
+from contactverif.run.profiles import Shrink
 
 _FOLDER = "FOLDER"
 
@@ -24,6 +26,7 @@ def merge(
             "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
         ),
     ],
+    shrink: Annotated[Shrink | None, typer.Option(help=SHRINK_HELP)] = None,
 ) -> None:
     """Make the report of a campaign: that of one verify with the same seed.
 
@@ -40,7 +43,8 @@ def merge(
 
     plan, journals = read_shards(folder, _FOLDER)
     options = options_of(plan, CAMPAIGN, _FOLDER)
+    sampling = replace(options.sampling, shrink=shrink or options.sampling.shrink)
     files = " ".join(f"--out {shlex.quote(str(path))}" for path in out)
-    job = new_job(replace(options, out=tuple(out)))
-    again = f"contactverif merge {shlex.quote(str(folder))} {files}"
+    job = new_job(replace(options, sampling=sampling, out=tuple(out)))
+    again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
     raise typer.Exit(run_job(replace(job, sources=journals, again=again)))

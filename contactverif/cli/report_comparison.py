@@ -17,6 +17,7 @@ from contactverif.cli.output_files import PAGE, OutputFiles
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
+from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.regression import Change, Changes, NamedRun
@@ -40,7 +41,7 @@ def compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFi
         kind = "property" if set(old.formulations) & set(new.formulations) else "formulation"
         names = " and ".join(", ".join(_names(run.run, kind)) or "nothing" for run in runs)
         raise MisuseError("NEW.nc", f"no {kind} that OLD.nc has too ({names})", "two reports with something in common")
-    meshes = _smallest_failing(changes)
+    meshes = _failing(changes)
     if PAGE in files.paths:
         write_page(files.paths[PAGE], changes_page(changes, meshes), "--out")
     show(ChangesTable(changes))
@@ -63,14 +64,14 @@ def _names(run: Run, kind: str) -> Sequence[str]:
     return run.formulations if kind == "formulation" else list(run.properties)
 
 
-def _smallest_failing(changes: Changes) -> dict[str, Counterexample]:
+def _failing(changes: Changes) -> dict[str, Counterexample]:
     """Return {id: counterexample} of the new report, for what got worse and fails."""
     cells = [change.new for change in changes.changes if change.regressions]
     worse = {(cell.formulation, cell.property_id) for cell in cells}
     return {
         id_: example
         for id_, example in counterexamples(changes.new.run).items()
-        if (example.formulation, example.property_id) in worse and not example.is_witness
+        if (example.formulation, example.property_id) in worse and example.verdict is not Verdict.PASS
     }
 
 
@@ -158,8 +159,8 @@ def _iterations(changes: Changes) -> Table:
 
 
 def _stored_mesh(example: Counterexample, report: str) -> Text:
-    """Return the smallest case on which a row that got worse fails, and the line that replays it."""
-    title = f"{example.formulation}, {example.property_id}: {example.row.result}"
+    """Return the case on which a row that got worse fails, and the line that replays it."""
+    title = f"{example.formulation}, {example.property_id}: {example.row.result}, {example.label}"
     return indent_below(title, *as_text(example.case).splitlines(), example.replay_command(report))
 
 

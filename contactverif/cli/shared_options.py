@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from contactverif.contract.errors import MisuseError
+from contactverif.run.profiles import Shrink, profile_named
 
 if TYPE_CHECKING:
     from contactverif.contract.case import Case
@@ -31,6 +32,10 @@ PROFILE_HELP = (
     "nightly: 2000 cases, new ones in every run. (default: dev)"
 )
 
+SHRINK_HELP = (
+    "The failures whose mesh is made as small as it goes. new: those that neither the formulation nor --known states; "
+    "the others show a witness, or the first case that clearly fails. (default: new)"
+)
 JOBS_HELP = (
     "Number of processes that share the work; the results are the same. "
     "(default: one for each 1000 planned cases, at most one for each core)"
@@ -76,16 +81,15 @@ CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the 
 
 @dataclass(frozen=True, slots=True)
 class SamplingOptions:
-    """Number and seed of the random cases of a run; None leaves them to the profile."""
+    """Number and seed of the random cases of a run, None to leave them to the profile, and what is shrunk."""
 
     examples: Annotated[int | None, typer.Option(help="Number of random cases of each property.", metavar="N")] = None
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same cases.", metavar="N")] = None
     profile: Annotated[str | None, typer.Option(help=PROFILE_HELP, metavar="NAME")] = None
+    shrink: Annotated[Shrink | None, typer.Option(help=SHRINK_HELP)] = None
 
     def planned_examples(self) -> int:
         """Return the number of random cases of each property."""
-        from contactverif.run.profiles import profile_named
-
         return self.examples or profile_named(self.profile or "dev").examples
 
 

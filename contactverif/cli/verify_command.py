@@ -116,6 +116,7 @@ def run_job(job: VerifyJob) -> int:
                 interface=job.interface,
                 scene=job.scene,
                 known=job.known,
+                shrink=job.options.sampling.shrink or "new",
                 progress=bar.show_progress,
                 executor=executor,
                 journal=journal,
@@ -175,7 +176,7 @@ def _show_counterexamples(
     files: OutputFiles,
     folder: PictureFolder | None,
 ) -> None:
-    """Print the smallest mesh of each failure, and draw it if the user named a folder."""
+    """Print a mesh of each failure, and draw it if the user named a folder."""
     from contactverif.cli.console import show_as_it_is
     from contactverif.cli.counterexample_output import counterexample_text, failing_examples
 

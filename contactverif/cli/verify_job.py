@@ -163,7 +163,7 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
     settled = replace(
         options,
         properties=matching_ids(options.properties or ("*",)),
-        sampling=SamplingOptions(profile.examples, profile.seed, profile.name),
+        sampling=replace(sampling, examples=profile.examples, seed=profile.seed, profile=profile.name),
     )
     scene = options.place.make_scene()
     interface = options.place.read_interface()

@@ -11,6 +11,7 @@ import re
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -18,6 +19,14 @@ from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Row, Run
 
 _LONGEST_FILE_NAME = 180  # File systems take 255 bytes, and a suffix and the mark of a temporary file are added.
+
+
+class Origin(StrEnum):
+    """The ways to a counterexample, as a report says them."""
+
+    SHRUNK = "shrunk from the random cases"
+    WITNESS = "the witness of a formulation"
+    FIRST = "the first case that clearly fails, not shrunk"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,9 +43,22 @@ class Counterexample:
         return self.outcome.case
 
     @property
-    def is_witness(self) -> bool:
-        """Return whether it is the named case of the formulation; otherwise it was shrunk from the random cases."""
-        return self.row.shrunk is None
+    def origin(self) -> Origin:
+        """The way to the case: only one that was shrunk is the smallest found."""
+        if self.outcome is self.row.witness:
+            return Origin.WITNESS
+        return Origin.FIRST if self.row.shrunk is None else Origin.SHRUNK
+
+    @property
+    def label(self) -> str:
+        """The case in a few words, for a reader."""
+        if self.origin is Origin.WITNESS:
+            words = f"its witness, the case {self.case.name}"
+        elif self.case.name:
+            words = f"the case {self.case.name}"
+        else:
+            words = "the smallest case found" if self.row.shrunk else "the first case that clearly fails, not shrunk"
+        return f"{words} ({self.case.kind})" if self.case.kind else words
 
     @property
     def formulation(self) -> str:
@@ -66,14 +88,17 @@ class Counterexample:
 def counterexamples(run: Run) -> dict[str, Counterexample]:
     """Return all counterexamples {id: counterexample}, in the order of the run."""
     entries = [(row, outcome) for row in run.rows if (outcome := counterexample_of(row)) is not None]
-    ids = distinct(case_id(row.formulation, row.property_id, witness=row.shrunk is None) for row, _ in entries)
+    ids = distinct(
+        case_id(row.formulation, row.property_id, witness=outcome is row.witness) for row, outcome in entries
+    )
     return {id_: Counterexample(id_, *entry) for id_, entry in zip(ids, entries, strict=True)}
 
 
 def counterexample_of(row: Row) -> Outcome | None:
-    """Return the shrunk case, else a witness that failed or broke its promise, else None."""
-    if row.shrunk is not None or row.witness is None:
-        return row.shrunk
+    """Return the case that was shrunk or is the first, else a witness that failed or broke its promise, else None."""
+    planned = row.shrunk or row.first
+    if planned is not None or row.witness is None:
+        return planned
     failed = row.witness.verdict in (Verdict.FAIL, Verdict.CRASHED)
     return row.witness if failed or (row.promise is False and row.unexpected) else None
 

@@ -124,7 +124,9 @@ class Row:
     witness : Outcome | None
         The outcome of the named case with which a formulation proves that it fails.
     shrunk : Outcome | None
-        The worst case after shrinking, or the first bad one of a finite list; None if no planned case failed.
+        The smallest case found that fails; None if no planned case failed, or nothing was shrunk.
+    first : Outcome | None
+        The first planned case that clearly fails, where nothing was shrunk and no witness shows the failure.
     seconds : float
         Time spent judging, shrinking excluded.
     """
@@ -139,6 +141,7 @@ class Row:
     outcomes: Sequence[Outcome] = ()
     witness: Outcome | None = None
     shrunk: Outcome | None = None
+    first: Outcome | None = None
     seconds: float = 0.0
     _tally: Tally | None = field(default=None, init=False, repr=False)
 

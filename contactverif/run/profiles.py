@@ -1,4 +1,4 @@
-"""Profiles: how many cases a run draws and with which seed, under one name.
+"""The size of a run: profiles with the number of cases and the seed, and which failures are shrunk.
 
 `dev` draws new cases in every run, `ci` the same cases every time, `nightly` twenty times as many.
 """
@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
 
 MOST_EXAMPLES = 10**9
+# The failures that are shrunk: those that nobody stated, all, or none. The others show a witness or the first case.
+Shrink = Literal["new", "all", "none"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,19 +16,20 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from operator import attrgetter
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
-from contactverif.contract.result import NotLoaded, Run
+from contactverif.contract.result import NotLoaded, Result, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
-from contactverif.run.profiles import Profile, profile_named
+from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.provenance import collect_provenance
 from contactverif.run.rows import WHOLE, OpenRow, Shrinking, open_rows
 from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Notes
@@ -65,6 +66,7 @@ def run(
     interface: Interface | None = None,
     scene: Case | None = None,
     known: Mapping[str, str] | None = None,
+    shrink: Shrink = "new",
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
     journal: Journal | None = None,
@@ -88,6 +90,9 @@ def run(
         that the formulation fails.
     known : Mapping[str, str] | None
         {property id: reason why its failure is known}.
+    shrink : Shrink
+        The failures that are shrunk: `"new"` those that neither the formulation nor `known` states, `"all"` or
+        `"none"`. One that is not shrunk shows the witness, or the first case that clearly fails.
     progress : Callable[[Progress], None] | None
         A function that is called after every case; with an executor, after every job.
     executor : Executor | None
@@ -105,7 +110,7 @@ def run(
     Raises
     ------
     MisuseError
-        If a known failure names no property of this run, or a name stands there twice.
+        If a known failure names no property of this run, a name stands there twice, or `shrink` is another word.
     WorkerError
         If a worker process dies.
     RunStopped
@@ -113,12 +118,14 @@ def run(
     """
     known = known or {}
     _check_known(known, properties)
+    if shrink not in get_args(Shrink):
+        raise MisuseError("shrink", repr(shrink), "new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
     scheduler, journal = Scheduler(executor, progress), journal or Journal()
     loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
     sampling = Sampling(resolved.examples, resolved.seed, interface if scene is None else scene.interface, scene)
-    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known)
+    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known, shrink=shrink)
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     with closing(journal):
         try:
@@ -163,11 +170,12 @@ class RunJobs:
         report: Callable[[Progress], None],
         known: Mapping[str, str],
         share: tuple[int, int] | None = None,
+        shrink: Shrink = "new",
     ) -> None:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
         self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
-        self._share = share
+        self._share, self._shrink = share, shrink
         self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
         self._rows = open_rows(subjects, questions, sampling, known)
         self._opposite_signs: set[str] = set()
@@ -330,23 +338,26 @@ class RunJobs:
         return self._finish(row)
 
     def _finish(self, row: OpenRow) -> Iterable[Job]:
-        """Make the row if it is complete, and return the job to shrink what failed. Of a list nothing is smaller."""
+        """Make the row if it is complete, and return the job to shrink what failed, if that is wanted."""
         if not row.complete:
             return ()
         row.judge(on_scene=self._sampling.scene is not None)
         goal = row.goal()
         if goal is None:
             return ()
-        if row.listed is not None:
-            return self._add_shrunk(row, goal.first, row.outcomes[goal.first])
+        shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
+        if not shrinks or row.listed is not None:  # Of a list nothing is smaller.
+            return self._add_shrunk(row, goal.first, None)
         before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
         arguments = self._sampling, row.question, row.subject, goal
         return (Job(shrink_case, arguments, partial(self._add_shrunk, row, goal.first), before),)
 
     def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
-        if smallest is None:  # The formulation answers differently each time.
-            smallest = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
+        """Add the smallest case. Without one the witness shows the failure, or the first case that clearly fails."""
         row.row = replace(row.row, shrunk=smallest)
+        if counterexample_of(row.row) is None:
+            case = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
+            row.row = replace(row.row, first=case)
         return ()
 
 

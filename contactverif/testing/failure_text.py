@@ -1,4 +1,4 @@
-"""The text of a failed check: the promise, the numbers, the smallest mesh that fails, and a command that repeats it."""
+"""The text of a failed check: the promise, the numbers, a mesh that fails, and a command that repeats it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
     if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
         lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
     if row.reason:
-        lines.append(f"  The worst case: {row.reason}" if row.shrunk else f"  The reason: {row.reason}")
+        lines.append(f"  The {'worst case' if row.shrunk or row.first else 'reason'}: {row.reason}")
     if row.suspicion:
         lines.append(f"  {row.suspicion}")
-    outcome = row.shrunk or row.witness
+    outcome = row.shrunk or row.first or row.witness
     if outcome is not None:
         lines += _example(row, outcome)
     lines.append(f"  To run it again: {command}")
@@ -29,8 +29,9 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
 
 def _example(row: Row, outcome: Outcome) -> list[str]:
     """Return the numbers and the drawing of a case."""
-    name, role = outcome.case.name, "case" if row.shrunk else "witness"
-    lines = [f"  The {role} {name}: {outcome.verdict}" if name else "  The smallest case that fails:"]
+    name, role = outcome.case.name, "witness" if outcome is row.witness else "case"
+    unnamed = "smallest case that fails" if row.shrunk else "first case that clearly fails, not shrunk"
+    lines = [f"  The {role} {name}: {outcome.verdict}" if name else f"  The {unnamed}:"]
     if outcome.measurement is None:
         lines.append(f"    {outcome.reason}")
     return [*lines, *_numbers(row.info, outcome), _drawing(outcome)]

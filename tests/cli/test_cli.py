@@ -61,7 +61,20 @@ def rows(out: str) -> dict[tuple[str, str], list[str]]:
 def nts_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a report in which NTS fails the patch test."""
     path = tmp_path_factory.mktemp("reports") / "nts.nc"
-    arguments = ["verify", "nts", "-p", "patch.flat.transmission", "--seed", "1", "--examples", "20", "--out", path]
+    arguments = [
+        "verify",
+        "nts",
+        "-p",
+        "patch.flat.transmission",
+        "--seed",
+        "1",
+        "--examples",
+        "20",
+        "--shrink",
+        "all",
+        "--out",
+        path,
+    ]
     subprocess.run(command(*arguments), env=environment(), capture_output=True, check=True)
     return path
 
@@ -264,7 +277,7 @@ def test_a_plugin_that_raises_or_returns_nan_is_an_outcome(ask: Ask, tmp_path: P
 @pytest.mark.usefixtures("strangers")
 def test_a_case_is_replayed_with_what_cannot_be_asked(ask: Ask, tmp_path: Path) -> None:
     report = tmp_path / "r.nc"
-    options = ("-p", "tangent.*", "--examples", "30", "--seed", "1", "--out", report)
+    options = ("-p", "tangent.*", "--examples", "30", "--seed", "1", "--shrink", "all", "--out", report)
     assert ask("verify", "vts-ppt-basic", *options).status == 0
     answer = ask("replay", report, "--case", "vts-ppt-basic.tangent.directional", "--formulation", "nan")
     assert answer.status == 0
@@ -304,8 +317,10 @@ def test_what_fails_as_promised_is_drawn_and_the_run_passes(ask: Ask) -> None:
     assert (promise, fails, as_, stated, judged) == ("fails", "fails", "as", "stated", "10/10")
     assert float(closest) > float(tolerance)
     assert rows(answer.out)["vts-ppt", "patch.flat.transmission"][:3] == ["passes", "pass", "10/10"]
-    first_lines = "nts, patch.flat.transmission: fails as stated, the smallest case found\n    ✗ error of a "
+    first_lines = "nts, patch.flat.transmission: fails as stated, its witness, the case a1\n    ✗ error of a "
     assert first_lines in answer.out
+    shrunk = ask("verify", "nts", "-p", "patch.flat.transmission", "--examples", "10", "--seed", "1", "--shrink", "all")
+    assert first_lines.replace("its witness, the case a1", "the smallest case found") in shrunk.out
     assert "●──" in answer.out
     assert "run the same command with --seed 1 --out FILE.nc" in answer.out
 
@@ -375,7 +390,7 @@ def test_a_line_to_be_copied_is_never_folded(ask: Ask, tmp_path: Path) -> None:
     folder.mkdir()
     options = ("-p", "patch.flat.transmission", "--examples", "5", "--seed", "1", "--out", folder / "r.nc")
     answer = ask("verify", "nts", *options, columns=80)
-    assert f"    contactverif replay '{folder / 'r.nc'}' --case {CASE}\n" in answer.out
+    assert f"    contactverif replay '{folder / 'r.nc'}' --case {CASE}.witness\n" in answer.out
 
 
 def test_a_remark_that_is_too_long_stands_below_its_line(ask: Ask) -> None:

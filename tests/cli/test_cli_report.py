@@ -17,7 +17,7 @@ from contactverif.run.registry import the_property
 def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
     """Return a report of NTS, which fails the patch test as it states, and the output of `verify`."""
     path = tmp_path / "nts.nc"
-    options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3")
+    options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3", "--shrink", "all")
     return path, ask("verify", "nts", "vts-ppt", *options, "--out", path)
 
 
@@ -32,7 +32,9 @@ def test_verify_writes_the_page_with_or_without_the_report(
     assert "\npage: page.html\n" in answer.out
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
     name = "words.nc" if "words.nc" in files else "FILE.nc"
-    assert f"contactverif replay {name} --case nts.patch.flat.transmission" in (tmp_path / "page.html").read_text()
+    assert (
+        f"contactverif replay {name} --case nts.patch.flat.transmission.witness" in (tmp_path / "page.html").read_text()
+    )
 
 
 def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:

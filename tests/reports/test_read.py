@@ -11,6 +11,7 @@ import pytest
 from handmade_report import ERROR, awkward, small_run
 
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Origin
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif_reports.netcdf import schema
@@ -60,7 +61,7 @@ def test_a_counterexample_comes_back_with_its_numbers(report: Path) -> None:
     crashed = read_case(report, "vts-me_n_4.objectivity")
     assert (crashed.verdict, crashed.outcome.measurement) == (Verdict.CRASHED, None)
     partly = read_case(report, "vts-me_n_4.tangent.directional.witness")
-    assert partly.is_witness
+    assert partly.origin is Origin.WITNESS
     assert partly.outcome.measurement is not None
     assert list(partly.outcome.measurement.values) == [ERROR.name], "the slope was not measured"
 

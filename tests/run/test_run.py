@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from threadpoolctl import threadpool_info
 
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
@@ -159,7 +160,7 @@ def test_the_case_of_a_finite_list_that_fails_is_called_by_its_name_and_not_shru
     row = one_row(subject(from_size(2)), question)
     assert (row.verdict, row.failing_names) == (Verdict.FAIL, ("size 3", "size 2"))
     assert row.reason == "size 3: error 1, at most 1e-06"
-    assert row.shrunk is row.outcomes[0]
+    assert (row.shrunk, row.first) == (None, row.outcomes[0])
     assert row.closest_name == "size 3"
 
 
@@ -318,8 +319,9 @@ def test_a_plugin_that_answers_differently_each_time_still_gives_a_case() -> Non
     calls = iter(range(10**9))
     row = one_row(subject(lambda size: 1.0 if next(calls) % 7 == 6 else 0.0))
     assert row.verdict is Verdict.FAIL
-    assert row.shrunk is not None
-    assert row.shrunk.verdict is Verdict.FAIL
+    example = row.shrunk or row.first
+    assert example is not None
+    assert example.verdict is Verdict.FAIL
 
 
 @pytest.mark.parametrize(
@@ -346,6 +348,34 @@ def test_a_case_of_a_finite_list_is_a_witness_by_its_name_and_is_judged_once() -
     row = one_row(subject(from_size(2), flat=False, witnesses={"patch.zero": "size 2"}), question)
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
     assert row.witness is row.outcomes[1]
+
+
+@pytest.mark.parametrize(
+    ("least", "shrink", "size", "origin"),
+    [
+        (5, "new", 7, Origin.WITNESS),
+        (5, "none", 7, Origin.WITNESS),
+        (8, "new", 59, Origin.FIRST),  # The witness passes.
+        (5, "all", 5, Origin.SHRUNK),
+    ],
+)
+@pytest.mark.usefixtures("witnesses")
+def test_a_stated_failure_is_shrunk_only_when_that_is_wanted(
+    least: int, shrink: str, size: int, origin: Origin
+) -> None:
+    formulation = subject(from_size(least), flat=False, witnesses={"patch.zero": "C"})
+    [example] = counterexamples(run([formulation], [ZERO], examples=40, seed=1, shrink=shrink)).values()  # type: ignore[arg-type]
+    assert (segments(example.outcome), example.origin) == (size, origin)
+    assert ("smallest" in example.label) is (origin is Origin.SHRUNK)
+
+
+def test_what_the_caller_knows_is_not_shrunk_and_what_nobody_stated_is() -> None:
+    known, news = one_row(subject(from_size(5)), known={"patch.zero": "issue 12"}), one_row(subject(from_size(5)))
+    assert (known.shrunk, segments(news.shrunk)) == (None, 5)
+    assert known.first is next(outcome for outcome in known.outcomes if outcome.verdict is Verdict.FAIL)
+    assert one_row(subject(from_size(5)), shrink="none").shrunk is None
+    with pytest.raises(MisuseError, match="shrink: found 'some'; needed new, all or none"):
+        one_row(subject(), shrink="some")
 
 
 @pytest.mark.usefixtures("witnesses")

@@ -57,7 +57,7 @@ def cells(name: str) -> list[str]:
     subject, question = Subject(mutant.name, mutant.make), question_of(mutant.caught_by)
     sizes = []
     for seed in SEEDS:
-        (row,) = run([subject], [question], examples=EXAMPLES, seed=seed).rows
+        (row,) = run([subject], [question], examples=EXAMPLES, seed=seed, shrink="all").rows
         sizes.append("" if row.shrunk is None else size(row.shrunk.case))
     return [mutant.caught_by, *sizes]
 

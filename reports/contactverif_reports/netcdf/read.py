@@ -21,6 +21,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import (
     Counterexample,
+    Origin,
     counterexamples,
     find_counterexample,
     named_failures,
@@ -164,7 +165,7 @@ class _Reader:
             verdict = int(self._summary["row_verdict"].values[i, j])
             if verdict == schema.NOT_PLANNED:
                 continue
-            shrunk, case = self._example(formulation, property_id, info)
+            shrunk, first, case = self._example(formulation, property_id, info)
             length = self._n_outcomes(i, j, property_id, codes[i])
             yield (
                 i,
@@ -179,6 +180,7 @@ class _Reader:
                     outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
                     witness=None if witnesses is None else witnesses.outcome(i, case),
                     shrunk=shrunk,
+                    first=first,
                     seconds=float(self._timing["row_seconds"].values[i, j]),
                 ),
             )
@@ -191,14 +193,18 @@ class _Reader:
             raise ValueError(f"the verdicts of {property_id} are not those that the summary counts")
         return length
 
-    def _example(self, formulation: str, property_id: str, info: PropertyInfo) -> tuple[Outcome | None, Case | None]:
-        """Return the shrunk case, or the case of the witness, of a row; None where the report stores none."""
+    def _example(
+        self, formulation: str, property_id: str, info: PropertyInfo
+    ) -> tuple[Outcome | None, Outcome | None, Case | None]:
+        """Return the shrunk case, the first one and that of the witness, of which a report stores one at most."""
         if (formulation, property_id) not in self._examples:
-            return None, None
+            return None, None, None
         dataset, case = self._examples[formulation, property_id]
-        if dataset.attrs["origin"] == schema.WITNESS:
-            return None, case
-        return OutcomeArrays(dataset, info, ()).outcome(0, case), None
+        origin = Origin(str(dataset.attrs["origin"]))
+        if origin is Origin.WITNESS:
+            return None, None, case
+        outcome = OutcomeArrays(dataset, info, ()).outcome(0, case)
+        return (outcome, None, None) if origin is Origin.SHRUNK else (None, outcome, None)
 
     def _case_seconds(self, i: int, j: int, n_cases: int) -> FloatArray:
         seconds: FloatArray = self._timing["case_seconds"].values[i, j, :n_cases]

@@ -76,7 +76,6 @@ FINDING: Mapping[str, tuple[str, str]] = {
 }
 VERDICTS: Mapping[str, int] = {str(verdict).replace(" ", "_"): int(verdict) for verdict in Verdict}
 NONE = "none"  # The value of an attribute without one: some readers drop an attribute that is empty.
-SHRUNK, WITNESS = "shrunk from the random cases", "the witness of a formulation"  # The origins of a counterexample.
 NOT_PLANNED = -1  # The verdict behind the last case of a formulation that had fewer cases.
 NO_CASE = -1  # The number of a case where there is none.
 NOT_MEASURED = 9.969209968386869e36  # netCDF's own fill value for doubles; a NaN in a report was measured.

@@ -48,8 +48,8 @@ def counterexample_groups(run: Run) -> dict[str, Group]:
     examples = counterexamples(run)
     folder = f"/{schema.COUNTEREXAMPLES}"
     comment = (
-        "the smallest case found for each failure, each a UGRID mesh with the verdict on it; its group `case` rebuilds "
-        "it exactly. To judge one again: contactverif replay REPORT --case ID"
+        "one case of each failure, each a UGRID mesh with the verdict on it; `origin` says whether it was shrunk, and "
+        "its group `case` rebuilds it exactly. To judge one again: contactverif replay REPORT --case ID"
     )
     groups = {folder: Group(attrs={"comment": comment, "ids": " ".join(examples) or schema.NONE})}
     for id_, example in examples.items():
@@ -93,7 +93,7 @@ def _mesh(example: Counterexample) -> Group:
         "property_id": info.id,
         "summary": info.summary,
         "reason": example.reason or schema.NONE,
-        "origin": schema.WITNESS if example.is_witness else schema.SHRUNK,
+        "origin": example.origin,
         "case_name": case.name or schema.NONE,
         "case_kind": case.kind or schema.NONE,
         "replay": f"contactverif replay REPORT --case {example.id}",
