@@ -1,8 +1,7 @@
-"""A scene in other units, and a scene in another place: the same problem, so that its solution is known.
+"""A scene in other units, and an interface in another place: the same problem, so that its solution is known.
 
-Rules for the next editor: only powers of two change units, and only a way that adds no digit to any coordinate moves a
-scene, so that nothing but the exponents, or the place, changes. What depends on no place (stiffness, load, start)
-stays the same to the last bit.
+Rule for the next editor: only powers of two change units, and only a way that adds no digit to any coordinate moves an
+interface, so that nothing but the exponents, or the place, changes.
 """
 
 from __future__ import annotations
@@ -13,13 +12,10 @@ from math import frexp
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
 from contactverif.mechanics.bulk import CACHE_SIZE
 from contactverif.mechanics.scene import Scene
-
-# What a scene has in any place, to the last bit. It is not made anew.
-PLACELESS = ("unknowns", "slices", "stiffness", "load", "transformation", "imposed_displacements", "start")
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -58,7 +54,12 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
         )
         for body in scene.bodies
     )
-    return Scene(bodies, scene.slave, scene.master, scene.penalty * modulus / length, {}, scene.name)
+    changed = Scene(bodies, scene.slave, scene.master, scene.penalty * modulus / length, {}, scene.name)
+    # What follows from the bodies is multiplied too, where `cached_property` keeps it, and not computed again.
+    factors = {"transformation": 1.0, "stiffness": modulus, "load": modulus * length}
+    for name, factor in (factors | dict.fromkeys(("imposed_displacements", "start"), length)).items():
+        vars(changed)[name] = factor * getattr(scene, name)
+    return changed
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -71,25 +72,9 @@ def snap(scene: Scene, spacing: float) -> Scene:
     return replace(scene, bodies=bodies)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def move(scene: Scene, x: float, y: float) -> Scene:
-    """Return the scene moved by (x, y), to the last bit.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    x, y : float
-        The way, a length each.
-    """
-    bodies = []
-    for body in scene.bodies:
-        nodes: FloatArray = body.nodes + (x, y)
-        if (nodes - (x, y) != body.nodes).any():
-            raise MisuseError("move", f"({x}, {y}), which rounds a node of {body.name}", "a way that rounds no node")
-        bodies.append(replace(body, nodes=nodes))
-    moved = replace(scene, bodies=tuple(bodies))
-    if moved.bodies_in_reach == scene.bodies_in_reach:
-        for name in PLACELESS:
-            moved.__dict__[name] = getattr(scene, name)  # Where `cached_property` keeps it.
+def move(interface: Interface, way: float) -> Interface:
+    """Return an interface moved by `way`, a length, along both axes; its nodes keep all their digits."""
+    moved = interface.at(interface.nodes + way)
+    if (moved.nodes - way != interface.nodes).any():
+        raise MisuseError("move", f"{way}, which rounds a node", "a way that rounds no node")
     return moved

@@ -127,7 +127,8 @@ def _load_step(
         share = tolerance * (iteration > 0)
         # The last iterate needs no tangent, nor does one that keeps the matrix.
         forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0 or keep_matrix)
-        record.pairing, record.forces = pairing, forces
+        record.pairings.append(pairing)
+        record.forces = forces
         residual = system.balance(u, forces)
         changes = _count_changes(pairing, before)
         if system.is_balanced(residual, forces, share):

@@ -93,8 +93,8 @@ class Trace:
         The number of multipliers that were not unique in the step from the iterate; 0 where none was taken.
     seconds : dict[str, float]
         The processor's time spent in "pair", "residual", "tangent" and "solve".
-    pairing : Pairing | None
-        The pairing at the last iterate; None if the formulation has none.
+    pairings : tuple[Pairing | None, ...]
+        The pairing at each iterate; None if the formulation has none.
     forces : FloatArray, shape (n_unknowns + n_multipliers,)
         The residual of the formulation alone at the last iterate.
 
@@ -122,8 +122,13 @@ class Trace:
     conditions: FloatArray
     deficiencies: IntArray
     seconds: dict[str, float]
-    pairing: Pairing | None
+    pairings: tuple[Pairing | None, ...]
     forces: FloatArray
+
+    @property
+    def pairing(self) -> Pairing | None:
+        """The pairing at the last iterate."""
+        return self.pairings[-1]
 
     @property
     def converged(self) -> bool:
@@ -176,7 +181,7 @@ class Record:
     changes: list[int] = field(default_factory=list)
     conditions: list[float] = field(default_factory=list)
     deficiencies: list[int] = field(default_factory=list)
-    pairing: Pairing | None = None
+    pairings: list[Pairing | None] = field(default_factory=list)
     forces: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def add(
@@ -208,7 +213,7 @@ class Record:
             conditions=freeze(self.conditions, np.float64),
             deficiencies=freeze(self.deficiencies, np.int64),
             seconds=seconds,
-            pairing=self.pairing,
+            pairings=tuple(self.pairings),
             forces=freeze(self.forces, np.float64),
         )
 

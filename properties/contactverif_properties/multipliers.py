@@ -11,6 +11,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
+from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
@@ -20,7 +21,6 @@ from contactverif_properties.shared.applicability import refuse_dependent_multip
 from contactverif_properties.shared.newton_solution import (
     find_solution,
     is_untouched,
-    length_units,
     solution_details,
     solution_floor,
 )
@@ -82,12 +82,12 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     if not trace.converged:
         return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution, n_free = trace.u[-1], scene.n_free
-    pairing = system.pair(solution)
-    condition = system.step(system.matrix(solution, pairing)[0], np.zeros(system.size)).condition
+    matrix, _ = system.matrix(solution, trace.pairing)
+    condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= 0:
         return Measurement(details=details, undecided="the matrix has no inverse at the solution")
-    units, length = length_units(system, solution, pairing), case.shortest_segment
-    floor = solution_floor(system, solution, pairing, condition) / length
+    units, length = scale_factors(matrix, n_free)[1], case.shortest_segment
+    floor = solution_floor(scene, solution, units, condition) / length
     lengths: FloatArray = solution / units / length
     values = {TENSION: float(np.maximum(-lengths[n_free:], 0.0).max(initial=0.0))}
     rescaled = subject.with_penalty(subject.penalty(case) / SCALE_RATIO)
@@ -95,7 +95,7 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     if again.converged:
         values[CHANGE] = float((np.abs(again.u[-1] - solution) / units).max()) / length
     details |= {"converged with another scale": float(again.converged)}
-    return Measurement(check_all(values, floor), details=details, idle=is_untouched(system, trace))
+    return Measurement(check_all(values, floor), details=details, idle=is_untouched(trace))
 
 
 @Property.define(

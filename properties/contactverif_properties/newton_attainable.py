@@ -14,6 +14,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import move, snap
@@ -148,7 +149,7 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
         values[RESIDUAL] = max(attained.residual for attained in decided)
         values[ERROR] = max(attained.error for attained in decided)
         tolerances |= {RESIDUAL: 1.0, ERROR: 1.0}
-    return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(system, trace))
+    return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
 
 
 def _load_less(scene: Scene, share: float) -> Scene:
@@ -205,12 +206,22 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
 class Place:
     """The scene in another place, and how far Newton's method has come there."""
 
-    system: System  # The moved scene.
+    interface: Interface  # The moved interface.
     way: float  # The move along both axes, a length.
     u: FloatArray  # (n_free + n_multipliers,) The unknowns.
+    z: FloatArray = field(default_factory=lambda: np.zeros(0))  # The stored positions, multipliers behind them.
+    pairing: Pairing | None = None  # The pairing and the forces there.
+    forces: FloatArray = field(init=False)
     residual: FloatArray = field(init=False)  # (n_free + n_multipliers,) The residual there.
     added: float = 0.0  # The largest ω of all steps.
     rests: list[Rest] = field(default_factory=list)  # The state after each step.
+
+    def moves(self, scene: Scene) -> bool:
+        """Store the positions at the unknowns, in the place of the scene's own; return whether one has changed."""
+        q, multipliers = np.split(self.u, [scene.n_free])
+        positions = self.interface.nodes.reshape(-1) + scene.imposed_displacements + scene.transformation @ q
+        before, self.z = self.z, np.concatenate([positions, multipliers])
+        return not np.array_equal(self.z, before)
 
 
 class Rest(NamedTuple):
@@ -225,7 +236,7 @@ class Rest(NamedTuple):
 def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attained]:
     """Let Newton's method come to rest in other places, from the solution near the origin."""
     near = solution.system
-    places = [Place(replace(near, scene=move(near.scene, way, way)), way, solution.u) for way in ways]
+    places = [Place(move(near.scene.interface, way), way, solution.u) for way in ways]
     take_forces(solution, places)
     for _ in range(N_STEPS):
         for place in places:
@@ -237,23 +248,26 @@ def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attain
 
 
 def take_forces(solution: Solution, places: Sequence[Place]) -> None:
-    """Ask for the forces in all places, and for those of the same stored positions moved back."""
+    """Ask for the forces where stored positions have changed, and for those of the same positions moved back."""
     near, n = solution.system, solution.system.scene.interface.n_unknowns
-    pairings = [place.system.pair(place.u) for place in places]
-    states = [place.system.state(place.u) for place in places]
+    changed = [place for place in places if place.moves(near.scene)]
     calls: list[Call] = []
-    for place, pairing, z in zip(places, pairings, states, strict=True):
-        back = np.concatenate([z[:n] - place.way, z[n:]])
+    for place in changed:
+        place.pairing = near.formulation.pair(place.interface, place.z)
+        back = np.concatenate([place.z[:n] - place.way, place.z[n:]])
         calls += [
-            ("residual", place.system.scene.interface, pairing, z),
-            ("residual", near.scene.interface, pairing, back),
+            ("residual", place.interface, place.pairing, place.z),
+            ("residual", near.scene.interface, place.pairing, back),
         ]
     answers = near.formulation.answers(calls)
-    for place, pairing, z, forces, same in zip(places, pairings, states, answers[::2], answers[1::2], strict=True):
+    for place, forces, same in zip(changed, answers[::2], answers[1::2], strict=True):
         place.added = max(place.added, solution.conditioning.count_roundings(forces - same))
-        place.residual = place.system.balance(place.u, forces)
-        largest = float(np.abs(z[:n]).max())
-        place.rests.append(Rest(over(np.abs(place.residual), solution.roundoff(largest)), place.u, largest, pairing))
+        place.forces = forces
+    for place in places:
+        place.residual = near.balance(place.u, place.forces)
+        largest = float(np.abs(place.z[:n]).max())
+        attained = over(np.abs(place.residual), solution.roundoff(largest))
+        place.rests.append(Rest(attained, place.u, largest, place.pairing))
 
 
 def _attain(solution: Solution, case: Case, place: Place) -> Attained:

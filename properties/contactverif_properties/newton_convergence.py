@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, inf, log, log2
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -15,6 +16,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
+from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
@@ -27,7 +29,6 @@ from contactverif_properties.shared.newton_solution import (
     LOAD_STEPS,
     find_solution,
     is_untouched,
-    length_units,
     solution_details,
     solution_floor,
 )
@@ -112,7 +113,7 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
         [FINAL_ITERATIONS.check(iterations, float(_allowed_iterations(trace, begin)))],
         details=details,
         series=series,
-        idle=is_untouched(system, trace),
+        idle=is_untouched(trace),
     )
 
 
@@ -195,27 +196,27 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
     if not trace.converged:
         return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution = trace.u[-1]
-    pairing = system.pair(solution)
-    matrix, _ = system.matrix(solution, pairing)
+    matrix, _ = system.matrix(solution, trace.pairing)
     condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= system.size * UNIT_ROUNDOFF:
         return Measurement(details=details, undecided="the matrix has no inverse at the solution")
-    steps = fit_steps(system, case, solution, pairing, condition)
+    steps = fit_steps(system, case, trace, matrix, condition)
     details["rate"], details["steps"] = steps.rate, float(steps.count)
     if np.isnan(steps.order):
         return Measurement(details=details, undecided="a kink: too few states near the solution pair like it")
     undecided = ""
     if steps.order < QUADRATIC:
-        details["spectral radius"] = spectral_radius(system, solution, pairing)
-        by_differences = fit_steps(replace(system, use_tangent=False), case, solution, pairing, condition)
-        if not by_differences.order >= QUADRATIC:
+        by_differences = replace(system, use_tangent=False)
+        exact, _ = by_differences.matrix(solution, trace.pairing)
+        details["spectral radius"] = spectral_radius(matrix, exact)
+        if not fit_steps(by_differences, case, trace, exact, condition).order >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     linear = steps.order == inf  # One step solves a linear problem, which has no order.
     return Measurement(
         [] if linear else [ORDER.check(steps.order, QUADRATIC)],
         details=details,
         undecided=undecided,
-        idle=is_untouched(system, trace),
+        idle=is_untouched(trace),
     )
 
 
@@ -228,7 +229,7 @@ class Steps:
     count: int  # The number of steps that started with the pairing of the solution.
 
 
-def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing | None, condition: float) -> Steps:
+def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: float) -> Steps:
     """Take one Newton step from each of some states around a solution, and fit their order.
 
     Parameters
@@ -237,15 +238,16 @@ def fit_steps(system: System, case: Case, solution: FloatArray, pairing: Pairing
         The scene with its formulation.
     case : Case
         The case of the scene, for its seed and its shortest segment.
-    solution : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns of the solution.
-    pairing : Pairing | None
-        The pairing of the solution.
+    trace : Trace
+        Newton's method, whose last iterate is the solution.
+    matrix : Any
+        The matrix there.
     condition : float
-        The reciprocal condition of the matrix there.
+        Its reciprocal condition.
     """
-    length, units = case.shortest_segment, length_units(system, solution, pairing)
-    floor = solution_floor(system, solution, pairing, condition)
+    solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
+    units = scale_factors(matrix, system.scene.n_free)[1]
+    floor = solution_floor(system.scene, solution, units, condition)
     fits, count = [], 0
     for direction in random_directions(case.seed, N_DIRECTIONS, system.size):
         before, after = [], []
@@ -303,27 +305,15 @@ def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[floa
     return float(slopes.mean() if slopes[-1] < QUADRATIC else slopes[-1]), float(after[-1] / before[-1])
 
 
-def spectral_radius(system: System, u: FloatArray, pairing: Pairing | None) -> float:
+def spectral_radius(matrix: Any, exact: Any) -> float:
     """Return the spectral radius of I − K⁻¹ ∂R/∂u, the rate of Newton's method with the matrix K.
-
-    The derivative is taken by central differences of the residual.
-
-    Parameters
-    ----------
-    system : System
-        The scene with its formulation.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns.
-    pairing : Pairing | None
-        The pairing, which stays frozen.
 
     References
     ----------
     Zavarise & De Lorenzis (2009), Fig. 30.
     """
-    matrix, _ = system.matrix(u, pairing)
-    exact, _ = replace(system, use_tangent=False).matrix(u, pairing)
-    return float(np.abs(linalg.eigvals(np.eye(len(u)) - linalg.solve(dense(matrix), dense(exact)))).max())
+    rest = np.eye(matrix.shape[0]) - linalg.solve(dense(matrix), dense(exact))
+    return float(np.abs(linalg.eigvals(rest)).max())
 
 
 def _pair_alike(

@@ -13,8 +13,8 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics import linear
 from contactverif.mechanics.changed_scenes import change_units
+from contactverif.mechanics.linear import Step, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
@@ -23,7 +23,7 @@ from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.kinks import find_kink
-from contactverif_properties.shared.newton_solution import is_untouched, length_units, solution_details
+from contactverif_properties.shared.newton_solution import is_untouched, solution_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
 
 LARGEST_LENGTH, LARGEST_MODULUS = 60, 30  # The largest exponents of 2 and of 4.
@@ -97,7 +97,7 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
         undecided=undecided,
         broken=broken,
         details=details | {"steps that agree to the last bit": float(differences.count(0.0))},
-        idle=is_untouched(system, trace),
+        idle=is_untouched(trace),
     )
 
 
@@ -109,10 +109,9 @@ class Units:
     other: System
     factors: FloatArray  # (n_free + n_multipliers,) The unit of each unknown in the other units.
 
-    def step(self, u: FloatArray) -> linear.Step:
-        """Return the Newton step in the other units from the unknowns u (n,) in those of the scene."""
-        u = u * self.factors
-        pairing = self.other.pair(u)
+    def step(self, trace: Trace, number: int) -> Step:
+        """Return the Newton step in the other units from the iterate `number`, on the pairing of both."""
+        u, pairing = trace.u[number] * self.factors, trace.pairings[number]
         # Asked as `solve` asks: forces of one call with the tangent may be rounded otherwise than forces alone.
         forces, tangent = self.other.forces_and_tangent(u, pairing)
         matrix, floor = self.other.assemble(u, pairing, forces, tangent)
@@ -120,11 +119,10 @@ class Units:
 
     def compare_decisions(self, trace: Trace, number: int) -> str:
         """Return in words what differs in the other units at the iterate `number`, or an empty string."""
-        u, last = trace.u[number], number + 1 == len(trace.u)
-        if self.system.pair(u) != self.other.pair(u * self.factors):
+        if trace.pairings[number] != self.other.pair(trace.u[number] * self.factors):
             return f"at iterate {number} the pairing is another one in other units"
-        if last and trace.end is End.SINGULAR:
-            step = self.step(u)
+        if number + 1 == len(trace.u) and trace.end is End.SINGULAR:
+            step = self.step(trace, number)
             if step.change is not None and step.condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size:
                 return f"at iterate {number} the matrix has an inverse in other units alone"
         return ""
@@ -132,7 +130,7 @@ class Units:
     def compare_step(self, case: Case, trace: Trace, number: int) -> float:
         """Return the difference of the step from the iterate `number` over what roundoff does to it."""
         u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
-        change = self.step(u).change
+        change = self.step(trace, number).change
         if change is None:
             return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size else 0.0
         difference = (u * self.factors + change) / self.factors - after
@@ -155,7 +153,9 @@ def measure_step(system: System, case: Case, trace: Trace, number: int, differen
     difference : FloatArray, shape (n_free + n_multipliers,)
         The difference of the two next iterates.
     """
-    u, units = trace.u[number], length_units(system, trace.u[number], system.pair(trace.u[number]))
+    u, units = trace.u[number], np.ones(system.size)
+    if system.n_multipliers:
+        units = scale_factors(system.matrix(u, trace.pairings[number])[0], system.scene.n_free)[1]
     step = float(np.abs((trace.u[number + 1] - u) / units).max())
     size = float(np.abs(u / units).max() + np.abs(system.scene.imposed_displacements).max()) + step
     largest = float(np.abs(system.state(u)[: system.scene.interface.n_unknowns]).max())

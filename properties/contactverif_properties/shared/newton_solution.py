@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.formulation import Pairing
-from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import solve
+from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 
@@ -31,42 +30,29 @@ def find_solution(system: System) -> Trace:
     return trace
 
 
-def length_units(system: System, u: FloatArray, pairing: Pairing | None) -> FloatArray:
-    """Return the unit of each unknown (n_free + n_multipliers,) that corresponds to a unit of length.
-
-    It is 1 for a position, and for a multiplier the change that does as much to the forces.
-    """
-    if not system.n_multipliers:
-        return np.ones(system.size)
-    return scale_factors(system.matrix(u, pairing)[0], system.scene.n_free)[1]
-
-
-def solution_floor(system: System, solution: FloatArray, pairing: Pairing | None, condition: float) -> float:
+def solution_floor(scene: Scene, solution: FloatArray, units: FloatArray, condition: float) -> float:
     """Return the distance from a solution, a length, below which roundoff decides: max(1e3 u/cond, 30 u X).
 
     Parameters
     ----------
-    system : System
-        The scene with its formulation.
+    scene : Scene
+        The scene.
     solution : FloatArray, shape (n_free + n_multipliers,)
         The unknowns of the solution.
-    pairing : Pairing | None
-        The pairing of the solution.
+    units : FloatArray, shape (n_free + n_multipliers,)
+        The unit of each unknown that corresponds to a unit of length, see `scale_factors`.
     condition : float
         The reciprocal condition of the matrix there, above 0.
     """
-    scene, units = system.scene, length_units(system, solution, pairing)
     size = float(np.abs(solution / units).max() + np.abs(scene.imposed_displacements).max())
     solved_to = 1e3 * UNIT_ROUNDOFF / condition * size
     rounded_to = 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max())
     return max(solved_to, rounded_to)
 
 
-def is_untouched(system: System, trace: Trace) -> bool:
+def is_untouched(trace: Trace) -> bool:
     """Return whether the formulation gives no force at the last iterate, so that only the bodies were solved."""
-    interface, z = system.scene.interface, trace.z
-    pairing = system.formulation.pair(interface, z)
-    return not system.formulation.residual(interface, pairing, z)[: interface.n_unknowns].any()
+    return not trace.forces[: trace.scene.interface.n_unknowns].any()
 
 
 def end_details(trace: Trace) -> dict[str, float]:
