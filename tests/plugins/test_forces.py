@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, contact_forces, make_flat
+from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 import contactverif_nts
 from contactverif import Interface, MisuseError
@@ -78,6 +78,23 @@ def test_printed_ppt_loses_one_minus_cosine_of_the_slave_force(theta: float) -> 
     assert defect == pytest.approx(1 - np.cos(theta), rel=1e-12)
     balanced = contact_forces(contactverif_nts.vts_ppt_balanced(penalty=PENALTY, n=1), interface, x.ravel())
     assert np.linalg.norm(balanced.sum(axis=0)) < 16 * 2.0**-53
+
+
+def test_basic_has_the_residual_of_the_printed_one_and_the_tangent_of_vts_me() -> None:
+    differs = 0
+    for seed in range(50):
+        interface, z = make_bent(seed)
+        printed, basic, me = (
+            make(penalty=8.0)
+            for make in (contactverif_nts.vts_ppt, contactverif_nts.vts_ppt_basic, contactverif_nts.vts_me)
+        )
+        pairing, pairing_me = printed.pair(interface, z), me.pair(interface, z)
+        assert np.array_equal(printed.residual(interface, pairing, z), basic.residual(interface, pairing, z))
+        tangent = basic.tangent(interface, pairing, z).toarray()
+        if np.array_equal(pairing["active"], pairing_me["active"]):
+            assert tangent == pytest.approx(me.tangent(interface, pairing_me, z).toarray(), abs=1e-12)
+        differs += not np.allclose(tangent, printed.tangent(interface, pairing, z).toarray())
+    assert differs > 10
 
 
 def test_free_ends_truncate_extend_and_cover() -> None:

@@ -1,4 +1,4 @@
-"""Segment-to-segment and all that integrates over the same cells: exact forces and tangents, balance, the dead zone."""
+"""Segment-to-segment and all that integrates over the same cells: exact forces, contact points, the dead zone."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 import contactverif_mortar
 from contactverif import Interface, MisuseError
 from contactverif.contract.subject import Subject
-from contactverif.geometry import projection
-from contactverif.geometry.compiled import python_function
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
-from contactverif_mortar import cell_forces, cell_geometry, cell_search, chen_hisada_method, integration_cells
 
 PRESSURE_FROM_POSITIONS = [
     ("sts", {}),
@@ -38,7 +35,6 @@ MULTIPLIERS = [
     ("mortar_dual_lm", {"normals": "averaged"}),
 ]
 METHODS = [*PRESSURE_FROM_POSITIONS, *MULTIPLIERS]
-KERNEL_MODULES = (cell_geometry, cell_search, integration_cells, cell_forces, chen_hisada_method)
 
 
 def ids(methods: list[tuple[str, dict[str, str]]]) -> list[str]:
@@ -84,77 +80,6 @@ def test_so_it_is_on_random_meshes_and_with_many_segments_under_one(name: str, o
         exact = uniform_pressure_weights_exact(interface, z[::2])
         forces = contact_forces(make(name, options, 1 / DEPTH), interface, z)
         assert np.abs(forces[:, 1]) == pytest.approx([float(value) for value in exact], abs=1e-13)
-
-
-@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
-def test_the_tangent_is_the_complex_step(name: str, options: dict[str, str]) -> None:
-    formulation, in_contact = make(name, options), 0
-    for seed in range(100):
-        interface, z = make_state(formulation, seed)
-        pairing = formulation.pair(interface, z)
-        tangent = formulation.tangent(interface, pairing, z).toarray()
-        h = 2.0**-100
-        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
-        assert np.abs(moved.imag.T / h - tangent).max() <= 1e-13 * np.abs(tangent).max()
-        in_contact += bool(pairing["active"].any())
-    assert in_contact > 50
-
-
-@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
-def test_conserving_and_unsymmetric_as_declared(name: str, options: dict[str, str]) -> None:
-    formulation, unsymmetric = make(name, options), 0.0
-    for seed in range(50):
-        interface, z = make_state(formulation, seed)
-        pairing = formulation.pair(interface, z)
-        tangent = formulation.tangent(interface, pairing, z).toarray()
-        if not pairing["active"].any():
-            continue
-        unsymmetric = max(unsymmetric, np.abs(tangent - tangent.T).max() / np.abs(tangent).max())
-        x, forces = z[: interface.n_unknowns].reshape(-1, 2), contact_forces(formulation, interface, z)
-        size = np.abs(forces).sum()
-        assert np.abs(forces.sum(axis=0)).max() <= 1e-14 * size
-        assert abs((x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()) <= 1e-13 * size
-    assert unsymmetric > 0.1
-    assert formulation.traits.promises.symmetric is False
-    assert formulation.traits.promises.conserves_force
-    assert formulation.traits.promises.conserves_moment
-
-
-@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
-def test_a_batch_is_a_loop_bitwise(name: str, options: dict[str, str]) -> None:
-    formulation = make(name, options)
-    interface, z = make_state(formulation, 3)
-    pairing = formulation.pair(interface, z)
-    states = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
-    batch = formulation.residual(interface, pairing, states)
-    assert batch.shape == states.shape
-    for i in range(3):
-        for j in range(2):
-            assert np.array_equal(batch[i, j], formulation.residual(interface, pairing, states[i, j]))
-
-
-@pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))
-def test_uncompiled_kernels_agree(name: str, options: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    formulation = make(name, options)
-    scenes = [make_state(formulation, seed) for seed in range(4)]
-
-    def answers() -> list[Any]:
-        computed = []
-        for interface, z in scenes:
-            pairing = formulation.pair(interface, z)
-            computed += [
-                formulation.residual(interface, pairing, z),
-                formulation.tangent(interface, pairing, z).toarray(),
-            ]
-        return computed
-
-    compiled = answers()
-    for module in (projection, *KERNEL_MODULES):
-        for attribute, value in list(vars(module).items()):
-            if hasattr(value, "py_func"):
-                monkeypatch.setattr(module, attribute, python_function(value))
-    for first, other in zip(compiled, answers(), strict=True):
-        assert first == pytest.approx(other, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS, ids=ids(METHODS))

@@ -83,18 +83,6 @@ def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
     assert in_contact > 30
 
 
-@pytest.mark.parametrize("name", INNERS)
-def test_the_tangent_is_the_complex_step(name: str) -> None:
-    formulation = make_two_pass(name)
-    for seed in range(50):
-        interface, z = state(formulation, seed)
-        pairing = formulation.pair(interface, z)
-        tangent = formulation.tangent(interface, pairing, z).toarray()
-        h = 2.0**-100
-        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
-        assert np.abs(moved.imag.T / h - tangent).max() <= 1e-13 * np.abs(tangent).max()
-
-
 @pytest.mark.parametrize("name", ["nts_ar", "vts_ppt_balanced", "nts_lm"])
 def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> None:
     formulation = make_two_pass(name)

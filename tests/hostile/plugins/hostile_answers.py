@@ -17,10 +17,7 @@ _calls = itertools.count(1)
 _keepsakes: list[Any] = []
 
 
-@answers("residual")
-def nan(answer: Any) -> Any:
-    """Answer NaN."""
-    return answer * np.nan
+nan = answers("residual")(lambda answer: answer * np.nan, "Answer NaN.")
 
 
 @answers("residual")
@@ -30,76 +27,27 @@ def one_infinity(answer: Any) -> Any:
     return answer
 
 
-@answers("residual")
-def wrong_shape(answer: Any) -> Any:
-    """Answer with one entry too few."""
-    return answer[:-1]
-
-
-@answers("residual")
-def column(answer: Any) -> Any:
-    """Answer a column, which broadcasts to a matrix."""
-    return answer[:, None]
-
-
-@answers("residual")
-def single_precision(answer: Any) -> Any:
-    """Answer in single precision."""
-    return answer.astype(np.float32)
-
-
-@answers("residual")
-def other_byte_order(answer: Any) -> Any:
-    """Answer in the other order of bytes."""
-    return answer.astype(">f8")
-
-
-@answers("residual")
-def objects(answer: Any) -> Any:
-    """Answer an array of Python objects."""
-    return answer.astype(object)
-
-
-@answers("residual")
-def records(answer: Any) -> Any:
-    """Answer an array of records."""
-    return np.rec.fromarrays([answer], names="force")
-
-
-@answers("residual")
-def text(answer: Any) -> Any:
-    """Answer an array of words."""
-    return answer.astype(str)
-
-
-@answers("residual", ends=EITHER)
-def masked_array(answer: Any) -> Any:
-    """Answer a masked array, which hides its wrong entries."""
-    return np.ma.masked_array(answer, mask=np.arange(answer.size) % 2 == 0)
-
-
-@answers("residual")
-def generator(answer: Any) -> Any:
-    """Answer a generator that never ends."""
-    return itertools.cycle(answer)
-
-
-@answers("residual")
-def nothing(answer: Any) -> Any:
-    """Answer None."""
-    return None
-
-
-@answers("residual")
-def huge_without_memory(answer: Any) -> Any:
-    """Answer an array of 1e15 entries that takes no memory."""
-    return np.broadcast_to(np.float64(0), (10**9, 10**6))
-
-
-@answers("residual", ends=EITHER)
-def window_with_strides(answer: Any) -> Any:
-    """Answer an array whose strides reach far beyond its memory."""
-    return np.lib.stride_tricks.as_strided(answer, shape=answer.shape, strides=(1 << 40,))
+wrong_shape = answers("residual")(lambda answer: answer[:-1], "Answer with one entry too few.")
+column = answers("residual")(lambda answer: answer[:, None], "Answer a column, which broadcasts to a matrix.")
+single_precision = answers("residual")(lambda answer: answer.astype(np.float32), "Answer in single precision.")
+other_byte_order = answers("residual")(lambda answer: answer.astype(">f8"), "Answer in the other order of bytes.")
+objects = answers("residual")(lambda answer: answer.astype(object), "Answer an array of Python objects.")
+records = answers("residual")(lambda answer: np.rec.fromarrays([answer], names="force"), "Answer an array of records.")
+text = answers("residual")(lambda answer: answer.astype(str), "Answer an array of words.")
+masked_array = answers("residual", ends=EITHER)(
+    lambda answer: np.ma.masked_array(answer, mask=np.arange(answer.size) % 2 == 0),
+    "Answer a masked array, which hides its wrong entries.",
+)
+generator = answers("residual")(lambda answer: itertools.cycle(answer), "Answer a generator that never ends.")
+nothing = answers("residual")(lambda answer: None, "Answer None.")
+huge_without_memory = answers("residual")(
+    lambda answer: np.broadcast_to(np.float64(0), (10**9, 10**6)),
+    "Answer an array of 1e15 entries that takes no memory.",
+)
+window_with_strides = answers("residual", ends=EITHER)(
+    lambda answer: np.lib.stride_tricks.as_strided(answer, shape=answer.shape, strides=(1 << 40,)),
+    "Answer an array whose strides reach far beyond its memory.",
+)
 
 
 class _LyingArray(np.ndarray):
@@ -110,10 +58,10 @@ class _LyingArray(np.ndarray):
             os._exit(0)
 
 
-@answers("residual")
-def exits_when_copied(answer: Any) -> Any:
-    """Answer a subclass of an array that ends the process when numpy makes a view or copy of it."""
-    return answer.view(_LyingArray)
+exits_when_copied = answers("residual")(
+    lambda answer: answer.view(_LyingArray),
+    "Answer a subclass of an array that ends the process when numpy makes a view or copy of it.",
+)
 
 
 class _AlwaysEqual(np.ndarray):
@@ -151,10 +99,9 @@ class _LyingShape(np.ndarray):
         return np.dtype(np.float32)
 
 
-@answers("residual", ends=EITHER)
-def lies_about_its_shape(answer: Any) -> Any:
-    """Answer a subclass of an array that lies about its shape."""
-    return answer.view(_LyingShape)
+lies_about_its_shape = answers("residual", ends=EITHER)(
+    lambda answer: answer.view(_LyingShape), "Answer a subclass of an array that lies about its shape."
+)
 
 
 class _Bomb(np.ndarray):
@@ -164,10 +111,9 @@ class _Bomb(np.ndarray):
         return os._exit, (0,)
 
 
-@answers("residual", ends=LIKE_NTS)
-def exits_when_unpickled(answer: Any) -> Any:
-    """Answer rightly, in an array that ends whatever process unpickles it."""
-    return answer.view(_Bomb)
+exits_when_unpickled = answers("residual", ends=LIKE_NTS)(
+    lambda answer: answer.view(_Bomb), "Answer rightly, in an array that ends whatever process unpickles it."
+)
 
 
 @answers("residual", ends=EITHER)
@@ -196,22 +142,11 @@ def reuses_its_array(answer: Any) -> Any:
     return answer
 
 
-@answers("tangent")
-def tangent_nan(answer: Any) -> Any:
-    """Answer a tangent of NaN."""
-    return answer * np.nan
-
-
-@answers("tangent")
-def tangent_shape(answer: Any) -> Any:
-    """Answer a tangent with one row too few."""
-    return answer[:-1]
-
-
-@answers("tangent")
-def tangent_operator(answer: Any) -> Any:
-    """Answer a linear operator instead of a matrix."""
-    return aslinearoperator(answer)
+tangent_nan = answers("tangent")(lambda answer: answer * np.nan, "Answer a tangent of NaN.")
+tangent_shape = answers("tangent")(lambda answer: answer[:-1], "Answer a tangent with one row too few.")
+tangent_operator = answers("tangent")(
+    lambda answer: aslinearoperator(answer), "Answer a linear operator instead of a matrix."
+)
 
 
 @answers("tangent")
@@ -273,16 +208,13 @@ def tangent_duplicates(answer: Any) -> Any:
     return sparse.coo_array((np.append(answer.data, np.zeros(10**7)), (rows, columns)), shape=answer.shape)
 
 
-@answers("tangent")
-def tangent_of_objects(answer: Any) -> Any:
-    """Answer a tangent of Python objects."""
-    return answer.toarray().astype(object)
-
-
-@answers("contact_points")
-def points_of_another_kind(answer: Any) -> Any:
-    """Answer contact points in a class of its own."""
-    return type("ContactPoints", (), {name: getattr(answer, name) for name in ("gap", "pressure", "active")})()
+tangent_of_objects = answers("tangent")(
+    lambda answer: answer.toarray().astype(object), "Answer a tangent of Python objects."
+)
+points_of_another_kind = answers("contact_points")(
+    lambda answer: type("ContactPoints", (), {name: getattr(answer, name) for name in ("gap", "pressure", "active")})(),
+    "Answer contact points in a class of its own.",
+)
 
 
 @answers("contact_points")
@@ -300,16 +232,8 @@ def points_of_no_segment(answer: Any) -> Any:
     return answer
 
 
-@instead("n_multipliers")
-def many_multipliers(right: Any, interface: Any) -> Any:
-    """Answer that there are 1e15 multipliers."""
-    return 10**15
-
-
-@instead("n_multipliers")
-def negative_multipliers(right: Any, interface: Any) -> Any:
-    """Answer that there are −4 multipliers."""
-    return -4
+many_multipliers = instead("n_multipliers")(lambda right, interface: 10**15, "Answer that there are 1e15 multipliers.")
+negative_multipliers = instead("n_multipliers")(lambda right, interface: -4, "Answer that there are −4 multipliers.")
 
 
 class _Number(int):
@@ -327,10 +251,9 @@ class _Number(int):
     __hash__ = int.__hash__
 
 
-@instead("n_multipliers", ends=EITHER)
-def lying_number(right: Any, interface: Any) -> Any:
-    """Answer an integer that compares as it likes."""
-    return _Number(0)
+lying_number = instead("n_multipliers", ends=EITHER)(
+    lambda right, interface: _Number(0), "Answer an integer that compares as it likes."
+)
 
 
 @instead("traits", ends=CAUGHT)

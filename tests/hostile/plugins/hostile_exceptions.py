@@ -9,51 +9,17 @@ from typing import Any
 
 import hypothesis
 import typer
-from hostile_kit import EITHER, LONG, before
+from hostile_kit import EITHER, LONG, before, raises
 
 from contactverif.contract.errors import ContractError, MisuseError
 
-
-@before("residual")
-def system_exit_0() -> None:
-    """Raise SystemExit with status 0."""
-    raise SystemExit(0)
-
-
-@before("make")
-def system_exit_in_make() -> None:
-    """Raise SystemExit with status 0 in the factory."""
-    raise SystemExit(0)
-
-
-@before("residual")
-def keyboard_interrupt() -> None:
-    """Raise KeyboardInterrupt, as Ctrl-C does."""
-    raise KeyboardInterrupt
-
-
-@before("make")
-def keyboard_interrupt_in_make() -> None:
-    """Raise KeyboardInterrupt in the factory."""
-    raise KeyboardInterrupt
-
-
-@before("residual")
-def generator_exit() -> None:
-    """Raise GeneratorExit."""
-    raise GeneratorExit
-
-
-@before("residual")
-def stop_iteration() -> None:
-    """Raise StopIteration, which ends a loop of somebody else."""
-    raise StopIteration
-
-
-@before("residual")
-def memory_error() -> None:
-    """Raise MemoryError."""
-    raise MemoryError
+system_exit_0 = raises("residual")(lambda: SystemExit(0), "Raise SystemExit with status 0.")
+system_exit_in_make = raises("make")(lambda: SystemExit(0), "Raise SystemExit with status 0 in the factory.")
+keyboard_interrupt = raises("residual")(KeyboardInterrupt, "Raise KeyboardInterrupt, as Ctrl-C does.")
+keyboard_interrupt_in_make = raises("make")(KeyboardInterrupt, "Raise KeyboardInterrupt in the factory.")
+generator_exit = raises("residual")(GeneratorExit, "Raise GeneratorExit.")
+stop_iteration = raises("residual")(StopIteration, "Raise StopIteration, which ends a loop of somebody else.")
+memory_error = raises("residual")(MemoryError, "Raise MemoryError.")
 
 
 @before("residual")
@@ -111,28 +77,18 @@ def text_hangs() -> None:
     raise SlowError
 
 
-@before("residual")
-def name_with_controls() -> None:
-    """Raise an exception whose class name clears the terminal."""
-    raise type("\x1b[2J\x1b[HAll tests passed\r\n\x07", (Exception,), {})("\x1b]0;title\x07")
-
-
-@before("residual")
-def long_text() -> None:
-    """Raise an exception with a text of 20 MB."""
-    raise RuntimeError("x" * 20_000_000)
-
-
-@before("residual")
-def many_lines() -> None:
-    """Raise an exception with a text of 100,000 lines."""
-    raise RuntimeError("line\n" * 100_000)
-
-
-@before("residual")
-def half_characters() -> None:
-    """Raise an exception whose text holds halves of characters and NUL, which cannot be written as UTF-8."""
-    raise RuntimeError("\ud800\udfff\x00\u202e")
+name_with_controls = raises("residual")(
+    lambda: type("\x1b[2J\x1b[HAll tests passed\r\n\x07", (Exception,), {})("\x1b]0;title\x07"),
+    "Raise an exception whose class name clears the terminal.",
+)
+long_text = raises("residual")(lambda: RuntimeError("x" * 20_000_000), "Raise an exception with a text of 20 MB.")
+many_lines = raises("residual")(
+    lambda: RuntimeError("line\n" * 100_000), "Raise an exception with a text of 100,000 lines."
+)
+half_characters = raises("residual")(
+    lambda: RuntimeError("\ud800\udfff\x00\u202e"),
+    "Raise an exception whose text holds halves of characters and NUL, which cannot be written as UTF-8.",
+)
 
 
 @before("residual")
@@ -145,10 +101,10 @@ def base_exception() -> None:
     raise PlainError("no Exception")
 
 
-@before("residual")
-def exception_group() -> None:
-    """Raise a group of exceptions in groups."""
-    raise BaseExceptionGroup("outer", [ExceptionGroup("inner", [ValueError("a")]), KeyboardInterrupt()])
+exception_group = raises("residual")(
+    lambda: BaseExceptionGroup("outer", [ExceptionGroup("inner", [ValueError("a")]), KeyboardInterrupt()]),
+    "Raise a group of exceptions in groups.",
+)
 
 
 @before("residual")
@@ -162,46 +118,28 @@ def long_chain() -> None:
     raise last
 
 
-@before("residual")
-def looks_like_misuse() -> None:
-    """Raise the harness' own error for a mistake on the command line."""
-    raise MisuseError("--seed", "nothing", "another plugin")
-
-
-@before("make", ends=EITHER)
-def looks_like_misuse_in_make() -> None:
-    """Raise the harness' own error for a wrong option in the factory, though there is none."""
-    raise MisuseError("option", "nothing", "another plugin")
-
-
-@before("residual")
-def looks_like_a_breach() -> None:
-    """Raise the harness' own error for a broken contract, with a class name that lies about its module."""
-    raise type("ContractError", (ContractError,), {"__module__": "\x1b[31m"})("\x1b[2J")
-
-
-@before("residual")
-def looks_like_success() -> None:
-    """Raise what ends a command with status 0."""
-    raise typer.Exit(0)
-
-
-@before("residual")
-def looks_like_a_closed_pipe() -> None:
-    """Raise BrokenPipeError, after which a command ends quietly."""
-    raise BrokenPipeError(errno.EPIPE, "closed")
-
-
-@before("residual")
-def looks_like_a_full_disk() -> None:
-    """Raise the error of a full disk."""
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-@before("residual")
-def rejects_the_case() -> None:
-    """Tell hypothesis that the case is of no use, so that it draws another one."""
-    hypothesis.reject()
+looks_like_misuse = raises("residual")(
+    lambda: MisuseError("--seed", "nothing", "another plugin"),
+    "Raise the harness' own error for a mistake on the command line.",
+)
+looks_like_misuse_in_make = raises("make", ends=EITHER)(
+    lambda: MisuseError("option", "nothing", "another plugin"),
+    "Raise the harness' own error for a wrong option in the factory, though there is none.",
+)
+looks_like_a_breach = raises("residual")(
+    lambda: type("ContractError", (ContractError,), {"__module__": "\x1b[31m"})("\x1b[2J"),
+    "Raise the harness' own error for a broken contract, with a class name that lies about its module.",
+)
+looks_like_success = raises("residual")(lambda: typer.Exit(0), "Raise what ends a command with status 0.")
+looks_like_a_closed_pipe = raises("residual")(
+    lambda: BrokenPipeError(errno.EPIPE, "closed"), "Raise BrokenPipeError, after which a command ends quietly."
+)
+looks_like_a_full_disk = raises("residual")(
+    lambda: OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), "Raise the error of a full disk."
+)
+rejects_the_case = before("residual")(
+    hypothesis.reject, "Tell hypothesis that the case is of no use, so that it draws another one."
+)
 
 
 class _Deep(Exception):

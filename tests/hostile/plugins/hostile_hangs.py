@@ -18,28 +18,10 @@ from hostile_kit import LIKE_NTS, LONG, answers, before
 _calls = itertools.count(1)
 
 
-@before("residual")
-def sleep() -> None:
-    """Sleep."""
-    time.sleep(LONG)
-
-
-@before("make")
-def sleep_in_make() -> None:
-    """Sleep in the factory."""
-    time.sleep(LONG)
-
-
-@before("traits")
-def sleep_in_traits() -> None:
-    """Sleep when it is asked for its promises."""
-    time.sleep(LONG)
-
-
-@before("pair")
-def sleep_in_pair() -> None:
-    """Sleep in the search."""
-    time.sleep(LONG)
+sleep = before("residual")(lambda: time.sleep(LONG), "Sleep.")
+sleep_in_make = before("make")(lambda: time.sleep(LONG), "Sleep in the factory.")
+sleep_in_traits = before("traits")(lambda: time.sleep(LONG), "Sleep when it is asked for its promises.")
+sleep_in_pair = before("pair")(lambda: time.sleep(LONG), "Sleep in the search.")
 
 
 @before("residual")
@@ -57,22 +39,16 @@ def loop() -> None:
         pass
 
 
-@before("residual")
-def loop_in_c() -> None:
-    """Compute for ever in C without giving the lock of the interpreter away, so that no Python signal handler runs."""
-    sum(range(10**11))
-
-
-@before("residual")
-def match_for_ever() -> None:
-    """Match a regular expression that backtracks exponentially."""
-    re.match(r"(a+)+$", "a" * 60 + "b")
-
-
-@before("residual")
-def sleep_with_the_lock() -> None:
-    """Sleep while holding the lock of the interpreter."""
-    ctypes.PyDLL(None).sleep(int(LONG))
+loop_in_c = before("residual")(
+    lambda: sum(range(10**11)),
+    "Compute for ever in C without giving the lock of the interpreter away, so that no Python signal handler runs.",
+)
+match_for_ever = before("residual")(
+    lambda: re.match(r"(a+)+$", "a" * 60 + "b"), "Match a regular expression that backtracks exponentially."
+)
+sleep_with_the_lock = before("residual")(
+    lambda: ctypes.PyDLL(None).sleep(int(LONG)), "Sleep while holding the lock of the interpreter."
+)
 
 
 @before("residual")
@@ -92,10 +68,9 @@ def sleep_without_signals() -> None:
         time.sleep(1.0)
 
 
-@before("residual")
-def stop_itself() -> None:
-    """Send SIGSTOP to the own process, as Ctrl-Z does."""
-    os.kill(os.getpid(), signal.SIGSTOP)
+stop_itself = before("residual")(
+    lambda: os.kill(os.getpid(), signal.SIGSTOP), "Send SIGSTOP to the own process, as Ctrl-Z does."
+)
 
 
 @before("residual")
@@ -105,10 +80,9 @@ def wait_for_input() -> None:
         raise RuntimeError("nobody types here")
 
 
-@before("residual", ends=LIKE_NTS)
-def sleep_at_exit() -> None:
-    """Answer rightly, and sleep when Python ends."""
-    atexit.register(time.sleep, LONG)
+sleep_at_exit = before("residual", ends=LIKE_NTS)(
+    lambda: atexit.register(time.sleep, LONG), "Answer rightly, and sleep when Python ends."
+)
 
 
 @answers("residual", ends=LIKE_NTS)

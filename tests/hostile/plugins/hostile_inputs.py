@@ -79,46 +79,30 @@ def add_the_last_answer(right: Any, interface: Any, pairing: Any, z: Any) -> Any
     return answer + 1e-9 * last
 
 
-@answers("residual", ends=IMPURE)
-def by_count(answer: Any) -> Any:
-    """Answer by the number of calls."""
-    return answer * (1 + 1e-9 * next(_calls))
-
-
-@answers("residual", ends=IMPURE)
-def by_process(answer: Any) -> Any:
-    """Answer by the number of the process."""
-    return answer * (1 + 1e-12 * os.getpid())
-
-
-@answers("residual", ends=IMPURE)
-def by_hash_seed(answer: Any) -> Any:
-    """Answer by the seed of Python's hashes, as the order of a set of words does."""
-    return answer * (1 + 1e-6 * (hash("seed") % 1001))
-
-
-@answers("residual", ends=IMPURE)
-def by_threads(answer: Any) -> Any:
-    """Answer by the number of threads that the environment allows."""
-    return answer * (1 + 1e-6 * int(os.environ.get("OMP_NUM_THREADS", "1")))
-
-
-@answers("residual", ends=IMPURE)
-def by_time(answer: Any) -> Any:
-    """Answer by the clock."""
-    return answer * (1 + 1e-9 * (time.perf_counter_ns() % 1_000_003))
-
-
-@answers("residual", ends=IMPURE)
-def by_chance(answer: Any) -> Any:
-    """Answer by chance."""
-    return answer * (1 + 1e-9 * np.random.default_rng().random())
-
-
-@instead("residual", ends=EITHER)
-def by_address(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-    """Answer by the address of the state in memory."""
-    return right() * (1 + 1e-9 * (z.ctypes.data // 64 % 1009))
+by_count = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-9 * next(_calls)), "Answer by the number of calls."
+)
+by_process = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-12 * os.getpid()), "Answer by the number of the process."
+)
+by_hash_seed = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-6 * (hash("seed") % 1001)),
+    "Answer by the seed of Python's hashes, as the order of a set of words does.",
+)
+by_threads = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-6 * int(os.environ.get("OMP_NUM_THREADS", "1"))),
+    "Answer by the number of threads that the environment allows.",
+)
+by_time = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-9 * (time.perf_counter_ns() % 1_000_003)), "Answer by the clock."
+)
+by_chance = answers("residual", ends=IMPURE)(
+    lambda answer: answer * (1 + 1e-9 * np.random.default_rng().random()), "Answer by chance."
+)
+by_address = instead("residual", ends=EITHER)(
+    lambda right, interface, pairing, z: right() * (1 + 1e-9 * (z.ctypes.data // 64 % 1009)),
+    "Answer by the address of the state in memory.",
+)
 
 
 @instead("residual", ends=IMPURE)

@@ -8,12 +8,17 @@ whatever it starts ends by itself after `LONG`.
 
 from __future__ import annotations
 
+import os
+import struct
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import contactverif_nts
 
 LONG = 120.0  # Seconds. It is longer than any limit of a test, and short enough to leave nothing for the night.
+
+MOST_FILES = 200  # No process here has more open files.
 
 # The ends that a run with the plugin may have.
 CAUGHT = "caught"  # The run says that the plugin is at fault; the exit status is 1.
@@ -59,8 +64,10 @@ class HostileNts:
         )
 
 
-def instead(verb: str, *, ends: str = CAUGHT) -> Callable[[Act], Factory]:
+def instead(verb: str, *, ends: str = CAUGHT) -> Callable[..., Factory]:
     """Decorate `act(right, *arguments)`, which answers a verb; `right()` is the right answer.
+
+    The decorators of this file take a summary beside an act that is no function with a docstring.
 
     Parameters
     ----------
@@ -70,47 +77,57 @@ def instead(verb: str, *, ends: str = CAUGHT) -> Callable[[Act], Factory]:
         The end that a run with the plugin must have.
     """
 
-    def decorate(act: Act) -> Factory:
+    def decorate(act: Act, summary: str | None = None) -> Factory:
         def make(*, penalty: float) -> Any:
             if verb == "make":
                 return act(lambda: HostileNts(penalty, {}))
             return HostileNts(penalty, {verb: act})
 
-        make.__name__, make.__doc__, make.__module__ = act.__name__, act.__doc__, act.__module__
+        make.__doc__ = summary or act.__doc__
         make.__dict__.update(ends=ends, verb=verb)
         return make
 
     return decorate
 
 
-def before(verb: str, *, ends: str = CAUGHT) -> Callable[[Callable[[], Any]], Factory]:
+def before(verb: str, *, ends: str = CAUGHT) -> Callable[..., Factory]:
     """Decorate `act()`, which does something before a verb gives its right answer."""
 
-    def decorate(act: Callable[[], Any]) -> Factory:
+    def decorate(act: Callable[[], Any], summary: str | None = None) -> Factory:
         def first(right: Callable[[], Any], *arguments: Any) -> Any:
             act()
             return right()
 
-        first.__name__, first.__doc__, first.__module__ = act.__name__, act.__doc__, act.__module__
-        return instead(verb, ends=ends)(first)
+        return instead(verb, ends=ends)(first, summary or act.__doc__)
 
     return decorate
 
 
-def answers(verb: str, *, ends: str = CAUGHT) -> Callable[[Callable[[Any], Any]], Factory]:
+def raises(verb: str, *, ends: str = CAUGHT) -> Callable[..., Factory]:
+    """Make a plugin that raises `error()` in a verb."""
+
+    def decorate(error: Callable[[], BaseException], summary: str) -> Factory:
+        def throw() -> None:
+            raise error()
+
+        return before(verb, ends=ends)(throw, summary)
+
+    return decorate
+
+
+def answers(verb: str, *, ends: str = CAUGHT) -> Callable[..., Factory]:
     """Decorate `act(answer)`, which makes the hostile answer of a verb from the right one."""
 
-    def decorate(act: Callable[[Any], Any]) -> Factory:
+    def decorate(act: Callable[[Any], Any], summary: str | None = None) -> Factory:
         def change(right: Callable[[], Any], *arguments: Any) -> Any:
             return act(right())
 
-        change.__name__, change.__doc__, change.__module__ = act.__name__, act.__doc__, act.__module__
-        return instead(verb, ends=ends)(change)
+        return instead(verb, ends=ends)(change, summary or act.__doc__)
 
     return decorate
 
 
-def wrongly(act: Callable[[], Any]) -> Factory:
+def wrongly(act: Callable[[], Any], summary: str | None = None) -> Factory:
     """Decorate `act()`, which hides that the forces of the plugin are wrong: they are 1.5 times what they should be.
 
     NTS states which forces it gives on two named cases, so a verdict that is not manipulated is a broken promise.
@@ -120,5 +137,12 @@ def wrongly(act: Callable[[], Any]) -> Factory:
         act()
         return 1.5 * right()
 
-    scale.__name__, scale.__doc__, scale.__module__ = act.__name__, act.__doc__, act.__module__
-    return instead("residual")(scale)
+    return instead("residual")(scale, summary or act.__doc__)
+
+
+def write_to_sockets(data: bytes, n_bytes: int | None = None) -> None:
+    """Write a message to every socket of this process, and so to the harness; its head may announce other bytes."""
+    for number in range(3, MOST_FILES):
+        with suppress(OSError):
+            if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
+                os.write(number, struct.pack("<Q", len(data) if n_bytes is None else n_bytes) + data)

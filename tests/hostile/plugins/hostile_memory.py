@@ -14,22 +14,11 @@ _calls = itertools.count(1)
 MEGABYTE = 2**20
 
 
-@before("residual")
-def long_list() -> None:
-    """Make a list of 100 GB."""
-    _leak.append([0] * (100 * 1024 * MEGABYTE // 8))
-
-
-@before("residual")
-def large_array() -> None:
-    """Make a numpy array of 100 GB and write to it."""
-    _leak.append(np.ones(100 * 1024 * MEGABYTE // 8))
-
-
-@before("residual")
-def slow_leak() -> None:
-    """Keep 200 MB more at each call."""
-    _leak.append(np.ones(200 * MEGABYTE // 8))
+long_list = before("residual")(lambda: _leak.append([0] * (100 * 1024 * MEGABYTE // 8)), "Make a list of 100 GB.")
+large_array = before("residual")(
+    lambda: _leak.append(np.ones(100 * 1024 * MEGABYTE // 8)), "Make a numpy array of 100 GB and write to it."
+)
+slow_leak = before("residual")(lambda: _leak.append(np.ones(200 * MEGABYTE // 8)), "Keep 200 MB more at each call.")
 
 
 @before("residual")
@@ -41,10 +30,9 @@ def leak_in_c() -> None:
     ctypes.memset(address or 0, 1, 200 * MEGABYTE)
 
 
-@before("make")
-def large_in_make() -> None:
-    """Make a numpy array of 100 GB in the factory."""
-    _leak.append(np.ones(100 * 1024 * MEGABYTE // 8))
+large_in_make = before("make")(
+    lambda: _leak.append(np.ones(100 * 1024 * MEGABYTE // 8)), "Make a numpy array of 100 GB in the factory."
+)
 
 
 @before("residual")

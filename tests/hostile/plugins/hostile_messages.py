@@ -5,19 +5,15 @@ Rule for the next editor: the messages here are those of `contactverif.isolation
 
 from __future__ import annotations
 
-import os
-import struct
 import sys
-from contextlib import suppress
 from typing import Any
 
 import msgspec
 import numpy as np
-from hostile_kit import EITHER, HostileNts, before, instead
+from hostile_kit import EITHER, HostileNts, before, instead, write_to_sockets
 
 import contactverif_nts
 
-MOST_FILES = 200
 ANSWER, FAILURE, LOADED = "answer", "failure", "loaded"  # The names of messages.
 
 
@@ -32,72 +28,42 @@ def _question() -> int:
 
 def _say(kind: str, *content: Any) -> None:
     """Send a reply to every socket of this process, before the real answer."""
-    data = msgspec.msgpack.encode([[kind, _question(), *content]])
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
-                os.write(number, struct.pack("<Q", len(data)) + data)
+    write_to_sockets(msgspec.msgpack.encode([[kind, _question(), *content]]))
 
 
-@before("residual", ends=EITHER)
-def say_misuse() -> None:
-    """Tell the harness that the user has made a mistake on the command line, which would end the run."""
-    _say(FAILURE, "misuse", "exception", ["--seed", "nothing", "another command"])
-
-
-@before("residual", ends=EITHER)
-def say_too_much() -> None:
-    """Tell the harness of an error in 5 MB of escape sequences."""
-    _say(FAILURE, "plugin", "exception", ["\x1b[2J\x07\n" * 700_000])
-
-
-@before("residual", ends=EITHER)
-def say_no_words() -> None:
-    """Tell the harness of an error without words."""
-    _say(FAILURE, "plugin", "exception", [])
-
-
-@before("residual", ends=EITHER)
-def say_loaded_again() -> None:
-    """Tell the harness in the middle of a case that a formulation with other promises was loaded."""
-    _say(LOADED, {"flat": True, "enforcement": "multiplier", "nonsense": 1}, ["pair", "nonsense"])
-
-
-@before("residual", ends=EITHER)
-def say_huge_shape() -> None:
-    """Answer an array without numbers whose shape is larger than any memory."""
-    _say(ANSWER, {"residual": ["<f8", [0, 2**62], b""]}, 0.0, 0.0)
-
-
-@before("residual", ends=EITHER)
-def say_objects() -> None:
-    """Answer an array of Python objects, whose bytes would be addresses."""
-    _say(ANSWER, {"residual": ["|O", [1], b"\x08" * 8]}, 0.0, 0.0)
-
-
-@before("residual", ends=EITHER)
-def say_negative_seconds() -> None:
-    """Answer that the call took less than no time."""
-    _say(ANSWER, {"residual": ["<f8", [1], bytes(8)]}, float("-inf"), float("-inf"))
-
-
-@before("residual", ends=EITHER)
-def say_deep_message() -> None:
-    """Send a message of lists in lists, 10,000 deep."""
-    data = b"\x91" * 10_000 + b"\xc0"
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
-                os.write(number, struct.pack("<Q", len(data)) + data)
-
-
-@before("residual", ends=EITHER)
-def say_a_little() -> None:
-    """Send the beginning of a message, and the rest of it never."""
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
-                os.write(number, struct.pack("<Q", 100_000) + b"\x93")
+say_misuse = before("residual", ends=EITHER)(
+    lambda: _say(FAILURE, "misuse", "exception", ["--seed", "nothing", "another command"]),
+    "Tell the harness that the user has made a mistake on the command line, which would end the run.",
+)
+say_too_much = before("residual", ends=EITHER)(
+    lambda: _say(FAILURE, "plugin", "exception", ["\x1b[2J\x07\n" * 700_000]),
+    "Tell the harness of an error in 5 MB of escape sequences.",
+)
+say_no_words = before("residual", ends=EITHER)(
+    lambda: _say(FAILURE, "plugin", "exception", []), "Tell the harness of an error without words."
+)
+say_loaded_again = before("residual", ends=EITHER)(
+    lambda: _say(LOADED, {"flat": True, "enforcement": "multiplier", "nonsense": 1}, ["pair", "nonsense"]),
+    "Tell the harness in the middle of a case that a formulation with other promises was loaded.",
+)
+say_huge_shape = before("residual", ends=EITHER)(
+    lambda: _say(ANSWER, {"residual": ["<f8", [0, 2**62], b""]}, 0.0, 0.0),
+    "Answer an array without numbers whose shape is larger than any memory.",
+)
+say_objects = before("residual", ends=EITHER)(
+    lambda: _say(ANSWER, {"residual": ["|O", [1], b"\x08" * 8]}, 0.0, 0.0),
+    "Answer an array of Python objects, whose bytes would be addresses.",
+)
+say_negative_seconds = before("residual", ends=EITHER)(
+    lambda: _say(ANSWER, {"residual": ["<f8", [1], bytes(8)]}, float("-inf"), float("-inf")),
+    "Answer that the call took less than no time.",
+)
+say_deep_message = before("residual", ends=EITHER)(
+    lambda: write_to_sockets(b"\x91" * 10_000 + b"\xc0"), "Send a message of lists in lists, 10,000 deep."
+)
+say_a_little = before("residual", ends=EITHER)(
+    lambda: write_to_sockets(b"\x93", 100_000), "Send the beginning of a message, and the rest of it never."
+)
 
 
 class _ManyMultipliers(HostileNts):

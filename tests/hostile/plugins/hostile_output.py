@@ -10,22 +10,17 @@ import sys
 import warnings
 from contextlib import suppress
 
-from hostile_kit import EITHER, LIKE_NTS, before
+from hostile_kit import EITHER, LIKE_NTS, MOST_FILES, before
 
 _calls = itertools.count(1)
-MOST_FILES = 200
 
 
-@before("residual", ends=LIKE_NTS)
-def print_lines() -> None:
-    """Print a line to standard output at each call."""
-    print("residual called")
-
-
-@before("residual", ends=LIKE_NTS)
-def print_errors() -> None:
-    """Print a line to standard error at each call."""
-    print("residual called", file=sys.stderr)
+print_lines = before("residual", ends=LIKE_NTS)(
+    lambda: print("residual called"), "Print a line to standard output at each call."
+)
+print_errors = before("residual", ends=LIKE_NTS)(
+    lambda: print("residual called", file=sys.stderr), "Print a line to standard error at each call."
+)
 
 
 @before("residual", ends=LIKE_NTS)
@@ -35,16 +30,16 @@ def write_to_1_and_2() -> None:
     os.write(2, b"residual called\n")
 
 
-@before("residual", ends=LIKE_NTS)
-def print_from_c() -> None:
-    """Print by C's printf, whose buffer is written at the end of the process."""
-    ctypes.CDLL(None).printf(b"residual called\n")
-
-
-@before("residual", ends=LIKE_NTS)
-def print_escapes() -> None:
-    """Clear the terminal, change its title, and print a table of its own."""
-    print("\x1b[2J\x1b[H\x1b]0;all passed\x07\x1b[32mbad\n  patch.flat.transmission passes pass\x1b[0m", flush=True)
+print_from_c = before("residual", ends=LIKE_NTS)(
+    lambda: ctypes.CDLL(None).printf(b"residual called\n"),
+    "Print by C's printf, whose buffer is written at the end of the process.",
+)
+print_escapes = before("residual", ends=LIKE_NTS)(
+    lambda: print(
+        "\x1b[2J\x1b[H\x1b]0;all passed\x07\x1b[32mbad\n  patch.flat.transmission passes pass\x1b[0m", flush=True
+    ),
+    "Clear the terminal, change its title, and print a table of its own.",
+)
 
 
 @before("residual", ends=LIKE_NTS)
@@ -55,10 +50,7 @@ def print_100_megabytes() -> None:
             os.write(1, b"x" * 2**20)
 
 
-@before("make", ends=LIKE_NTS)
-def print_in_make() -> None:
-    """Print in the factory."""
-    print("made", flush=True)
+print_in_make = before("make", ends=LIKE_NTS)(lambda: print("made", flush=True), "Print in the factory.")
 
 
 @before("residual", ends=LIKE_NTS)
@@ -68,16 +60,12 @@ def warn() -> None:
     logging.getLogger("plugin").error("an error \x1b[2J")
 
 
-@before("residual", ends=EITHER)
-def close_standard_streams() -> None:
-    """Close the file descriptors 0, 1 and 2."""
-    os.closerange(0, 3)
-
-
-@before("residual", ends=EITHER)
-def close_all_files() -> None:
-    """Close the file descriptors from 0 to 100, and so the line to the harness too."""
-    os.closerange(0, 101)
+close_standard_streams = before("residual", ends=EITHER)(
+    lambda: os.closerange(0, 3), "Close the file descriptors 0, 1 and 2."
+)
+close_all_files = before("residual", ends=EITHER)(
+    lambda: os.closerange(0, 101), "Close the file descriptors from 0 to 100, and so the line to the harness too."
+)
 
 
 @before("residual", ends=EITHER)

@@ -13,10 +13,10 @@ from contactverif.contract.formulation import Pairing
 NUMBER_OF_NAMES = 200_000
 
 
-@answers("pair")
-def floats(answer: Any) -> Any:
-    """Answer a pairing that holds real numbers, so that the frozen part of the residual may be the whole."""
-    return {**answer, "gap": np.zeros(4)}
+floats = answers("pair")(
+    lambda answer: {**answer, "gap": np.zeros(4)},
+    "Answer a pairing that holds real numbers, so that the frozen part of the residual may be the whole.",
+)
 
 
 @answers("pair", ends=EITHER)
@@ -26,40 +26,27 @@ def floats_as_integers(answer: Any) -> Any:
     return {**answer, "bits": bits}
 
 
-@answers("pair")
-def too_large_numbers(answer: Any) -> Any:
-    """Answer a pairing with numbers that number nothing."""
-    return {**answer, "number": np.array([2**62])}
-
-
-@answers("pair", ends=EITHER)
-def huge(answer: Any) -> Any:
-    """Answer a pairing with an array of 1e9 entries that takes no memory."""
-    return {**answer, "huge": np.broadcast_to(np.int64(0), 10**9)}
-
-
-@answers("pair", ends=EITHER)
-def long_name(answer: Any) -> Any:
-    """Answer a pairing with a name of 20 MB."""
-    return {**answer, "x" * 20_000_000: np.zeros(1, np.int64)}
-
-
-@answers("pair", ends=EITHER)
-def many_names(answer: Any) -> Any:
-    """Answer a pairing with 200,000 names."""
-    return {**answer, **{f"name {number}": np.zeros(0, np.int64) for number in range(NUMBER_OF_NAMES)}}
-
-
-@answers("pair", ends=EITHER)
-def names_with_controls(answer: Any) -> Any:
-    """Answer a pairing with names that clear the terminal, hold NUL, or cannot be written as UTF-8."""
-    return {**answer, "\x1b[2J": np.zeros(1, np.int64), "\0": np.zeros(1, bool), "\ud800": np.zeros(1, bool)}
-
-
-@answers("pair")
-def number_as_name(answer: Any) -> Any:
-    """Answer a pairing with a name that is no string."""
-    return {**answer, 7: np.zeros(1, np.int64)}
+too_large_numbers = answers("pair")(
+    lambda answer: {**answer, "number": np.array([2**62])}, "Answer a pairing with numbers that number nothing."
+)
+huge = answers("pair", ends=EITHER)(
+    lambda answer: {**answer, "huge": np.broadcast_to(np.int64(0), 10**9)},
+    "Answer a pairing with an array of 1e9 entries that takes no memory.",
+)
+long_name = answers("pair", ends=EITHER)(
+    lambda answer: {**answer, "x" * 20_000_000: np.zeros(1, np.int64)}, "Answer a pairing with a name of 20 MB."
+)
+many_names = answers("pair", ends=EITHER)(
+    lambda answer: {**answer, **{f"name {number}": np.zeros(0, np.int64) for number in range(NUMBER_OF_NAMES)}},
+    "Answer a pairing with 200,000 names.",
+)
+names_with_controls = answers("pair", ends=EITHER)(
+    lambda answer: {**answer, "\x1b[2J": np.zeros(1, np.int64), "\0": np.zeros(1, bool), "\ud800": np.zeros(1, bool)},
+    "Answer a pairing with names that clear the terminal, hold NUL, or cannot be written as UTF-8.",
+)
+number_as_name = answers("pair")(
+    lambda answer: {**answer, 7: np.zeros(1, np.int64)}, "Answer a pairing with a name that is no string."
+)
 
 
 @answers("pair", ends=EITHER)
@@ -103,10 +90,7 @@ def floats_after_the_check(answer: Any) -> Any:
     return answer
 
 
-@answers("pair")
-def list_of_arrays(answer: Any) -> Any:
-    """Answer a list instead of a mapping."""
-    return list(answer.values())
+list_of_arrays = answers("pair")(lambda answer: list(answer.values()), "Answer a list instead of a mapping.")
 
 
 @answers("pair")

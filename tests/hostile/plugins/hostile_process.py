@@ -42,10 +42,9 @@ def _patch(modules: list[Any], name: str, value: Any) -> None:
             setattr(module, name, value)
 
 
-@wrongly
-def success_at_exit() -> None:
-    """Answer wrongly, and turn the exit status into 0 when Python ends."""
-    atexit.register(os._exit, 0)
+success_at_exit = wrongly(
+    lambda: atexit.register(os._exit, 0), "Answer wrongly, and turn the exit status into 0 when Python ends."
+)
 
 
 @wrongly
@@ -76,10 +75,10 @@ def patched_judge() -> None:
     _patch(_harness(""), "judge", lambda *_: (verdicts.Verdict.PASS, ""))
 
 
-@wrongly
-def patched_tolerances() -> None:
-    """Answer wrongly, and patch the unit roundoff that all tolerances are made of."""
-    _patch(_harness(""), "UNIT_ROUNDOFF", 1e9)
+patched_tolerances = wrongly(
+    lambda: _patch(_harness(""), "UNIT_ROUNDOFF", 1e9),
+    "Answer wrongly, and patch the unit roundoff that all tolerances are made of.",
+)
 
 
 @wrongly
@@ -157,10 +156,9 @@ def profile() -> None:
     threading.setprofile(spy)
 
 
-@before("residual", ends=EITHER)
-def rounding_mode() -> None:
-    """Round upwards from now on."""
-    ctypes.CDLL("libm.so.6").fesetround(FE_UPWARD)
+rounding_mode = before("residual", ends=EITHER)(
+    lambda: ctypes.CDLL("libm.so.6").fesetround(FE_UPWARD), "Round upwards from now on."
+)
 
 
 @before("residual", ends=LIKE_NTS)
@@ -190,10 +188,9 @@ def ignore_signals() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-@before("residual", ends=EITHER)
-def alarm() -> None:
-    """Let the system send a signal in a second, whose default is to end the process."""
-    signal.alarm(1)
+alarm = before("residual", ends=EITHER)(
+    lambda: signal.alarm(1), "Let the system send a signal in a second, whose default is to end the process."
+)
 
 
 @before("residual", ends=EITHER)
@@ -207,10 +204,10 @@ def timer() -> None:
     signal.setitimer(signal.ITIMER_REAL, 0.05, 0.05)
 
 
-@before("residual", ends=EITHER)
-def exit_later() -> None:
-    """Let Python's own watchdog end the process in a second."""
-    faulthandler.dump_traceback_later(1.0, exit=True, file=sys.__stderr__)
+exit_later = before("residual", ends=EITHER)(
+    lambda: faulthandler.dump_traceback_later(1.0, exit=True, file=sys.__stderr__),
+    "Let Python's own watchdog end the process in a second.",
+)
 
 
 @before("residual", ends=EITHER)
@@ -252,22 +249,13 @@ def other_user() -> None:
         os.setuid(NOBODY)
 
 
-@before("residual", ends=LIKE_NTS)
-def no_environment() -> None:
-    """Delete all environment variables."""
-    os.environ.clear()
-
-
-@before("residual", ends=EITHER)
-def no_files() -> None:
-    """Forbid the process to open another file."""
-    resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))
-
-
-@before("residual", ends=LIKE_NTS)
-def no_bytes() -> None:
-    """Forbid the process to write to a file."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+no_environment = before("residual", ends=LIKE_NTS)(os.environ.clear, "Delete all environment variables.")
+no_files = before("residual", ends=EITHER)(
+    lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3)), "Forbid the process to open another file."
+)
+no_bytes = before("residual", ends=LIKE_NTS)(
+    lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)), "Forbid the process to write to a file."
+)
 
 
 @before("residual", ends=EITHER)
@@ -278,10 +266,9 @@ def no_seconds() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
 
 
-@before("residual", ends=EITHER)
-def no_memory() -> None:
-    """Forbid the process to take any more memory."""
-    resource.setrlimit(resource.RLIMIT_AS, (2**20, 2**20))
+no_memory = before("residual", ends=EITHER)(
+    lambda: resource.setrlimit(resource.RLIMIT_AS, (2**20, 2**20)), "Forbid the process to take any more memory."
+)
 
 
 @before("residual", ends=LIKE_NTS)
@@ -323,16 +310,10 @@ def same_chance() -> None:
     np.random.seed(0)  # noqa: NPY002
 
 
-@before("residual", ends=LIKE_NTS)
-def no_rights() -> None:
-    """Take all rights from files that are made from now on."""
-    os.umask(0o777)
-
-
-@before("residual", ends=LIKE_NTS)
-def last_in_the_queue() -> None:
-    """Give the process the lowest priority."""
-    os.nice(19)
+no_rights = before("residual", ends=LIKE_NTS)(
+    lambda: os.umask(0o777), "Take all rights from files that are made from now on."
+)
+last_in_the_queue = before("residual", ends=LIKE_NTS)(lambda: os.nice(19), "Give the process the lowest priority.")
 
 
 @before("residual", ends=EITHER)
@@ -346,10 +327,9 @@ def no_streams() -> None:
     sys.stdout = sys.stderr = Broken()  # type: ignore[assignment]
 
 
-@before("residual", ends=LIKE_NTS)
-def seldom_switch() -> None:
-    """Let no other thread run for a long time."""
-    sys.setswitchinterval(LONG)
+seldom_switch = before("residual", ends=LIKE_NTS)(
+    lambda: sys.setswitchinterval(LONG), "Let no other thread run for a long time."
+)
 
 
 @before("make", ends=EITHER)

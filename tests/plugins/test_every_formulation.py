@@ -1,0 +1,119 @@
+"""What all formulations are asked alike on random bent surfaces: exact tangents, declared balance, batches, kernels."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from every_formulation import FORMULATIONS
+from subjects import load_subject
+from surfaces import make_bent
+
+from contactverif import Interface
+from contactverif.geometry.compiled import python_function
+
+NAMES = (
+    *FORMULATIONS,
+    *("vts-me:n=5,area=reference", "vts-ppt:n=1", "vts-ppt:n=3,free_end=extend", "vts-ppt-balanced:n=1"),
+    *("vts-me-lm:n=1", "vts-me-lm:n=3,area=reference", "vts-ppt-lm:n=1", "vts-ppt-lm:n=3,free_end=extend"),
+    *("vts-ppt-lm:free_end=cover", "vts-ppt-lm:transmission=balanced,n=1,free_end=cover"),
+    *("mortar-lm:normals=averaged,area=reference", "mortar-dual:area=reference", "mortar-dual-lm"),
+    *(f"two-pass/{name}" for name in ("vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced", "vts-me-lm", "vts-ppt-lm")),
+)
+EACH = pytest.mark.parametrize("name", NAMES)
+POINTS_WITH_MULTIPLIERS = ("nts-lm", "vts-me-lm", "vts-ppt-lm")
+OF_CELLS = ("sts", "chen-hisada", "mortar")  # Their sums round less.
+KERNELS = ("contactverif.geometry.", "contactverif_nts.", "contactverif_mortar.")
+
+
+def load(name: str) -> Any:
+    return load_subject(name).with_penalty(8.0).plugin
+
+
+def states(formulation: Any, count: int) -> Iterator[tuple[Interface, Any]]:
+    """Yield bent scenes; half of the multipliers are negative, so that some points let go."""
+    for seed in range(count):
+        interface, z = make_bent(seed)
+        n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
+        yield interface, np.append(z, np.random.default_rng(seed).uniform(-1, 1, n))
+
+
+@EACH
+def test_the_tangent_is_the_complex_step(name: str) -> None:
+    formulation = load(name)
+    n_active = n_idle = n_cut = n_multipliers = 0
+    for interface, z in states(formulation, 100):
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        h = 2.0**-100
+        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
+        if formulation.traits.promises.tangent == "exact":
+            error = np.abs(moved.imag.T / h - tangent).max()
+            assert error <= (1e-14 if name.startswith(POINTS_WITH_MULTIPLIERS) else 1e-13) * np.abs(tangent).max()
+        active = pairing["active" if "active" in pairing else "pass_1.active"]
+        n_active, n_idle = n_active + int(active.sum()), n_idle + int((~active).sum())
+        n_cut += "cut_p" in pairing and bool((pairing["frame"] >= 0).any())
+        n_multipliers += z.size - interface.n_unknowns
+    assert n_active > 100
+    assert n_idle > 100 or not n_multipliers
+    assert n_cut > 50 or not ("free_end=cover" in name or name == "vts-ppt-balanced")
+
+
+@EACH
+def test_symmetric_and_conserving_as_declared(name: str) -> None:
+    formulation = load(name)
+    asymmetry = force = moment = 0.0
+    for interface, z in states(formulation, 50):
+        pairing = formulation.pair(interface, z)
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        forces, x = (
+            array[: interface.n_unknowns].reshape(-1, 2) for array in (formulation.residual(interface, pairing, z), z)
+        )
+        if not forces.any():
+            continue
+        size = np.abs(forces).sum()
+        asymmetry = max(asymmetry, np.abs(tangent - tangent.T).max() / np.abs(tangent).max())
+        force = max(force, np.abs(forces.sum(axis=0)).max() / size)
+        moment = max(moment, abs((x[:, 0] * forces[:, 1] - x[:, 1] * forces[:, 0]).sum()) / size)
+    promises, few = formulation.traits.promises, 0.1 if name.startswith(OF_CELLS) else 1.0
+    assert bool(asymmetry < 1e-13) is promises.symmetric
+    # Nothing is promised of a balanced transmission past a free end; else the promises are those of the presets.
+    if promises.conserves_force is not None and "free_end" not in name:
+        assert bool(force < 1e-13 * few) is promises.conserves_force
+        assert bool(moment < 1e-12 * few) is promises.conserves_moment
+
+
+@EACH
+def test_uncompiled_kernels_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    formulation = load(name)
+
+    def answers() -> list[Any]:
+        computed = []
+        for interface, z in states(formulation, 4):
+            pairing = formulation.pair(interface, z)
+            computed.append(formulation.residual(interface, pairing, z))
+            computed.append(formulation.tangent(interface, pairing, z).toarray())
+        return computed
+
+    compiled = answers()
+    for module in [module for name, module in sys.modules.items() if name.startswith(KERNELS)]:
+        for attribute, value in list(vars(module).items()):
+            if hasattr(value, "py_func"):
+                monkeypatch.setattr(module, attribute, python_function(value))
+    for first, other in zip(compiled, answers(), strict=True):
+        assert first == pytest.approx(other, rel=1e-12, abs=1e-12)
+
+
+@EACH
+def test_a_batch_is_a_loop_bitwise(name: str) -> None:
+    formulation = load(name)
+    interface, z = list(states(formulation, 4))[3]
+    pairing = formulation.pair(interface, z)
+    batch = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
+    answers = formulation.residual(interface, pairing, batch)
+    assert answers.shape == batch.shape
+    for place in np.ndindex(3, 2):
+        assert np.array_equal(answers[place], formulation.residual(interface, pairing, batch[place]))
