@@ -1,4 +1,4 @@
-"""What all formulations are asked alike on random bent surfaces: exact tangents, declared balance, batches, kernels."""
+"""All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, uncompiled kernels."""
 
 from __future__ import annotations
 
