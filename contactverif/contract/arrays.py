@@ -5,6 +5,7 @@ What a plugin may keep or change must not be what others are judged on: arrays g
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,13 +30,22 @@ def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
     It stands on immutable bytes, so that nobody can make it writeable again. An array that already does is returned.
     """
     array = np.asarray(values, dtype=dtype)
-    if _is_frozen(array):
-        return array
-    if array.size == 0:
-        array = array.copy()
-        array.setflags(write=False)
-        return array
-    return np.frombuffer(array.tobytes(), dtype=dtype).reshape(array.shape)
+    return array if _is_frozen(array) else np.ndarray(array.shape, array.dtype, array.tobytes())
+
+
+def freeze_together(arrays: Collection[NDArray[_Scalar]], dtype: type[_Scalar]) -> list[NDArray[_Scalar]]:
+    """Return read-only copies of arrays of a dtype as parts of one, which is the last of the list.
+
+    One copy of many small arrays takes less time than a copy of each.
+    """
+    buffers: list[Any] = [array if array.flags.c_contiguous else array.tobytes() for array in arrays]
+    data = b"".join(buffers)
+    together: NDArray[_Scalar] = np.ndarray((len(data) // np.dtype(dtype).itemsize,), dtype, data)
+    parts, end = [], 0
+    for array in arrays:
+        begin, end = end, end + array.size
+        parts.append(together[begin:end] if array.ndim == 1 else together[begin:end].reshape(array.shape))
+    return [*parts, together]
 
 
 def _is_frozen(array: NDArray[Any]) -> bool:

@@ -50,10 +50,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray, freeze
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray, freeze, freeze_together
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
+
+_INTEGER = np.dtype(np.int64)
+_NEEDED = "needed an array of int64 or bool"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,12 +117,13 @@ class Pairing(Mapping[str, NDArray[Any]]):
     Pairing(master_segment(3,), active(3,))
     """
 
-    __slots__ = ("_arrays", "_handle")
+    __slots__ = ("_arrays", "_handle", "_integers")
 
     def __init__(self, arrays: Mapping[str, Any]) -> None:
         if not isinstance(arrays, Mapping):
             raise ContractError(f"pair: returned a {type(arrays).__name__}; needed a mapping from names to arrays")
-        checked: dict[str, NDArray[Any]] = {}
+        self._arrays: dict[str, NDArray[Any]] = {}
+        integers: dict[str, IntArray] = {}
         handles = []
         for name, values in arrays.items():
             if not isinstance(name, str):
@@ -127,13 +131,19 @@ class Pairing(Mapping[str, NDArray[Any]]):
             if isinstance(values, Handle):
                 handles.append(values)
                 continue
-            if not isinstance(values, np.ndarray) or values.dtype not in (np.int64, np.bool_):
-                kind = f"dtype {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
-                raise ContractError(f"pair: {name!r} is {kind}; needed an array of int64 or bool")
-            checked[name] = freeze(values, values.dtype.type)
+            if not isinstance(values, np.ndarray):
+                raise ContractError(f"pair: {name!r} is a {type(values).__name__}; {_NEEDED}")
+            array = np.asarray(values)  # A subclass may say of itself what it likes.
+            if array.dtype == _INTEGER:
+                self._arrays[name] = integers[name] = array
+            elif array.dtype == np.bool_:
+                self._arrays[name] = freeze(array, np.bool_)
+            else:
+                raise ContractError(f"pair: {name!r} is dtype {array.dtype}; {_NEEDED}")
         if len(handles) > 1:
             raise ContractError(f"pair: returned {len(handles)} handles; needed at most one")
-        self._arrays = checked
+        *parts, self._integers = freeze_together(integers.values(), np.int64)
+        self._arrays.update(zip(integers, parts, strict=True))
         self._handle = handles[0] if handles else None
 
     @property
@@ -177,13 +187,13 @@ class Pairing(Mapping[str, NDArray[Any]]):
         ContractError
             If an integer is below −1, or larger than both the number of unknowns and the longest array of the pairing.
         """
-        most = max([interface.n_unknowns, *(values.size for values in self._arrays.values())])
-        numbers = {name: values for name, values in self._arrays.items() if values.dtype == np.int64}
-        together = np.concatenate([[0], *(values.reshape(-1) for values in numbers.values())])
-        lowest, highest = together.min(), together.max()
+        lowest, highest = self._integers.min(initial=0), self._integers.max(initial=0)
+        if lowest >= -1 and highest <= interface.n_unknowns:
+            return
+        most = max(interface.n_unknowns, *(values.size for values in self._arrays.values()))
         if not -1 <= lowest <= highest <= most:
             outlier = lowest if lowest < -1 else highest
-            name = next(name for name, values in numbers.items() if (values == outlier).any())
+            name = next(name for name, values in self.items() if values.dtype == _INTEGER and (values == outlier).any())
             raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
 
     def same_as(self, other: Pairing) -> bool:

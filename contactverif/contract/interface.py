@@ -33,6 +33,8 @@ class Surface:
     chain_order : IntArray, shape (n_segments,)
         The numbers of the segments in the order of a walk along the chains: open chains from their free ends, then
         closed chains.
+    chain_starts : IntArray, shape (n_chains,)
+        The places in `chain_order` at which the chains begin.
     nodes : IntArray, shape (n_nodes,)
         The numbers of the nodes of this surface, ascending.
 
@@ -53,6 +55,7 @@ class Surface:
     segments: IntArray
     neighbours: IntArray = field(init=False)
     chain_order: IntArray = field(init=False)
+    chain_starts: IntArray = field(init=False)
     nodes: IntArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -63,11 +66,10 @@ class Surface:
             raise MisuseError("segments", f"dtype {raw.dtype}", "integer node numbers")
         segments = freeze(raw, np.int64)
         link = _link_small if segments.size <= _SMALL else _link
-        neighbours, chain_order, nodes = link(segments.tobytes())
         object.__setattr__(self, "segments", segments)
-        object.__setattr__(self, "neighbours", neighbours)
-        object.__setattr__(self, "chain_order", chain_order)
-        object.__setattr__(self, "nodes", nodes)
+        names = ("neighbours", "chain_order", "chain_starts", "nodes")
+        for name, array in zip(names, link(segments.tobytes()), strict=True):
+            object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
         return len(self.segments)
@@ -234,12 +236,14 @@ class Interface:
         return Interface(as_array("nodes", nodes), self.slave, self.master)
 
 
-def _link(data: bytes) -> tuple[IntArray, IntArray, IntArray]:
-    """Check the segments (n_segments, 2) whose bytes are given; return neighbours, chain order and nodes."""
+def _link(data: bytes) -> list[IntArray]:
+    """Check the segments (n_segments, 2) whose bytes are given; return neighbours, chain order and starts, nodes."""
     segments = np.frombuffer(data, np.int64).reshape(-1, 2)
     _check_chains(segments)
-    neighbours = freeze(_neighbours(segments), np.int64)
-    return neighbours, freeze(_chain_order(neighbours), np.int64), freeze(np.unique(segments), np.int64)
+    neighbours = _neighbours(segments)
+    order = _chain_order(neighbours)
+    starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
+    return [freeze(array, np.int64) for array in (neighbours, order, starts, np.unique(segments))]
 
 
 _SMALL = 128  # Number of node numbers of a surface that is remembered: random meshes share few ways to hang together.

@@ -24,9 +24,9 @@ def split_states(interface: Interface, z: Array) -> tuple[Array, Array]:
 
 
 def split_state(interface: Interface, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Split one state (n_unknowns + n_multipliers,) into positions (n_nodes, dim) and multipliers."""
-    positions, multipliers = split_states(interface, z)
-    return positions[0], multipliers[0]
+    """Return copies of the positions (n_nodes, dim) and the multipliers of one state (n_unknowns + n_multipliers,)."""
+    n_unknowns = interface.n_unknowns
+    return np.array(z[:n_unknowns]).reshape(interface.nodes.shape), np.array(z[n_unknowns:])
 
 
 def join_rows(forces: Array, constraints: Array, z: Array) -> Array:

@@ -222,11 +222,10 @@ def _pad_chains(surface: Surface) -> IntArray:
     So a chain far away costs a search one look at its box, and the subtree of the near chain is what it would be alone.
     """
     order = surface.chain_order
-    begins = np.flatnonzero(surface.neighbours[order[:-1], 1] != order[1:]) + 1
-    if not len(begins):
+    if len(surface.chain_starts) == 1:
         return order
     padded = np.full(0, -1, dtype=np.int64)
-    for chain in np.split(order, begins):
+    for chain in np.split(order, surface.chain_starts[1:]):
         width = LEAF
         while width < len(chain):
             width *= 2

@@ -23,6 +23,9 @@ def split_range(n_items: int, threads: int) -> list[tuple[int, int]]:
 
 def run_in_threads(calls: list[Callable[[], None]]) -> None:
     """Run calls side by side, the last one in the calling thread, and return when all have ended."""
+    if len(calls) == 1:
+        calls[0]()
+        return
     errors: dict[int, BaseException] = {}
 
     def run(number: int) -> None:

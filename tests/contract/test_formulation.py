@@ -31,6 +31,24 @@ def test_a_pairing_is_a_read_only_mapping() -> None:
         pairing["segment"] = segments  # type: ignore[index]
 
 
+def test_a_pairing_keeps_shapes_and_order_of_any_arrays() -> None:
+    table = np.arange(12).reshape(3, 4)
+    arrays = {
+        "columns": table.T,
+        "active": table > 5,
+        "none": np.zeros((0, 2), np.int64),
+        "one": table[2, 3:].reshape(()),
+    }
+    pairing = Pairing(arrays | {"every second": table.view(np.ma.MaskedArray)[:, ::2]})
+    assert list(pairing) == ["columns", "active", "none", "one", "every second"]
+    for name, values in arrays.items():
+        assert np.array_equal(pairing[name], values)
+        assert pairing[name].shape == values.shape
+        assert pairing[name].flags.c_contiguous
+    assert type(pairing["every second"]) is np.ndarray
+    assert pairing["every second"].tolist() == [[0, 2], [4, 6], [8, 10]]
+
+
 @pytest.mark.parametrize(
     ("answer", "message"),
     [

@@ -48,6 +48,7 @@ def test_a_closed_chain() -> None:
 def test_several_chains_open_ones_first() -> None:
     chains = surface((0, 1), (1, 0), (4, 5), (2, 3), (3, 8))
     assert chains.chain_order.tolist() == [2, 3, 4, 0, 1]
+    assert chains.chain_starts.tolist() == [0, 1, 3]
     assert chains.neighbours.tolist() == [[1, 1], [0, 0], [-1, -1], [-1, 4], [3, -1]]
 
 

@@ -163,6 +163,16 @@ def test_a_plugin_that_writes_to_the_interface_or_the_pairing() -> None:
             answer_to("residual", residual=writing(target))
 
 
+def test_a_plugin_that_changes_how_numpy_treats_errors_changes_it_for_itself_alone() -> None:
+    def residual(interface: Any, pairing: Any, z: Any) -> Any:
+        np.seterr(all="raise")
+        return z
+
+    before = np.geterr()
+    answer_to("residual", residual=residual)
+    assert np.geterr() == before
+
+
 def broken_compressed(format_: str, **arrays: Any) -> Any:
     """Return a unit matrix of which some arrays were replaced behind scipy's back."""
     matrix = sparse.eye_array(10).asformat(format_)
