@@ -144,19 +144,19 @@ class Interface:
         if raw.dtype.kind not in "fiu":
             raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
         nodes = freeze(raw, np.float64)
-        bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
-        if len(bad):
-            raise MisuseError("nodes", f"node {bad[0]} at {tuple(nodes[bad[0]].tolist())}", "finite coordinates")
+        if not np.isfinite(nodes).all():
+            bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0]
+            raise MisuseError("nodes", f"node {bad} at {tuple(nodes[bad].tolist())}", "finite coordinates")
         object.__setattr__(self, "nodes", nodes)
         used_slave, used_master = self.slave.nodes, self.master.nodes
         n_slave = len(used_slave)
-        if not np.array_equal(used_slave, np.arange(n_slave)):
+        if used_slave[-1] != n_slave - 1:  # The numbers of a surface are different, ascending and ≥ 0.
             raise MisuseError(
                 "slave",
                 f"nodes {_abbreviate(used_slave)}",
                 f"the first node numbers, 0 … {n_slave - 1}, each used",
             )
-        if not np.array_equal(used_master, np.arange(n_slave, len(nodes))):
+        if used_master[0] != n_slave or not n_slave + len(used_master) == len(nodes) == used_master[-1] + 1:
             raise MisuseError(
                 "master",
                 f"nodes {_abbreviate(used_master)}",
@@ -240,10 +240,14 @@ def _link(data: bytes) -> list[IntArray]:
     """Check the segments (n_segments, 2) whose bytes are given; return neighbours, chain order and starts, nodes."""
     segments = np.frombuffer(data, np.int64).reshape(-1, 2)
     _check_chains(segments)
-    neighbours = _neighbours(segments)
+    nodes, ends = np.unique(segments, return_inverse=True)
+    first, second = ends.reshape(segments.shape).T  # Node numbers without gaps.
+    starting, ending = (np.full(len(nodes), -1) for _ in range(2))
+    starting[first] = ending[second] = np.arange(len(segments))
+    neighbours = np.column_stack([ending[first], starting[second]])  # −1 at a free end.
     order = _chain_order(neighbours)
     starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
-    return [freeze(array, np.int64) for array in (neighbours, order, starts, np.unique(segments))]
+    return [freeze(array, np.int64) for array in (neighbours, order, starts, nodes)]
 
 
 _SMALL = 128  # Number of node numbers of a surface that is remembered: random meshes share few ways to hang together.
@@ -260,8 +264,9 @@ def _check_chains(segments: IntArray) -> None:
         node = segments[segment, 0]
         raise MisuseError("segments", f"segment {segment} that begins and ends at node {node}", "two nodes")
     for end, verb in ((0, "begin"), (1, "end")):
-        numbers, counts = np.unique(segments[:, end], return_counts=True)
-        if counts.max() > 1:
+        numbers = np.sort(segments[:, end])
+        if (numbers[1:] == numbers[:-1]).any():
+            numbers, counts = np.unique(numbers, return_counts=True)
             node = numbers[np.argmax(counts)]
             meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
             raise MisuseError(
@@ -269,15 +274,6 @@ def _check_chains(segments: IntArray) -> None:
                 f"segments {meeting} that all {verb} at node {node}",
                 "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
             )
-
-
-def _neighbours(segments: IntArray) -> IntArray:
-    """Return the previous and the next segment of each segment (n_segments, 2), −1 at a free end."""
-    numbers, ends = np.unique(segments, return_inverse=True)
-    first, second = ends.reshape(segments.shape).T  # node numbers without gaps
-    starting, ending = (np.full(len(numbers), -1) for _ in range(2))
-    starting[first] = ending[second] = np.arange(len(segments))
-    return np.column_stack([ending[first], starting[second]])
 
 
 def _chain_order(neighbours: IntArray) -> IntArray:
@@ -299,22 +295,20 @@ def _chain_order(neighbours: IntArray) -> IntArray:
 
 def _check_positions(name: str, surface: Surface, used: IntArray, nodes: FloatArray) -> None:
     """Check that the segments of a surface have a length and its nodes a place of their own."""
+    if len(set(map(tuple, nodes[used].tolist()))) == len(used):
+        return
     ends = nodes[surface.segments]
     zero = np.flatnonzero((ends[:, 0] == ends[:, 1]).all(axis=1))
     if len(zero):
         raise MisuseError(name, f"segment {zero[0]} of zero length", "two different end positions")
-    along_x = nodes[used][np.lexsort(nodes[used].T[::-1])]
-    if not (along_x[1:] == along_x[:-1]).all(axis=1).any():
-        return
     _, first, counts = np.unique(nodes[used], axis=0, return_index=True, return_counts=True)
-    if counts.max() > 1:
-        place = nodes[used[first[np.argmax(counts)]]]
-        twins = used[(nodes[used] == place).all(axis=1)]
-        raise MisuseError(
-            name,
-            f"coincident nodes {_abbreviate(twins)} at {tuple(place.tolist())}",
-            "one node a place on each surface (merge them, or move one)",
-        )
+    place = nodes[used[first[np.argmax(counts)]]]
+    twins = used[(nodes[used] == place).all(axis=1)]
+    raise MisuseError(
+        name,
+        f"coincident nodes {_abbreviate(twins)} at {tuple(place.tolist())}",
+        "one node a place on each surface (merge them, or move one)",
+    )
 
 
 def _abbreviate(numbers: IntArray) -> str:

@@ -37,8 +37,9 @@ try:
     from hypothesis.database import choices_to_bytes
     from hypothesis.internal.conjecture.choice import ChoiceTemplate
     from hypothesis.internal.conjecture.data import ConjectureData
+    from hypothesis.strategies._internal.lazy import LazyStrategy
 except ImportError:  # pragma: no cover  # `find_difference` says so.
-    BuildContext = ConjectureData = object  # type: ignore[assignment, misc]
+    BuildContext = ConjectureData = LazyStrategy = object  # type: ignore[assignment, misc]
 
 Fails = Callable[[Case], bool]
 
@@ -145,7 +146,7 @@ class _Context(BuildContext):
 class _RandomChoices(ConjectureData):
     """Random choices. All integers of a narrow range are equally probable; hypothesis draws everything else.
 
-    `checked` has the strategies that are known to be valid, by their identity. It grows.
+    `checked` has the strategies that are known to be valid, by their identity, and what they are made of. It grows.
     """
 
     def __init__(self, random: Random, checked: dict[int, Any]) -> None:
@@ -163,15 +164,20 @@ class _RandomChoices(ConjectureData):
 
     def draw(self, strategy: Any, label: int | None = None, observe_as: str | None = None) -> Any:
         """Draw from a strategy, without a record of which choices belong to it."""
-        if id(strategy) not in self._checked:
+        checked = self._checked.get(id(strategy))
+        if checked is None:
             strategy.validate()
-            if not strategy.is_empty:
-                self._checked[id(strategy)] = strategy
-        if self.depth > _DEEPEST or id(strategy) not in self._checked:
+            if strategy.is_empty:
+                self.mark_invalid()
+            inner = strategy
+            while isinstance(inner, LazyStrategy):
+                inner = inner.wrapped_strategy
+            checked = self._checked[id(strategy)] = strategy, inner
+        if self.depth > _DEEPEST:
             self.mark_invalid()
         self.depth += 1
         try:
-            return strategy.do_draw(self)
+            return checked[1].do_draw(self)
         finally:
             self.depth -= 1
 

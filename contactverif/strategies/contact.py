@@ -13,6 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.strategies.panels import on_lattice
+from contactverif.strategies.parts import ends_of
 
 STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts as seen at this slope.
 SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
@@ -34,7 +35,7 @@ def covered_start(start: float, slave: Sequence[float], width: float) -> float:
 
     Half of its first or last segment fits into the width. The start stays if half of some segment is covered there.
     """
-    x = start + np.concatenate([[0.0], np.cumsum(slave)])
+    x = start + ends_of(slave)
     if any(True for _ in _covered_halves(x, 0.0, width)):
         return start
     if start >= 0:

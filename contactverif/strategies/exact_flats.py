@@ -25,6 +25,11 @@ from contactverif.strategies.translations import FINENESS, exact_shifts
 _TURNS: tuple[Turn, ...] = ((4, 3, 5), (12, -5, 13), (-3, 4, 5), (-5, -12, 13))
 _FINENESS_AT_REST = 40
 _COARSE = 12  # The bits of the places of a slave that is not parallel to the master.
+_ANY_TURN = st.sampled_from(_TURNS)
+_QUARTERS = st.integers(1, 7)
+_EXPONENTS, _COARSE_EXPONENTS = st.integers(6, 28), st.integers(6, 12)  # Of the penetration 2^-e.
+_RISES = st.sampled_from([1, -1, 2, -2, 3, -3])
+_SHIFTS = st.one_of(st.just(np.zeros(2)), exact_shifts())
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 
 
@@ -49,7 +54,7 @@ def linear_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case
 @st.composite
 def _exact_flat_cases(draw: DrawFn) -> Case:
     turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
-    depth = draw(st.integers(1, 7)) / 4 * 2.0 ** -draw(st.integers(6, 28))
+    depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
     penalty, seed, shift, offsets = _others(draw)
     fineness = FINENESS if shift.any() else _FINENESS_AT_REST
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
@@ -60,7 +65,7 @@ def _exact_flat_cases(draw: DrawFn) -> Case:
 @st.composite
 def _linear_flat_cases(draw: DrawFn) -> Case:
     turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
-    depth, rise = 2.0 ** -draw(st.integers(6, 12)), draw(st.sampled_from([1, -1, 2, -2, 3, -3]))
+    depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
     penalty, seed, shift, offsets = _others(draw)
     # Heights are places times a power of two, so that they need some bits more than places.
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
@@ -75,13 +80,13 @@ def _linear_flat_cases(draw: DrawFn) -> Case:
 
 
 def _turn_and_lengths(draw: DrawFn) -> tuple[Turn, list[int], list[int]]:
-    return draw(st.sampled_from(_TURNS)), draw(_LENGTHS), draw(_LENGTHS)
+    return draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
 
 
 def _others(draw: DrawFn) -> tuple[float, int, FloatArray, list[int]]:
     """Draw penalty, seed, translation and offsets."""
     penalty, seed = draw(penalties()), draw(seeds())
-    return penalty, seed, draw(st.one_of(st.just(np.zeros(2)), exact_shifts())), draw(OFFSETS)
+    return penalty, seed, draw(_SHIFTS), draw(OFFSETS)
 
 
 def _slave_and_master(

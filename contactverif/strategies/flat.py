@@ -23,7 +23,17 @@ from contactverif.contract.interface import Interface
 from contactverif.oracle.flat_answers import is_of_class
 from contactverif.strategies import given_interface
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
-from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, motions, penalties, seeds, shuffles
+from contactverif.strategies.parts import (
+    SEVENTHS,
+    depth_units,
+    ends_of,
+    lengths,
+    motions,
+    penalties,
+    repeat_cyclically,
+    seeds,
+    shuffles,
+)
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
 
@@ -97,7 +107,7 @@ def _places(
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
     """
-    slave_x = np.concatenate([[0.0], np.cumsum(np.tile(slave, repeats))])
+    slave_x = ends_of([*slave] * repeats)
     end = slave_x[-1] + right
     master_x = [-float(left)]
     for length in cycle(master) if refinement else master:
@@ -176,9 +186,9 @@ def _class_places(
     Where the master ends with the slave, their end nodes coincide. Where it goes beyond, one of its inner nodes may lie
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
     """
-    segments = np.tile(slave, repeats)
-    slave_x = np.concatenate([[0.0], np.cumsum(segments)])
-    deal = partial(np.resize, new_shape=len(slave_x))
+    segments = np.array([*slave] * repeats)
+    slave_x = ends_of([*slave] * repeats)
+    deal = partial(repeat_cyclically, count=len(slave_x))
     nodes = slave_x[deal(at_nodes) == 1]
     nodes = nodes[(nodes > slave_x[0]) & (nodes < slave_x[-1])] if inner else nodes
     middles = (slave_x[:-1] + segments / 2)[deal(at_middles)[:-1] == 1]

@@ -28,6 +28,7 @@ from contactverif.strategies.parts import (
     OFFSETS,
     depth_units,
     depths,
+    ends_of,
     lengths,
     motions,
     penalties,
@@ -93,7 +94,7 @@ class Broken:
         if not self.upright:
             line = extend_line(line, self.slave, length / 8)
             start = covered_start(start, self.slave, line[-1, 0] - length / 8)
-        x = start + np.concatenate([[0.0], np.cumsum(self.slave)])
+        x = start + ends_of(self.slave)
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)

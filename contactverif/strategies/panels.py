@@ -47,7 +47,7 @@ def on_lattice(values: FloatArray) -> FloatArray:
 
 def shortest(points: FloatArray) -> float:
     """Return the length of the shortest of the segments between consecutive points (n, 2)."""
-    return float(np.hypot(*np.diff(points, axis=0).T).min())
+    return float(np.hypot(*(points[1:] - points[:-1]).T).min())
 
 
 def assemble_panels(
@@ -98,10 +98,9 @@ def _offsets(panels: Sequence[Panel]) -> list[FloatArray]:
 
 def _segments(chains: Sequence[Chain], start: int) -> IntArray:
     """Return the segments (n, 2) of chains whose nodes are numbered on the walk, from `start`."""
-    segments = []
+    segments: list[tuple[int, int]] = []
     for chain in chains:
-        numbers = np.arange(start, start + len(chain.points))
-        pairs = np.column_stack([numbers, np.roll(numbers, -1)])
-        segments.append(pairs if chain.closed else pairs[:-1])
-        start += len(chain.points)
-    return np.vstack(segments)
+        numbers = [*range(start, start + len(chain.points))]
+        segments += pairwise([*numbers, start] if chain.closed else numbers)
+        start += len(numbers)
+    return np.array(segments)

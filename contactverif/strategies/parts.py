@@ -7,9 +7,10 @@ Strategies are cached because hypothesis validates each new one anew, which take
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import accumulate, cycle, islice
 from math import ldexp
 
 import numpy as np
@@ -124,9 +125,14 @@ def shifts(offsets: Sequence[int], count: int) -> FloatArray:
     return repeat_cyclically(offsets, 2 * count).reshape(-1, 2) / [7.0, 11.0] / 16
 
 
-def repeat_cyclically(values: Sequence[int], count: int) -> FloatArray:
+def repeat_cyclically(values: Sequence[float], count: int) -> FloatArray:
     """Return `count` floats, the values in turn."""
-    return np.resize(np.asarray(values, dtype=np.float64), count)
+    return np.array([*islice(cycle(values), count)], dtype=np.float64)
+
+
+def ends_of(lengths: Iterable[float]) -> FloatArray:
+    """Return 0 and the places (n + 1,) where segments of these lengths end, one behind the other."""
+    return np.array([*accumulate(lengths, initial=0.0)])
 
 
 @cache

@@ -17,6 +17,7 @@ from contactverif.strategies.parts import (
     OFFSETS,
     depth_units,
     depths,
+    ends_of,
     motions,
     penalties,
     repeat_cyclically,
@@ -59,7 +60,7 @@ class Ring:
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
         """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
-        shares = np.concatenate([[0.0], np.cumsum(weights)]) / sum(weights)
+        shares = ends_of(weights) / sum(weights)
         angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
         points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
         return points if inner else points[::-1]
@@ -73,6 +74,9 @@ def rings() -> SearchStrategy[Ring]:
     return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
 
 
+_RINGS = rings()
+
+
 def closed_cases() -> SearchStrategy[Case]:
     """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
     return _closed_cases()
@@ -80,7 +84,7 @@ def closed_cases() -> SearchStrategy[Case]:
 
 @st.composite
 def _closed_cases(draw: DrawFn) -> Case:
-    ring = replace(draw(rings()), degrees=360)
+    ring = replace(draw(_RINGS), degrees=360)
     motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
     interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)

@@ -15,7 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
-from contactverif.strategies.parts import motions, penalties, seeds, shuffles
+from contactverif.strategies.parts import ends_of, motions, penalties, repeat_cyclically, seeds, shuffles
 
 _SLAVE = st.lists(st.sampled_from([1.0, 1.5, 2.0]), min_size=1, max_size=3)
 _MASTER = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=3)
@@ -38,9 +38,9 @@ def sliding_cases(interface: Interface | None = None) -> SearchStrategy[Case] | 
 def _sliding_cases(draw: DrawFn) -> Case:
     steps = draw(_SLAVE)
     way = max(steps)
-    x = np.concatenate([[0.0], np.cumsum(steps)])
+    x = ends_of(steps)
     line = _bent_line(draw(_MASTER), draw(_SLOPES), -_MARGIN - draw(_PLACES) / 13, x[-1] + way + _MARGIN)
-    depth = np.resize(np.array(draw(_DEPTHS)) / 32, len(x))
+    depth = repeat_cyclically(draw(_DEPTHS), len(x)) / 32
     # The slave follows the master as it lies in the middle of the way.
     slave = np.column_stack([x, on_lattice(np.interp(x + way / 2, *line.T)) - depth])
     motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())

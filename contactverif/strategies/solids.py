@@ -23,15 +23,15 @@ from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.strategies.parts import Motion, lengths, motions, seeds
+from contactverif.strategies.parts import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
 
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
 INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
 POSITIONS = 200  # The number of positions of a punch that slides over one master segment.
 _LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
 _POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
-_CLOSED_TILTS = (1, 2, 3, 4, 5, 6)  # Thirteenths of the approach: all of the interface is in contact.
-_TILTS = (*_CLOSED_TILTS, 13, 16, 20, 26)  # From 13 on contact ends within the interface.
+_CLOSED_TILTS = st.sampled_from([1, 2, 3, 4, 5, 6])  # Thirteenths of the approach: all of the interface is in contact.
+_TILTS = st.sampled_from([1, 2, 3, 4, 5, 6, 13, 16, 20, 26])  # From 13 on contact ends within the interface.
 # Stiffer springs get a larger approach, so that gaps are far longer than the steps that Newton's method is judged by.
 _SMALLEST_STRAIN = {10.0: 6, 64.0: 5}  # The exponents of the smallest strain 2^-e.
 _STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
@@ -39,6 +39,11 @@ _OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # Left
 _PARTS = 8  # A master may end at this many parts of a slave segment.
 _PART = st.sampled_from([4, 2, 6, 1, 3, 5, 7])
 _WIDER = st.integers(1, 4)
+_VARIANTS = st.integers(0, len(VARIANTS) - 1)
+_SEVENTHS = st.integers(1, 6)
+# Distributed stiffness ε̂ h / E of tilted blocks and of those with a dead zone.
+_STIFF, _DEAD_STIFF = st.sampled_from([1.0, 10.0, 0.125, 64.0]), st.sampled_from([MODERATE_PENALTY, 1.0, 100.0])
+_TILTED_STRAINS = st.integers(5, 8)  # The exponents of a strain 2^-e.
 _MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
 
 
@@ -109,13 +114,13 @@ def _two_blocks(draw: DrawFn) -> Case:
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
     strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
-    x = _grid(slave)
+    x = ends_of(slave)
     return _scene(x, _cut(master, x[-1]), layers, young, poisson, motion, strain=strain).case(seed=seed)
 
 
 @st.composite
 def _variants(draw: DrawFn) -> Case:
-    variant = draw(st.integers(0, len(VARIANTS) - 1))
+    variant = draw(_VARIANTS)
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(seeds())
@@ -123,7 +128,7 @@ def _variants(draw: DrawFn) -> Case:
     degrees = draw(st.sampled_from(INCLINATIONS)) if VARIANTS[variant] == "inclined" else 0.0
     position = draw(st.integers(0, POSITIONS - 1)) if VARIANTS[variant] == "sliding" else 0
     beside = (draw(st.integers(1, 4)), draw(st.integers(1, 4))) if VARIANTS[variant] in ("sliding", "punch") else (0, 0)
-    x = _grid(slave)
+    x = ends_of(slave)
     master_x = _cut(master, x[-1] + sum(beside)) - beside[0]
     # A thin stiff body on a soft one bends at nearly no force, and its stress would be roundoff: height ≥ width/4.
     unit = float(x[-1]) / 4 if ratio != 1.0 else 1.0
@@ -144,7 +149,7 @@ def _variants(draw: DrawFn) -> Case:
 
 @st.composite
 def _dead_zones(draw: DrawFn) -> Case:
-    x, (left, right) = _grid(draw(_widths())), draw(_OVERHANGS)
+    x, (left, right) = ends_of(draw(_widths())), draw(_OVERHANGS)
     segments = np.diff(x)
     first = draw(st.integers(0, len(segments) - 1)) if left > 0 else 0
     last = draw(st.integers(first, len(segments) - 1)) if right > 0 else len(segments) - 1
@@ -156,24 +161,24 @@ def _dead_zones(draw: DrawFn) -> Case:
     layers = tuple([unit * height for height in draw(_LAYERS)] for _ in range(2))
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
     strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
-    stiff = draw(st.sampled_from([MODERATE_PENALTY, 1.0, 100.0]))
+    stiff = draw(_DEAD_STIFF)
     master_x = begin + _cut(master, float(end - begin))
     pressure = strain * min(young)
     return _scene(x, master_x, layers, young, poisson, motion, pressure=pressure, stiff=stiff).case(seed=seed)
 
 
 @st.composite
-def _tilted_blocks(draw: DrawFn, tilts: Sequence[int]) -> Case:
+def _tilted_blocks(draw: DrawFn, tilts: SearchStrategy[int]) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    exponent, motion, seed = draw(st.integers(5, 8)), draw(motions(furthest=16)), draw(seeds())
-    tilt, sevenths = draw(st.sampled_from(tilts)), draw(st.integers(1, 6))
-    stiff = draw(st.sampled_from([1.0, 10.0, 0.125, 64.0]))
+    exponent, motion, seed = draw(_TILTED_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    tilt, sevenths = draw(tilts), draw(_SEVENTHS)
+    stiff = draw(_STIFF)
     strain = 2.0 ** -min(exponent, _SMALLEST_STRAIN.get(stiff, exponent))
-    x = _grid(slave)
+    x = ends_of(slave)
     # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
-    moved = x + sevenths / 7 + np.resize([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4
+    moved = x + sevenths / 7 + repeat_cyclically([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4
     master_x = _cut(master, x[-1] + 4) - 1
     scene = _scene(moved, master_x, layers, young, poisson, motion, strain=strain, tilt=tilt / 13, stiff=stiff)
     return scene.case(seed=seed)
@@ -201,7 +206,7 @@ def _scene(
         place = Placing(tuple(placing.direction.tolist()), placing.shift, placing.scale)
     else:
         place = placing
-    slave_y, master_y = _grid(layers[0]), _grid(layers[1])
+    slave_y, master_y = ends_of(layers[0]), ends_of(layers[1])
     approach = None if pressure is not None else strain * (slave_y[-1] + master_y[-1])
     segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * place.scale
     return two_blocks(
@@ -214,10 +219,6 @@ def _scene(
         rigid_master=rigid_master,
         placing=place,
     )
-
-
-def _grid(segments: Sequence[float]) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum(segments)])
 
 
 def _cut(segments: Sequence[float], end: float) -> FloatArray:

@@ -22,11 +22,12 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
-from contactverif.strategies.parts import SEVENTHS, depth_units, lengths, penalties, seeds, shuffles
+from contactverif.strategies.parts import SEVENTHS, depth_units, ends_of, lengths, penalties, seeds, shuffles
 from contactverif.strategies.sketches import exact_turns
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
+_LEVEL_OR_TILTED = st.integers(0, 11)
 _SIGNS = st.sampled_from([1, -1])
 _QUARTERS = st.integers(1, 8)  # The depth of the shallow end, in quarters of a unit.
 _BENDS = st.sampled_from([0.3, 0.9, 0.6, 0.1, -0.1, -0.3])  # Turns of an end of the master in rad, down if positive.
@@ -70,7 +71,7 @@ def _tilted_cases(draw: DrawFn) -> Case:
 
 @st.composite
 def _bent_end_cases(draw: DrawFn) -> Case:
-    slope = draw(st.integers(0, 11)) * draw(_SIGNS) / 16
+    slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
     slave, master, reference, reach = _layout(draw, slope)
     ends = [_turn_end(corner, side, reach, draw(_BENDS)) for corner, side in ((master[0], 1.0), (master[-1], -1.0))]
     straight = np.vstack([master[0] + [reach, 0.0], master, master[-1] - [reach, 0.0]])
@@ -80,7 +81,7 @@ def _bent_end_cases(draw: DrawFn) -> Case:
 
 @st.composite
 def _cases_over_a_body(draw: DrawFn) -> Case:
-    slope = draw(st.integers(0, 11)) * draw(_SIGNS) / 16
+    slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
     slave, master, reference, reach = _layout(draw, slope)
     depth = reach * draw(_DISTANCES)
     behind = np.column_stack([np.linspace(master[0, 0] + reach, master[-1, 0] - reach, 4), np.full(4, -2 * depth)])
@@ -89,8 +90,8 @@ def _cases_over_a_body(draw: DrawFn) -> Case:
 
 def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return slave, flat master and slave reference in walking order, and a length larger than all depths."""
-    x = np.concatenate([[0.0], np.cumsum(draw(_SLAVE))])
-    shortest = float(np.diff(x).min())
+    x = ends_of(draw(_SLAVE))
+    shortest = float((x[1:] - x[:-1]).min())
     shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) * shortest
     depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
     # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.

@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.strategies.contact import sink_below
 from contactverif.strategies.panels import Panel, assemble_panels
-from contactverif.strategies.parts import depth_units, motions, penalties, repeat_cyclically, seeds
+from contactverif.strategies.parts import depth_units, ends_of, motions, penalties, repeat_cyclically, seeds
 
 _RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # The rise of a vertex above its neighbours, per length.
 _QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # Penetrations; 0 is a gap of exactly zero.
@@ -52,7 +52,7 @@ def _facing(
             master_x.append(slave_x[-1] + length * quarter / 4)
         slave_x.append(slave_x[-1] + length)
         master_x.append(slave_x[-1])
-    heights = np.resize(rises, len(master_x)) / 4
+    heights = repeat_cyclically(rises, len(master_x)) / 4
     return _below(np.array(slave_x), np.column_stack([master_x, heights]), quarters, unit / 4)
 
 
@@ -65,7 +65,7 @@ def _on_bisector(
 
     The slave is level, so that the bisector, which is upright, is met at right angles.
     """
-    x = np.concatenate([[0.0], np.cumsum([length for length, _ in segments])])
+    x = ends_of(length for length, _ in segments)
     x -= segments[0][0] * segments[0][1] / 4
     reach = 4 * x[-1]
     line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])

@@ -22,11 +22,13 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
-from contactverif.strategies.parts import OFFSETS, Motion, penalties, repeat_cyclically, seeds, shifts
+from contactverif.strategies.parts import OFFSETS, Motion, ends_of, penalties, repeat_cyclically, seeds, shifts
 
 FINENESS = 32  # Coordinates are multiples of 2^-32.
 FURTHEST = 20  # Translations reach 2^20.
 KINDS = ("plain", "turned", "slave tilted", "kinked", "overhang")
+_KINDS = st.sampled_from(KINDS)
+_DEPTHS = st.integers(7, 20)  # Exponents of the penetration 2^-e.
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 _QUARTERS = st.lists(st.integers(1, 8), min_size=1, max_size=4)
 _RISES = st.lists(st.sampled_from([1, -1, 2, -2, 0]), min_size=1, max_size=4)  # Eighths
@@ -49,9 +51,9 @@ def translated_cases(interface: Interface | None = None) -> SearchStrategy[Case]
 
 @st.composite
 def _translated_cases(draw: DrawFn) -> Case:
-    kind = draw(st.sampled_from(KINDS))
+    kind = draw(_KINDS)
     slave_lengths, master_lengths = draw(_LENGTHS), draw(_LENGTHS)
-    quarters, depth = draw(_QUARTERS), 2.0 ** -draw(st.integers(7, 20))
+    quarters, depth = draw(_QUARTERS), 2.0 ** -draw(_DEPTHS)
     rises = draw(_RISES) if kind == "kinked" else [0]
     tilt = draw(_TILTS) if kind == "slave tilted" else 0.0
     degrees = 0 if kind == "plain" else draw(_angles(at_least=int(kind == "turned")))
@@ -91,13 +93,13 @@ def _master_line(
     begin, end = (-1.0, width + 1.0) if covers else (0.5 if several else -1.0, width - 0.375)
     x = [begin, *(place for place in accumulate(lengths, initial=0) if begin < place < end), end]
     shift = repeat_cyclically(offsets, len(x)) / 13 / 16
-    heights = np.concatenate([[0.0], np.cumsum(np.resize(rises, len(x) - 1))]) / 8
+    heights = ends_of(repeat_cyclically(rises, len(x) - 1)) / 8
     return np.column_stack([x + shift, heights])
 
 
 def _slave_below(line: FloatArray, lengths: Sequence[int], offsets: Sequence[int]) -> FloatArray:
     """Return the slave's points (n, 2) on the master's line, or on the continuation of its end."""
-    x = np.concatenate([[0.0], np.cumsum(lengths)])
+    x = ends_of(lengths)
     x = x + shifts(offsets, len(x))[:, 0]
     return np.column_stack([x, np.interp(x, *line.T)])
 
