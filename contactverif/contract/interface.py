@@ -138,15 +138,7 @@ class Interface:
         for name, surface in (("slave", self.slave), ("master", self.master)):
             if not isinstance(surface, Surface):
                 raise MisuseError(name, f"a {type(surface).__name__}", "a Surface")
-        raw = as_array("nodes", self.nodes)
-        if raw.ndim != 2 or raw.shape[1] != 2:
-            raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
-        if raw.dtype.kind not in "fiu":
-            raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
-        nodes = freeze(raw, np.float64)
-        if not np.isfinite(nodes).all():
-            bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0]
-            raise MisuseError("nodes", f"node {bad} at {tuple(nodes[bad].tolist())}", "finite coordinates")
+        nodes = _check_nodes(self.nodes)
         object.__setattr__(self, "nodes", nodes)
         used_slave, used_master = self.slave.nodes, self.master.nodes
         n_slave = len(used_slave)
@@ -162,8 +154,8 @@ class Interface:
                 f"nodes {_abbreviate(used_master)}",
                 f"all node numbers behind the slave's, {n_slave} … {len(nodes) - 1}, each used",
             )
-        for name, surface, used in (("slave", self.slave, used_slave), ("master", self.master, used_master)):
-            _check_positions(name, surface, used, nodes)
+        _check_positions("slave", self.slave, nodes)
+        _check_positions("master", self.master, nodes)
 
     @classmethod
     def from_chains(cls, slave: ArrayLike, master: ArrayLike) -> Interface:
@@ -293,8 +285,23 @@ def _chain_order(neighbours: IntArray) -> IntArray:
     return np.array(order, dtype=np.int64)
 
 
-def _check_positions(name: str, surface: Surface, used: IntArray, nodes: FloatArray) -> None:
+def _check_nodes(values: ArrayLike) -> FloatArray:
+    """Return reference positions (n_nodes, 2), checked and read-only."""
+    raw = as_array("nodes", values)
+    if raw.ndim != 2 or raw.shape[1] != 2:
+        raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
+    if raw.dtype.kind not in "fiu":
+        raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
+    nodes = freeze(raw, np.float64)
+    if not np.isfinite(nodes).all():
+        bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0]
+        raise MisuseError("nodes", f"node {bad} at {tuple(nodes[bad].tolist())}", "finite coordinates")
+    return nodes
+
+
+def _check_positions(name: str, surface: Surface, nodes: FloatArray) -> None:
     """Check that the segments of a surface have a length and its nodes a place of their own."""
+    used = surface.nodes
     if len(set(map(tuple, nodes[used].tolist()))) == len(used):
         return
     ends = nodes[surface.segments]
