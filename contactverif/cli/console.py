@@ -37,37 +37,33 @@ PLAIN_STYLE = "dim"  # The style of the other results.
 _PIPE_WIDTH = 140  # The number of columns where no terminal says how many there are.
 
 
-class _Console(Console):
-    """A console that raises BrokenPipeError instead of ending the process.
+class QuietConsole(Console):
+    """A console for which words of a plugin are neither markup nor emoji, whatever brackets they hold."""
 
-    `cli.main` turns the error into an exit status.
-    """
+    def __init__(self, width: int | None = None, *, stderr: bool = False) -> None:
+        super().__init__(width=width, stderr=stderr, highlight=False, markup=False, emoji=False)
 
     def on_broken_pipe(self) -> NoReturn:
+        """Raise the error instead of ending the process; `cli.main` turns it into an exit status."""
         raise BrokenPipeError
 
 
 def show(content: RenderableType) -> None:
     """Print to standard output, as wide as the terminal, or wide enough where there is none."""
     width_is_known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    console = _console(None if width_is_known else _PIPE_WIDTH)
+    console = QuietConsole(None if width_is_known else _PIPE_WIDTH)
     console.print(_clean(console, content))
 
 
 def show_as_it_is(text: Text) -> None:
     """Print without folding a line: a drawing, or a command that is to be copied."""
-    console = _console(None)
+    console = QuietConsole()
     console.print(_clean(console, text, soft_wrap=True), soft_wrap=True)
 
 
 def say(words: str, *, to_stderr: bool = False) -> None:
     """Print words as they are, without folding a line."""
     typer.echo(printable(words), err=to_stderr)
-
-
-def _console(width: int | None) -> _Console:
-    """Return a console for which words of a plugin are neither markup nor emoji, whatever brackets they hold."""
-    return _Console(width=width, highlight=False, markup=False, emoji=False)
 
 
 def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False) -> Segments:

@@ -1,4 +1,4 @@
-"""The progress bar of a run. It is written to standard error, so that a table can be piped, and only to a terminal.
+"""The progress of a run on standard error: a line for each row that is judged, and on a terminal a bar below them.
 
 While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
 callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
+from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
 from contactverif.contract.foreign_text import one_line
+from contactverif.contract.result import Row
 from contactverif.run import scheduler
 
 _LONGEST = 120  # Characters beside the bar.
@@ -24,7 +27,7 @@ class Bar:
     """A progress bar, up as long as its `with` block lasts."""
 
     def __init__(self) -> None:
-        console = Console(stderr=True)
+        console = QuietConsole(stderr=True)
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
@@ -57,7 +60,16 @@ class Bar:
 
     def show_progress(self, step: scheduler.Progress) -> None:
         """Show how far a run is; the scheduler calls this after every case."""
+        if step.row is not None:
+            self._show_row(step.row)
         self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.count, step.planned)
+
+    def _show_row(self, row: Row) -> None:
+        words = f"{row.formulation} {row.property_id}: ", row.result, f", {row.judged}/{row.planned} judged"
+        reason = f": {row.reason}" if row.reason else ""
+        line = Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason)
+        with suppress(OSError):  # Without a reader the run goes on.
+            self._progress.console.print(line, soft_wrap=True)
 
     def update(self, description: str, n_finished: int, n_planned: int) -> None:
         """Show how many of the planned steps are finished, and what comes next.

@@ -131,10 +131,10 @@ class VerifyJob:
         )
         from contactverif.run.run_journal import Journal
 
-        plan = self.plan()
         if self.output is None:
-            yield Journal(plan, None, self.sources)
+            yield Journal()
             return
+        plan = self.plan()
         folder = journal_folder(self.files.paths[self.output.suffix.lower()])
         if not self.resumes and (aside := begin_journal(folder, plan, self.files.paths.values())):
             folder_aside = self.output.parent / aside

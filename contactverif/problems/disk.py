@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 from math import asin, atan, expm1, pi, tan
 
 import numpy as np
-from scipy.optimize import brentq
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
@@ -216,6 +215,8 @@ def grade(length: float, first: float, parts: int, steps: int) -> FloatArray:
 
     def excess(growth: float) -> float:
         return length * expm1(growth / parts) / expm1(growth) - first
+
+    from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
 
     growth = brentq(excess, 1e-9, 700.0)  # The parts grow by e^growth from first to last. expm1 overflows beyond 709.
     places = np.arange(steps + 1) / steps

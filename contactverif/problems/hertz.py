@@ -17,7 +17,6 @@ from math import pi, sqrt
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.optimize import brentq
 
 from contactverif.contract.arrays import FloatArray
 
@@ -85,6 +84,8 @@ def solve_winkler_contact(
 
     def missing(a: float) -> float:
         return _solve_width(a, radius, stiffness, penalty, terms).force - force
+
+    from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
 
     a = brentq(missing, widest * 1e-6, widest, xtol=1e-14 * widest, rtol=1e-14)
     return _solve_width(a, radius, stiffness, penalty, terms)

@@ -23,7 +23,6 @@ from math import inf, pi
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
@@ -145,6 +144,8 @@ class ShrinkFit:
         def excess(force: float) -> float:
             springs = force / (radii[index] + outwards * force) / penalty
             return sum(flexibilities) * force + springs - self.interference
+
+        from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
 
         force = brentq(excess, 0.0, 2 * self.pressure() * self.radius, xtol=1e-300, rtol=1e-14)
         return FiniteFit(force, force / (radii[index] + outwards * force))

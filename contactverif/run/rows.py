@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from math import sqrt
@@ -21,7 +21,7 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.problems.named_states import named_case
-from contactverif.run.draw import CaseSource, Sampling, check_names, draw_cases
+from contactverif.run.draw import CaseSource, Sampling, draw_cases
 from contactverif.run.judge import badness, verdict_over_all
 from contactverif.run.run_journal import OutcomeForm, decode_outcome, encode_outcome
 from contactverif.run.scheduler import CaseChunk
@@ -234,25 +234,7 @@ class OpenRow:
         return Shrinking(first, kind, least)
 
 
-def open_rows(
-    subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling, known: Mapping[str, str]
-) -> list[OpenRow | Row]:
-    """Return a row for each formulation and property: one whose cases are to be judged, or a complete one.
-
-    `known` has the reasons of known failures by property id.
-    """
-    sources = {sampling.group(question): sampling.source(question) for question in questions}
-    for source in sources.values():
-        if isinstance(source, tuple):
-            check_names(source)
-    return [
-        _open(subject, question, sources[sampling.group(question)], known.get(question.id, ""), sampling)
-        for subject in subjects
-        for question in questions
-    ]
-
-
-def _open(
+def open_row(
     subject: Subject, question: Property, source: CaseSource | None, known: str, sampling: Sampling
 ) -> OpenRow | Row:
     """Return a row whose cases are to be judged, or the row itself if there is nothing to judge."""

@@ -1,9 +1,9 @@
 """A run: the jobs of checking every property of some formulations, in the order in which they are handed out.
 
 Each formulation is called once before anything else. Then the cases of a strategy are drawn, once for all formulations
-and all properties that have this strategy, they are judged, and what failed is shrunk. All planned cases of a row are
-judged before one is shrunk, so that a failure ends nothing early. What the journal knows is not judged again, and a
-block of which it knows all is not drawn.
+and all properties that have this strategy, they are judged, and what failed is shrunk. Properties that solve bodies
+come last. All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early. What the
+journal knows is not judged again, and a block of which it knows all is not drawn.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, islice
+from itertools import chain, islice, product
 from operator import attrgetter
 from typing import TypeVar, get_args
 
@@ -24,14 +24,14 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
-from contactverif.contract.result import NotLoaded, Result, Run
+from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.rows import WHOLE, OpenRow, Shrinking, open_rows
+from contactverif.run.rows import WHOLE, OpenRow, Shrinking, open_row
 from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Notes
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 
@@ -94,7 +94,8 @@ def run(
         The failures that are shrunk: `"new"` those that neither the formulation nor `known` states, `"all"` or
         `"none"`. One that is not shrunk shows the witness, or the first case that clearly fails.
     progress : Callable[[Progress], None] | None
-        A function that is called after every case; with an executor, after every job.
+        A function that is called after every case; with an executor, after every job. It gets each row as soon as
+        its cases are judged, those of cheap properties first.
     executor : Executor | None
         Worker processes that do the jobs of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
         or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
@@ -175,9 +176,14 @@ class RunJobs:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
         self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
+        self._questions, self._known = questions, known
         self._share, self._shrink = share, shrink
         self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
-        self._rows = open_rows(subjects, questions, sampling, known)
+        self._rows: dict[tuple[str, str], OpenRow | Row] = {}
+        # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
+        self._groups: dict[tuple[str, bool], list[Property]] = {}
+        for question in sorted(questions, key=attrgetter("bodies")):
+            self._groups.setdefault(sampling.group(question), []).append(question)
         self._opposite_signs: set[str] = set()
 
     def first_calls(self) -> Iterator[Job]:
@@ -202,11 +208,15 @@ class RunJobs:
         provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
-        for row in self._open_rows:
+        while self._groups:
+            self._open_next()
+        keys = product((subject.name for subject in self._subjects), (question.id for question in self._questions))
+        rows = [self._rows[key] for key in keys]
+        for row in _of_kind(OpenRow, rows):
             if not row.complete:
                 row.stop(self._sampling.examples)
         return Run(
-            rows=tuple(row.row if isinstance(row, OpenRow) else row for row in self._rows),
+            rows=tuple(row.row if isinstance(row, OpenRow) else row for row in rows),
             not_loaded=not_loaded,
             provided={
                 subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects
@@ -221,18 +231,31 @@ class RunJobs:
             trouble = f"{self._journal.folder.name}: {self._journal.trouble}"
             raise MisuseError("--out", trouble, "a disk with room")
 
-    @property
-    def _open_rows(self) -> list[OpenRow]:
-        return _of_kind(OpenRow, self._rows)
+    def _open_next(self) -> list[OpenRow]:
+        """Open the rows of the next properties with the same cases, and return those whose cases are to be judged."""
+        group, questions = next(iter(self._groups.items()))
+        source = self._sampling.source(questions[0])
+        if isinstance(source, tuple):
+            draw.check_names(source)
+        rows = {
+            (subject.name, question.id): open_row(
+                subject, question, source, self._known.get(question.id, ""), self._sampling
+            )
+            for subject, question in product(self._subjects, questions)
+        }
+        self._rows |= rows
+        del self._groups[group]
+        return _of_kind(OpenRow, rows.values())
 
     def _parts(self) -> Iterator[Iterable[Job]]:
         """Yield the jobs of each part; those of a part are made when they are wanted."""
-        groups: dict[tuple[str, bool], list[OpenRow]] = {}
-        for row in self._open_rows:
-            if row.witness is not None and not row.witness_is_listed:
-                yield self._judge(row, CaseChunk([row.witness], WITNESS))
-            groups.setdefault(self._sampling.group(row.question), []).append(row)
-        for group in groups.values():
+        while self._groups:
+            group = self._open_next()
+            for row in group:
+                if row.witness is not None and not row.witness_is_listed:
+                    yield self._judge(row, CaseChunk([row.witness], WITNESS))
+            if not group:
+                continue
             if group[0].listed is not None:
                 for row in group:
                     yield from self._judge_list(row, group[0].listed)
@@ -342,6 +365,7 @@ class RunJobs:
         if not row.complete:
             return ()
         row.judge(on_scene=self._sampling.scene is not None)
+        self._report(replace(self._judging(row), row=row.row))
         goal = row.goal()
         if goal is None:
             return ()

@@ -38,6 +38,7 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
+from contactverif.contract.result import Row
 from contactverif.isolation.host import last_words, note_last_words
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.registry import installed_properties, load_property
@@ -66,6 +67,7 @@ class Progress:
     phase: Phase
     count: int  # The number of finished cases.
     planned: int
+    row: Row | None = None  # The row, once all its cases are judged.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

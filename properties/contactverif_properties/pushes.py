@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
-from scipy.optimize import nnls
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.case import Case
@@ -365,4 +364,6 @@ def _pull_past_ends(points: ContactPoints) -> FloatArray:
 
 def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:
     """Return the distance of a force from the sums of non-negative multiples of the normals."""
+    from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
+
     return float(nnls(np.unique(np.array(normals), axis=0).T, force)[1]) if normals else float(np.hypot(*force))

@@ -16,7 +16,7 @@ from contactverif.run import registry
 
 
 class Answer(NamedTuple):
-    """The exit status of a command, and its output."""
+    """The exit status of a command, and its output, without the rows on standard error."""
 
     status: int
     out: str
@@ -24,6 +24,12 @@ class Answer(NamedTuple):
 
 
 Ask = Callable[..., Answer]
+_ROW = re.compile(r"^\S+ [a-z0-9.-]+: [A-Za-z ]+, \d+/\d+ judged(: .*)?\n", re.MULTILINE)
+
+
+def without_rows(err: str) -> str:
+    """Return what a command said on standard error besides the rows of its run."""
+    return _ROW.sub("", err)
 
 
 def asking(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
@@ -41,7 +47,7 @@ def asking(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
             cli.main()
         out, err = capsys.readouterr()
         assert isinstance(exit_info.value.code, int)
-        return Answer(exit_info.value.code, out, err)
+        return Answer(exit_info.value.code, out, without_rows(err))
 
     return run_command
 

@@ -50,6 +50,24 @@ def test_who_has_seen_enough_may_close_the_pipe() -> None:
     assert (answer.returncode, answer.stderr) == (128 + signal.SIGPIPE, "")
 
 
+def test_rows_appear_on_standard_error_as_they_are_judged_and_those_with_bodies_last() -> None:
+    properties = [word for name in ("patch.flat.solve", "purity", "balance.*") for word in ("-p", name)]
+    answer = run_command("verify", "nts", *properties, "--examples", "2", "--seed", "1")
+    rows = [line.partition(":")[0] for line in answer.stderr.splitlines()]
+    assert rows == [f"nts {name}" for name in ("balance.force", "balance.moment", "purity", "patch.flat.solve")]
+    assert "nts balance.force: pass, 2/2 judged\n" in answer.stderr
+    assert "balance.force" in answer.stdout
+    assert "2/2 judged" not in answer.stdout
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_rows_that_nobody_can_read_do_not_stop_a_run() -> None:
+    with open("/dev/full", "w") as full:
+        answer = run_command("verify", "nts", "-p", "balance.*", "--examples", "2", "--seed", "1", stderr=full)
+    assert answer.returncode == 0
+    assert answer.stdout.endswith("Every promise is kept and every property was judged.\n")
+
+
 def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
     """A callback of the garbage collector drops the exception of the first Ctrl-C."""
     before = signal.getsignal(signal.SIGINT)

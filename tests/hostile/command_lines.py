@@ -272,7 +272,8 @@ def _judge(status: int | None, out: str, err: str) -> str:
         return "crash"
     if hidden_characters(out) or hidden_characters(err):
         return "control character"
-    return "several lines" if status == 2 and err.count("\n") > 1 else str(status)
+    others = [line for line in err.splitlines() if " judged" not in line]  # The rows of a run are no refusal.
+    return "several lines" if status == 2 and len(others) > 1 else str(status)
 
 
 def run_lines(number: int, seed: int, folder: Path, *, limit: float = TIME_LIMIT) -> Iterator[tuple[Line, Ending]]:

@@ -73,7 +73,7 @@ def facts(result: Run) -> list[bytes]:
 def test_one_process_and_two_give_the_same_results_bit_by_bit(pool: Executor) -> None:
     subjects = [load_formulation("vts-ppt"), load_formulation("nts")]
     alone, shared = (
-        run(subjects, load_properties(PROPERTY_IDS), examples=30, seed=3, executor=executor)
+        run(subjects, load_properties(PROPERTY_IDS), examples=30, seed=3, executor=executor, shrink="all")
         for executor in (None, pool)
     )
     assert facts(alone) == facts(shared)

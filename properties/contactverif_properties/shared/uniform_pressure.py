@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
@@ -131,7 +131,9 @@ def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
     state = case.with_multipliers(uniform)
     transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
     exact = consistent_forces(case, pressure).reshape(-1)
-    nearest: FloatArray = optimize.nnls(transfer, exact)[0]  # The formulation would release one below 0.
+    from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
+
+    nearest: FloatArray = nnls(transfer, exact)[0]  # The formulation would release one below 0.
     if subject.traits.rules.penalty != "nodal":
         uniform[~transfer.any(axis=0)] = 0.0
         errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]
