@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exact_projection import projection_cases
 from expected_verdicts import (
     COMPLEMENTARITY,
     CURVED_WAVE,
@@ -47,7 +48,6 @@ from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.oracle import projection_cases
 from contactverif.problems.named_states import named_case
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties, property_ids, standalone_names

@@ -5,7 +5,6 @@ the compiled geometry of plugins. Where it is affordable, the arithmetic is rati
 """
 
 from contactverif.oracle.exact_nearest import Nearest, NearSegment, nearest_segments
-from contactverif.oracle.exact_projection import Projection, project_point, projection_cases
 from contactverif.oracle.flat_answers import (
     is_of_class,
     nodal_spring_weights,
@@ -18,7 +17,6 @@ from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 __all__ = [
     "NearSegment",
     "Nearest",
-    "Projection",
     "default_points",
     "is_of_class",
     "is_of_kind",
@@ -26,8 +24,6 @@ __all__ = [
     "kink_margin",
     "nearest_segments",
     "nodal_spring_weights",
-    "project_point",
-    "projection_cases",
     "uniform_pressure_weights",
     "uniform_pressure_weights_exact",
 ]

@@ -1,7 +1,7 @@
 """The exact distance of a point from segments, and the nearest of them: the one search of this room.
 
 A point is (X, Y)/W on a lattice of integers, and the nodes are integers. So all that is compared are integers, and no
-root is taken. `exact_projection`, `exact_nearest` and `exact_choices` say in their own words what is found here.
+root is taken. `exact_nearest` and `exact_choices` say in their own words what is found here.
 
 Rule for the next editor: a tie is a tie. The search returns every segment at the least distance; which of them counts
 is decided by the smallest overshoot and then by the number, and whoever asks may decide otherwise.
@@ -37,21 +37,6 @@ def integers(values: FloatArray) -> tuple[list[int], int]:
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
 
 
-def subtract(a: Point, b: Point) -> Point:
-    """Return the vector from a to b."""
-    return b[0] - a[0], b[1] - a[1]
-
-
-def dot(a: Point, b: Point) -> int:
-    """Return a · b."""
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def cross(a: Point, b: Point) -> int:
-    """Return a × b, positive if b points to the left of a."""
-    return a[0] * b[1] - a[1] * b[0]
-
-
 def reach(segment: int, first: Point, second: Point, point: Point, weight: int = 1) -> Reach:
     """Return the relation of the point (X, Y)/W to a closed segment.
 
@@ -78,13 +63,6 @@ def nearest_of(reaches: Iterable[Reach]) -> list[Reach]:
             nearest = [other]
         elif excess == 0:
             nearest.append(other)
-    return nearest if len(nearest) < 2 else sorted(nearest, key=_overshoot_and_number)
-
-
-def squared_overshoot(near: Reach) -> Fraction:
-    """Return the square of the length by which the foot lies past the segment's end, times W²; 0 if it lies inside."""
-    return Fraction(near.past * near.past, near.squared)
-
-
-def _overshoot_and_number(near: Reach) -> tuple[Fraction, int]:
-    return squared_overshoot(near), near.segment
+    if len(nearest) < 2:
+        return nearest
+    return sorted(nearest, key=lambda near: (Fraction(near.past * near.past, near.squared), near.segment))

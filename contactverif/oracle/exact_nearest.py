@@ -1,7 +1,6 @@
 """The exact nearest segments to a point: every one of them, with the rationals that decide between them.
 
-`exact_projection` answers for a point of a slave segment and looks at every master segment. Here the point is free, and
-floats with a safe bound leave only the few segments that can be nearest, so that a long chain costs little.
+Floats with a safe bound leave only the few segments that can be nearest, so that a long chain costs little.
 
 Rule for the next editor: floats only leave out what cannot be nearest. Everything that is returned is exact.
 """

@@ -6,8 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_projection import project_point
 
-from contactverif import Interface, oracle
+from contactverif import Interface
 from contactverif.geometry.projection import PointOnSegment, arm, nearest_segment, search_tree
 
 
@@ -26,7 +27,7 @@ def test_the_nearest_segment_is_the_rational_one(seed: int) -> None:
     interface = Interface.from_chains(slave, master)
     x = interface.nodes.copy()
     for node in range(11):
-        expected = oracle.project_point(interface, x.ravel(), node, -1)
+        expected = project_point(interface, x.ravel(), node, -1)
         here = find_nearest(interface, x, x[node])
         assert here in expected.tied
         if len(expected.tied) == 1:

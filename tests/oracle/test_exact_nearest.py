@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_projection import project_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.oracle import nearest_segments, project_point
+from contactverif.oracle import nearest_segments
 from contactverif.strategies import general_cases, tie_cases
 
 CHECKED = settings(max_examples=100, derandomize=True, database=None, deadline=None)

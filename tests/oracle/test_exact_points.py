@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_projection import project_point
 
 from contactverif.contract.interface import Interface, Surface
-from contactverif.oracle import project_point
 from contactverif.oracle.exact_choices import closest_excess, seen_excess
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_points import (

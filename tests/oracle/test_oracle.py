@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_projection import project_point, projection_cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,8 +18,6 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle import (
     default_points,
     kink_margin,
-    project_point,
-    projection_cases,
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
 )

@@ -7,10 +7,10 @@ from math import hypot
 
 import numpy as np
 import pytest
+from exact_projection import project_point
 from subjects import load_subject
 
 from contactverif.contract.case import Case
-from contactverif.oracle import project_point
 from contactverif.problems.flat_states import (
     STEEP,
     TURNED,

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_projection import projection_cases
 from hypothesis import find, settings
 from hypothesis.strategies import SearchStrategy
 
@@ -16,7 +17,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import scene_of
-from contactverif.oracle import default_points, kink_margin, projection_cases
+from contactverif.oracle import default_points, kink_margin
 from contactverif.problems.blocks import is_uniform, overhangs
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import NAMED, named_case

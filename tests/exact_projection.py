@@ -1,7 +1,6 @@
 """Exact projections of slave points onto the master, and how areas of competence fall on it.
 
-Rule for the next editor: all arithmetic is in integers and rationals on the stored floats, so lengths appear as their
-squares. A tie is a tie here, and is reported as one.
+All arithmetic is in integers and rationals on the stored floats, so lengths appear as their squares. A tie is reported.
 """
 
 from __future__ import annotations
@@ -16,16 +15,27 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_distance import (
-    Point,
-    cross,
-    dot,
-    integers,
-    nearest_of,
-    reach,
-    squared_overshoot,
-    subtract,
-)
+from contactverif.oracle.exact_distance import Point, Reach, integers, nearest_of, reach
+
+
+def subtract(a: Point, b: Point) -> Point:
+    """Return the vector from a to b."""
+    return b[0] - a[0], b[1] - a[1]
+
+
+def dot(a: Point, b: Point) -> int:
+    """Return a · b."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def cross(a: Point, b: Point) -> int:
+    """Return a × b, positive if b points to the left of a."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def squared_overshoot(near: Reach) -> Fraction:
+    """Return the square of the length by which the foot lies past the segment's end; 0 if it lies inside."""
+    return Fraction(near.past * near.past, near.squared)
 
 
 @dataclass(frozen=True, slots=True)
