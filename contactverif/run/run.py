@@ -210,13 +210,9 @@ class RunJobs:
             provenance["drawing"] = reason
         while self._groups:
             self._open_next()
-        keys = product((subject.name for subject in self._subjects), (question.id for question in self._questions))
-        rows = [self._rows[key] for key in keys]
-        for row in _of_kind(OpenRow, rows):
-            if not row.complete:
-                row.stop(self._sampling.examples)
+        pairs = product(self._subjects, self._questions)
         return Run(
-            rows=tuple(row.row if isinstance(row, OpenRow) else row for row in rows),
+            rows=tuple(self._close(self._rows[subject.name, question.id]) for subject, question in pairs),
             not_loaded=not_loaded,
             provided={
                 subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects
@@ -224,6 +220,14 @@ class RunJobs:
             opposite_signs=tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs),
             provenance=provenance,
         )
+
+    def _close(self, row: OpenRow | Row) -> Row:
+        """Return a row as far as it is judged."""
+        if isinstance(row, Row):
+            return row
+        if not row.complete:
+            row.stop(self._sampling.examples)
+        return row.row
 
     def check_written(self) -> None:
         """Check that all outcomes are kept."""

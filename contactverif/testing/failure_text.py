@@ -16,11 +16,11 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
     lines.append(f"  The property: {question.summary}")
     if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
         lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
+    outcome = row.shrunk or row.first or row.witness
     if row.reason:
-        lines.append(f"  The {'worst case' if row.shrunk or row.first else 'reason'}: {row.reason}")
+        lines.append(f"  The {'reason' if outcome is row.witness else 'worst case'}: {row.reason}")
     if row.suspicion:
         lines.append(f"  {row.suspicion}")
-    outcome = row.shrunk or row.first or row.witness
     if outcome is not None:
         lines += _example(row, outcome)
     lines.append(f"  To run it again: {command}")
