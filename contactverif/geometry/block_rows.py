@@ -39,9 +39,12 @@ class Couplings(NamedTuple):
 
 def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> sparse.csr_array:
     """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows."""
-    size = 2 * n_nodes + n_multipliers
-    begins, ends, columns = _columns_of_rows(n_nodes + n_multipliers, *couplings)
-    n_entries = _count_entries(n_nodes, begins, ends, columns)
+    size, n_numbers = 2 * n_nodes + n_multipliers, n_nodes + n_multipliers
+    begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
+    members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
+    _write_members(begins, member_starts, members, ends, *couplings)
+    columns = np.empty(begins[-1], dtype=np.int32)
+    n_entries = _write_columns(columns, ends, n_nodes, begins, member_starts, members, *couplings)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
     _write_pattern(indptr, indices, n_nodes, begins, ends, columns)
@@ -51,16 +54,57 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> spars
 
 
 @compile_kernel
-def _columns_of_rows(
-    n_numbers: int, nodes: NumberArray, starts: IntArray, first_row: IntArray
-) -> tuple[IntArray, IntArray, NumberArray]:
-    """Return the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
+def _write_members(
+    begins: IntArray,
+    member_starts: IntArray,
+    members: NumberArray,
+    ends: IntArray,
+    nodes: NumberArray,
+    starts: IntArray,
+    first_row: IntArray,
+) -> None:
+    """Write the couplings of each column, members[member_starts[i]:member_starts[i + 1]], and room for rows' columns.
 
-    Columns are visited in ascending order, so they are sorted as they come, and one that comes twice was the last.
+    The columns of row i get the room from begins[i] to begins[i + 1]; `ends` is room for this function.
     """
-    begins, member_starts, members = _couplings_of_columns(n_numbers, nodes, starts, first_row)
-    columns, ends = np.empty(begins[-1], dtype=np.int32), begins[:-1].copy()
-    for column in range(n_numbers):
+    for coupling in range(len(first_row)):
+        start, stop = starts[coupling], starts[coupling + 1]
+        for place in range(start, stop):
+            member_starts[nodes[place] + 1] += 1
+        for place in range(first_row[coupling], stop):
+            begins[nodes[place] + 1] += stop - start
+    for number in range(len(ends)):
+        ends[number] = member_starts[number]
+        member_starts[number + 1] += member_starts[number]
+        begins[number + 1] += begins[number]
+    for coupling in range(len(first_row)):
+        for place in range(starts[coupling], starts[coupling + 1]):
+            members[ends[nodes[place]]] = coupling
+            ends[nodes[place]] += 1
+
+
+@compile_kernel
+def _write_columns(
+    columns: NumberArray,
+    ends: IntArray,
+    n_nodes: int,
+    begins: IntArray,
+    member_starts: IntArray,
+    members: NumberArray,
+    nodes: NumberArray,
+    starts: IntArray,
+    first_row: IntArray,
+) -> int:
+    """Write the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
+
+    Return the number of entries. Columns are visited in ascending order, so they are sorted as they come, and one that
+    comes twice was the last.
+    """
+    n_entries = 0
+    for row in range(len(ends)):
+        ends[row] = begins[row]
+    for column in range(len(ends)):
+        width = 2 if column < n_nodes else 1
         for member in range(member_starts[column], member_starts[column + 1]):
             coupling = members[member]
             for place in range(first_row[coupling], starts[coupling + 1]):
@@ -69,50 +113,8 @@ def _columns_of_rows(
                 if end == begins[row] or columns[end - 1] != column:
                     columns[end] = column
                     ends[row] = end + 1
-    return begins, ends, columns
-
-
-@compile_part
-def _couplings_of_columns(
-    n_numbers: int, nodes: NumberArray, starts: IntArray, first_row: IntArray
-) -> tuple[IntArray, IntArray, NumberArray]:
-    """Return room for the columns of each row, and the couplings of each column with the place where they begin."""
-    begins, member_starts = np.zeros(n_numbers + 1, dtype=np.int64), np.zeros(n_numbers + 1, dtype=np.int64)
-    for coupling in range(len(first_row)):
-        start, stop = starts[coupling], starts[coupling + 1]
-        for place in range(start, stop):
-            member_starts[nodes[place] + 1] += 1
-        for place in range(first_row[coupling], stop):
-            begins[nodes[place] + 1] += stop - start
-    for number in range(n_numbers):
-        member_starts[number + 1] += member_starts[number]
-        begins[number + 1] += begins[number]
-    members, ends = np.empty(len(nodes), dtype=np.int32), member_starts[:-1].copy()
-    for coupling in range(len(first_row)):
-        for place in range(starts[coupling], starts[coupling + 1]):
-            members[ends[nodes[place]]] = coupling
-            ends[nodes[place]] += 1
-    return begins, member_starts, members
-
-
-@compile_kernel
-def _count_entries(n_nodes: int, begins: IntArray, ends: IntArray, columns: NumberArray) -> int:
-    """Return the number of entries in the rows of all nodes and multipliers."""
-    n_entries = 0
-    for row in range(len(ends)):
-        width = _width(n_nodes, begins[row], ends[row], columns)
-        n_entries += 2 * width if row < n_nodes else width
+                    n_entries += 2 * width if row < n_nodes else width
     return n_entries
-
-
-@compile_part
-def _width(n_nodes: int, begin: int, end: int, columns: NumberArray) -> int:
-    """Return how many unknowns the nodes and multipliers columns[begin:end] have."""
-    width = 2 * (end - begin)
-    while end > begin and columns[end - 1] >= n_nodes:
-        width -= 1
-        end -= 1
-    return width
 
 
 @compile_kernel

@@ -1,7 +1,8 @@
 """The one place that knows the compiler: a typed `numba.njit`, so that mypy --strict still checks the kernels.
 
-Kernels are compiled at their first call and cached beside their source (`kernel_store`). `python_function` gives the
-Python function back, for coverage and for tests that change a line of it. Where the environment variable
+Kernels are compiled at their first call and cached beside their source (`kernel_store`). A kernel writes to arrays that
+Python made, and counts no references to them: so it has half the code, and a call inside it is free. `python_function`
+gives the Python function back, for coverage and for tests that change a line of it. Where the environment variable
 NUMBA_DISABLE_JIT is 1 nothing is compiled: kernels are hundreds of times slower, and take every type that numpy has. A
 formulation then computes in ``numpy.longdouble`` if its constants have the precision of its state, too
 (`match_precision`).
@@ -20,6 +21,7 @@ from contactverif.contract.arrays import Array, FloatArray
 from contactverif.kernel_store.checked_files import compile_stored
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_PART_OPTIONS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False}
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 ARE_KERNELS_COMPILED = not cast(Any, numba.config).DISABLE_JIT
@@ -29,21 +31,23 @@ TAKES_LONGDOUBLE = not ARE_KERNELS_COMPILED and bool(_IS_LONGER)
 
 
 def compile_kernel(function: Kernel) -> Kernel:
-    """Compile a function that Python calls; division by zero gives infinity or NaN, as in numpy."""
-    return cast(Kernel, compile_stored(function, nogil=True, **_OPTIONS))
+    """Compile a function that Python calls and that makes no array; division by zero gives infinity or NaN."""
+    return cast(Kernel, compile_stored(function, nogil=True, _nrt=False, **_OPTIONS))
+
+
+def compile_maker(function: Kernel) -> Kernel:
+    """Compile a function that Python or another one calls, and that makes arrays."""
+    return cast(Kernel, compile_stored(function, nogil=True, _nrt=True, **_OPTIONS))
 
 
 def compile_part(function: Kernel) -> Kernel:
-    """Compile a function that kernels call; without a wrapper for Python this takes a third of the time less."""
-    return cast(Kernel, _guard(compile_stored(function, no_cpython_wrapper=True, **_OPTIONS)))
+    """Compile a function that kernels call, which makes no array; its code is stored with the kernel's."""
+    return cast(Kernel, _guard(numba.njit(**_PART_OPTIONS)(function)))
 
 
 def compile_inline(function: Kernel) -> Kernel:
-    """Compile a function as `compile_part` does, and put its code wherever a kernel calls it.
-
-    A call that hands on an array costs two atomic operations. Use this for what a loop calls for each point.
-    """
-    return cast(Kernel, _guard(compile_stored(function, no_cpython_wrapper=True, forceinline=True, **_OPTIONS)))
+    """Compile a function as `compile_part` does, and put its code wherever a kernel calls it."""
+    return cast(Kernel, _guard(numba.njit(forceinline=True, **_PART_OPTIONS)(function)))
 
 
 class _Part(CPUDispatcher):

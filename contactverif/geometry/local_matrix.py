@@ -14,7 +14,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray, find_node
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_maker
 
 MOST_NODES = 12  # A coupling has at most so many nodes, and behind them at most one multiplier.
 WIDTH = 2 * MOST_NODES + 1
@@ -45,7 +45,7 @@ def share_couplings(n_numbers: int, nodes: NumberArray, starts: IntArray, parts:
     return [Share(owner, part, *parts[part], np.flatnonzero(touches[part])) for part in range(len(parts))]
 
 
-@compile_kernel
+@compile_maker
 def _divide_rows(
     n_numbers: int, nodes: NumberArray, starts: IntArray, begins: IntArray
 ) -> tuple[NumberArray, BoolArray]:

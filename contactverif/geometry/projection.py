@@ -29,7 +29,7 @@ from contactverif.geometry.compiled import compile_inline, compile_kernel, compi
 Vector = tuple[float, float]
 Tree = tuple[IntArray, FloatArray]
 
-_ROOT, _NONE = constant(1), constant(-1)
+_ROOT, _NO_BIT, _NONE = constant(1), constant(0), constant(-1)
 LEAF = 4  # The number of segments in a leaf of the tree.
 
 
@@ -90,17 +90,15 @@ def frame(x1: Vector, x2: Vector) -> tuple[float, Vector, Vector]:
 
 
 @compile_kernel
-def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
-    """Return the boxes (n_boxes, 4) of a binary tree over the segments: low x, low y, high x, high y.
+def _write_boxes(boxes: FloatArray, x: FloatArray, segments: IntArray, order: IntArray) -> None:
+    """Write the boxes (n_boxes, 4) of a binary tree over the segments: low x, low y, high x, high y.
 
     Box 1 holds all segments, and box i is halved into 2i and 2i + 1. The second half of the list are the leaves.
     """
-    n_leaves = 1
-    while n_leaves * LEAF < len(order):
-        n_leaves *= 2
-    boxes = np.empty((2 * n_leaves, 4))
-    boxes[:, :2] = np.inf
-    boxes[:, 2:] = -np.inf
+    n_leaves = len(boxes) // 2
+    for box in range(len(boxes)):
+        for axis in range(2):
+            boxes[box, axis], boxes[box, 2 + axis] = np.inf, -np.inf
     for place in range(len(order)):
         if order[place] < 0:  # padding
             continue
@@ -114,7 +112,6 @@ def _box_tree(x: FloatArray, segments: IntArray, order: IntArray) -> FloatArray:
         for axis in range(2):
             boxes[parent, axis] = min(boxes[2 * parent, axis], boxes[2 * parent + 1, axis])
             boxes[parent, 2 + axis] = max(boxes[2 * parent, 2 + axis], boxes[2 * parent + 1, 2 + axis])
-    return boxes
 
 
 @compile_part
@@ -165,12 +162,13 @@ def nearest_place(v: PointOnSegment, x: FloatArray, segments: IntArray, order: I
     p = arm(origin, v)
     n_leaves = len(boxes) // 2
     best, best_distance, best_past, best_place = _NONE, np.inf, np.inf, _NONE
-    waiting, distances = np.empty(64, dtype=np.int64), np.empty(64)  # the boxes still to open, one for each level
-    n_waiting, box, distance = 0, _ROOT, 0.0
+    # The last bit of `waiting` says whether the other half beside this box is still to be opened, the bit before it
+    # says so of the box above, and so on.
+    box, distance, waiting = _ROOT, 0.0, _NO_BIT
     while True:
         while box < n_leaves and distance <= best_distance:  # down to a leaf, the nearer box first
-            box, distance, waiting[n_waiting], distances[n_waiting] = _halves(box, origin, p, boxes)
-            n_waiting += 1
+            box, distance = _nearer_half(box, origin, p, boxes)
+            waiting = 2 * waiting + 1
         if distance <= best_distance:
             start = (box - n_leaves) * LEAF
             for place in range(start, min(start + LEAF, len(order))):
@@ -180,20 +178,20 @@ def nearest_place(v: PointOnSegment, x: FloatArray, segments: IntArray, order: I
                     distance, past = distance_to_segment(origin, p, x_1, x_2)
                     if is_nearer(distance, past, segment, best_distance, best_past, best):
                         best, best_distance, best_past, best_place = segment, distance, past, place
-        if n_waiting == 0:
+        if waiting == 0:
             return best_place
-        n_waiting -= 1
-        box, distance = waiting[n_waiting], distances[n_waiting]
+        while waiting & 1 == 0:
+            box, waiting = box >> 1, waiting >> 1
+        box, waiting = box ^ 1, waiting - 1
+        distance = distance_to_box(origin, p, boxes[box])
 
 
 @compile_inline
-def _halves(box: int, origin: Vector, p: Vector, boxes: FloatArray) -> tuple[int, float, int, float]:
-    """Return the nearer half of a box with its distance, and the farther one with its distance."""
+def _nearer_half(box: int, origin: Vector, p: Vector, boxes: FloatArray) -> tuple[int, float]:
+    """Return the nearer half of a box with its distance."""
     first, second = 2 * box, 2 * box + 1
     d_1, d_2 = distance_to_box(origin, p, boxes[first]), distance_to_box(origin, p, boxes[second])
-    if d_2 < d_1:
-        return second, d_2, first, d_1
-    return first, d_1, second, d_2
+    return (second, d_2) if d_2 < d_1 else (first, d_1)
 
 
 @compile_part
@@ -213,7 +211,9 @@ def is_nearer(distance: float, past: float, segment: int, best_distance: float, 
 def search_tree(surface: Surface, x: FloatArray) -> Tree:
     """Return the tree by which `nearest_segment` searches a surface at x (n_nodes, 2); it costs O(n) to make."""
     order = _pad_chains(surface)
-    return order, _box_tree(x, surface.segments, order)
+    boxes = np.empty((2 << max(0, (len(order) - 1) // LEAF).bit_length(), 4))
+    _write_boxes(boxes, x, surface.segments, order)
+    return order, boxes
 
 
 def _pad_chains(surface: Surface) -> IntArray:

@@ -27,11 +27,11 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, IntArray
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C
 
 
-@compile_kernel
+@compile_maker
 def forces(points: Array, pressure: Array, nodes: NumberArray, n_nodes: int) -> Array:
     """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_points), positive where the surfaces press.
 
@@ -53,7 +53,7 @@ def forces(points: Array, pressure: Array, nodes: NumberArray, n_nodes: int) -> 
     return totals
 
 
-@compile_kernel
+@compile_maker
 def sum_by_place(values: Array, places: IntArray, n_places: int) -> Array:
     """Return sums (n_states, n_places) of the values (n_states, n) that belong to the same of the places (n,)."""
     sums = np.zeros((values.shape[0], n_places), dtype=values.dtype)

@@ -21,7 +21,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
+from contactverif.geometry.compiled import compile_inline, compile_maker, compile_part
 from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
 from contactverif_mortar.strip_search import Region, collect_segments, holds, make_region, make_strip
@@ -37,7 +37,7 @@ def longest_of_chain(surface: Surface, x: FloatArray) -> FloatArray:
     return _longest_of_chain(x, surface.segments, surface.neighbours, surface.chain_order)
 
 
-@compile_kernel
+@compile_maker
 def _longest_of_chain(x: FloatArray, segments: IntArray, neighbours: IntArray, order: IntArray) -> FloatArray:
     """Return the lengths (n_segments,); a chain begins where the walk `order` does not go on to a neighbour."""
     lengths, begin, longest = np.empty(len(order)), 0, 0.0
@@ -52,7 +52,7 @@ def _longest_of_chain(x: FloatArray, segments: IntArray, neighbours: IntArray, o
     return lengths
 
 
-@compile_kernel
+@compile_maker
 def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[IntArray, IntArray]:
     """Return with which segment the normals at the two ends of each slave segment are averaged, −1 for none.
 
@@ -71,7 +71,7 @@ def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[Int
     return partners[0], partners[1]
 
 
-@compile_kernel
+@compile_maker
 def find_cells(
     x: FloatArray,
     slave: IntArray,
@@ -131,7 +131,7 @@ def find_cells(
     )
 
 
-@compile_part
+@compile_maker
 def _lengthen(values: Array, room: int) -> Array:
     """Return an array with more room behind the same values."""
     longer = np.empty(room, dtype=values.dtype)

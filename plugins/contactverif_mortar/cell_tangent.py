@@ -16,7 +16,7 @@ from scipy import sparse
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block, zero_matrix
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
@@ -54,7 +54,7 @@ def touching_points(interface: Interface, cells: Cells, rule: Quadrature, x: Flo
     return touching
 
 
-@compile_kernel
+@compile_maker
 def _write_touching(x: FloatArray, segments_and_cells: Fields, rule: Fields, touching: BoolArray) -> None:
     """Write whether each point touches."""
     lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
@@ -94,7 +94,7 @@ def springs_at_points(
     return forces, matrix
 
 
-@compile_kernel
+@compile_maker
 def _nodes_of_cells(
     slave: IntArray, master: IntArray, cell_slave: IntArray, cell_master: IntArray, active: BoolArray
 ) -> NumberArray:
@@ -120,7 +120,7 @@ def _any_active(active: BoolArray, begin: int, count: int) -> bool:
     return False
 
 
-@compile_kernel
+@compile_maker
 def _add_springs(
     x: FloatArray,
     segments_and_cells: Fields,

@@ -20,7 +20,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_maker
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -137,7 +137,7 @@ def _couple(interface: Interface, cells: Cells, facing: IntArray) -> Couplings:
     return Couplings(nodes.astype(np.int32).ravel(), starts, starts[:-1] + 4)
 
 
-@compile_kernel
+@compile_maker
 def _add_springs(
     nodes: NumberArray,
     starts: IntArray,
@@ -157,7 +157,7 @@ def _add_springs(
                 add_block(indptr, indices, data, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
 
 
-@compile_kernel
+@compile_maker
 def _pair_nodes(
     x: FloatArray,
     n_nodes: int,
@@ -182,7 +182,7 @@ def _pair_nodes(
     return nearest, active
 
 
-@compile_kernel
+@compile_maker
 def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
     """Return the gaps (n_states, n_slave_nodes) of the slave nodes to the lines of their master segments."""
     gaps = np.empty((x.shape[0], len(nearest)), dtype=x.dtype)
@@ -194,7 +194,7 @@ def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
     return gaps
 
 
-@compile_kernel
+@compile_maker
 def _node_gap_rows(x: FloatArray, master: IntArray, nearest: IntArray) -> FloatArray:
     """Return Δg = n·(Δx_V − (1−ξ)Δx_1 − ξΔx_2) of each slave node, (n_slave_nodes, 3 nodes V, 1, 2, 2)."""
     d_gaps = np.empty((len(nearest), 3, 2))

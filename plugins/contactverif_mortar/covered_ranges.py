@@ -21,7 +21,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_kernel, match_precision
+from contactverif.geometry.compiled import compile_maker, match_precision
 from contactverif.geometry.projection import frame, node
 from contactverif_mortar.cell_geometry import (
     D_WEIGHT,
@@ -98,7 +98,7 @@ class Ranges:
         )
 
 
-@compile_kernel
+@compile_maker
 def _find(
     x: FloatArray, slave: IntArray, master: IntArray, cells: Fields, places: FloatArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
@@ -131,7 +131,7 @@ def _find(
     return table[0], table[1], table[2], table[3], table[4]
 
 
-@compile_kernel
+@compile_maker
 def _points(x: Array, segments: Fields, ranges: Fields, rule: Fields) -> Array:
     """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
     reference_length, slave, master = segments
@@ -157,7 +157,7 @@ def _points(x: Array, segments: Fields, ranges: Fields, rule: Fields) -> Array:
     return points
 
 
-@compile_kernel
+@compile_maker
 def _gains(x: FloatArray, segments: Fields, ranges: Fields, rule: Fields) -> FloatArray:
     """Compute the Δ (n_points, 5, 6, 2) of the points at positions x (n_nodes, 2)."""
     reference_length, slave, master = segments

@@ -4,7 +4,7 @@
 computes every real number from the positions: `points` of many states, real or complex, `gains` of one real state.
 
 A kernel gets the fields of a named tuple of arrays as a plain tuple and unpacks them first: numba reads that in half
-the time, and an array that is read through a tuple inside a loop costs two atomic operations each time.
+the time.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part, match_precision
+from contactverif.geometry.compiled import compile_inline, compile_maker, compile_part, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
@@ -189,7 +189,7 @@ class Quadrature:
         )
 
 
-@compile_kernel
+@compile_maker
 def any_end(nodes: BoolArray, slave: IntArray, cell_slave: IntArray) -> BoolArray:
     """Return for each cell whether one of the ends of its slave segment is among some nodes, given by mask."""
     selection = np.empty(len(cell_slave), dtype=np.bool_)
@@ -199,7 +199,7 @@ def any_end(nodes: BoolArray, slave: IntArray, cell_slave: IntArray) -> BoolArra
     return selection
 
 
-@compile_kernel
+@compile_maker
 def _local_nodes(
     slave: IntArray,
     master: IntArray,
@@ -253,7 +253,7 @@ def write_point(
     point[NORMAL_X], point[NORMAL_Y] = n
 
 
-@compile_kernel
+@compile_maker
 def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
     """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
     reference_length, slave, master = segments
@@ -276,7 +276,7 @@ def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
     return points
 
 
-@compile_kernel
+@compile_maker
 def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: Fields) -> FloatArray:
     """Compute the Δ (n_points, 5, n_local, 2) of the points at positions x (n_nodes, 2)."""
     reference_length, slave, master = segments

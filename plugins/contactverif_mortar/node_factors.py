@@ -15,7 +15,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray
-from contactverif.geometry.compiled import compile_kernel
+from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar.node_groups import RowGroups
 
 
@@ -91,7 +91,7 @@ class NodeRows(NamedTuple):
         return rest
 
 
-@compile_kernel
+@compile_maker
 def _add_products(
     first_row: int,
     end_row: int,

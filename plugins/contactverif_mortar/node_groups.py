@@ -13,10 +13,11 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.geometry.block_rows import Couplings, NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
+from contactverif.geometry.compiled import compile_inline, compile_maker, constant
 
 LARGE_GROUP = 64  # Groups of more nodes count in the estimate of a product's size; smaller ones overlap too much.
 MOST_BYTES = 2**35  # 32 GiB: more than a workstation spares for one matrix.
+_ONE = constant(1)
 BYTES_OF_ENTRY = 12  # A float64 and an int32.
 
 
@@ -67,7 +68,7 @@ def check_product(starts: IntArray) -> None:
         )
 
 
-@compile_kernel
+@compile_maker
 def _first_of_each(carrier: IntArray, n_segments: int) -> IntArray:
     """Return where the cells of each slave segment begin (n_segments + 1,); they are in the order of the segments."""
     first = np.zeros(n_segments + 1, dtype=np.int64)
@@ -78,7 +79,7 @@ def _first_of_each(carrier: IntArray, n_segments: int) -> IntArray:
     return first
 
 
-@compile_kernel
+@compile_maker
 def _group_nodes(
     n_nodes: int, active: BoolArray, slave: IntArray, local: NumberArray, first: IntArray, dual: bool
 ) -> tuple[NumberArray, IntArray]:
@@ -109,7 +110,7 @@ def _group_nodes(
     return nodes[:count].copy(), starts
 
 
-@compile_part
+@compile_maker
 def _segments_of_rows(active: BoolArray, slave: IntArray, dual: bool) -> IntArray:
     """Return the slave segments to which each row belongs (n_rows, 2), −1 for none."""
     n_slave = len(active)
@@ -127,16 +128,18 @@ def _segments_of_rows(active: BoolArray, slave: IntArray, dual: bool) -> IntArra
 
 @compile_inline
 def _sort(numbers: NumberArray, start: int, stop: int) -> None:
-    """Sort a part of an array in place; short parts, which are most, without an allocation."""
-    if stop - start > 32:
-        numbers[start:stop] = np.sort(numbers[start:stop])
-        return
-    for i in range(start + 1, stop):
-        number, place = numbers[i], i
-        while place > start and numbers[place - 1] > number:
-            numbers[place] = numbers[place - 1]
-            place -= 1
-        numbers[place] = number
+    """Sort a part of an array in place, by Shell's method."""
+    step = _ONE
+    while 3 * step < stop - start:
+        step = 3 * step + 1
+    while step > 0:
+        for i in range(start + step, stop):
+            number, place = numbers[i], i
+            while place >= start + step and numbers[place - step] > number:
+                numbers[place] = numbers[place - step]
+                place -= step
+            numbers[place] = number
+        step //= 3
 
 
 @compile_inline

@@ -23,7 +23,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, zero_matrix
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
@@ -71,7 +71,7 @@ def weigh(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, d
     return Weights(areas, with_gap, shapes)
 
 
-@compile_kernel
+@compile_maker
 def _weigh(
     x: FloatArray,
     segments_and_cells: Fields,
@@ -170,7 +170,7 @@ def node_rows(
     return NodeRows(forces, matrix, groups, left, right)
 
 
-@compile_kernel
+@compile_maker
 def _add_rows(
     x: FloatArray,
     segments_and_cells: Fields,
@@ -282,7 +282,7 @@ def _write_rows(
             right[place + 1] += share * y
 
 
-@compile_kernel
+@compile_maker
 def add_chains(
     slave: IntArray, chain: FloatArray, divisor: FloatArray, nodes: NumberArray, starts: IntArray, right: FloatArray
 ) -> None:

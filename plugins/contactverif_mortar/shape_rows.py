@@ -18,7 +18,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_block
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Fields
@@ -88,7 +88,7 @@ def add_shaped_rows(
     return left, right
 
 
-@compile_kernel
+@compile_maker
 def _add_points(
     first_point: int,
     n_q: int,

@@ -30,7 +30,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_kernel
+from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_maker
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.cell_forces import Shapes, integrals
@@ -195,7 +195,7 @@ def _couple(active: BoolArray, half_passes: list[_HalfPass], groups: list[RowGro
     return Couplings(nodes, starts, np.concatenate([parts[0][2], parts[1][2] + shift]))
 
 
-@compile_kernel
+@compile_maker
 def _couple_half_pass(
     active: BoolArray, slave: IntArray, nodes: NumberArray, starts: IntArray
 ) -> tuple[NumberArray, IntArray, IntArray]:

@@ -17,9 +17,7 @@ Rules for the next editor:
 1. All decisions are in the pairing (`walk.Areas`). Nothing here compares real numbers.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
 3. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `eq6` says why.
-4. A function that is called for each virtual slave node takes numbers, not arrays, wherever it can: passing an array
-   costs two atomic operations.
-5. `box3_tangent` differentiates this file line by line. Change both.
+4. `box3_tangent` differentiates this file line by line. Change both.
 
 Source: Zavarise & De Lorenzis (2009), Box 3, Eqs. 6, 8, 9.
 """
@@ -79,16 +77,24 @@ class VirtualSlaveNode(NamedTuple):
     g: float  # the gap, negative in penetration
 
 
-@compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields) -> tuple[Array, Array]:
     """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
 
     `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
     """
+    forces, rows = np.zeros(x.shape, x.dtype), np.zeros(multipliers.shape, x.dtype)
+    _add_residual(forces, rows, x, multipliers, surfaces, areas, options)
+    return forces, rows
+
+
+@compile_kernel
+def _add_residual(
+    forces: Array, rows: Array, x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields
+) -> None:
+    """Add forces and constraint rows to arrays of zeros."""
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     n, transmission, current_area, penalty = options
-    forces, rows = np.zeros_like(x), np.zeros_like(multipliers)
     has_multipliers = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
         now, r = x[state], forces[state]
@@ -125,7 +131,6 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
                 if j == area.last:
                     break
                 j = neighbours[j, 1]
-    return forces, rows
 
 
 @compile_part

@@ -16,7 +16,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, IntArray
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part, constant
+from contactverif.geometry.compiled import compile_inline, compile_kernel, constant
 from contactverif.geometry.local_matrix import MOST_NODES, NO_NODE, insert_node
 from contactverif_nts.box3 import Area
 from contactverif_nts.eq6 import Fields
@@ -37,18 +37,35 @@ class Box3Couplings(NamedTuple):
     segment: IntArray  # (n_couplings,), the master segment, or WHOLE
 
 
-@compile_kernel
 def list_couplings(surfaces: Fields, areas: Fields, n: int, group: int, first_multiplier: int) -> Fields:
     """List the couplings of all virtual slave nodes, n on each slave segment, as the fields of `Box3Couplings`.
 
     A coupling has at most `group` of them. The number of the first multiplier is NO_NODE for a penalty.
     """
+    _, first, last, _, _, _, _, _, active = areas
+    n_most, n_entries = _bound_couplings(surfaces[3], first, last, active, first_multiplier != NO_NODE)
+    nodes, starts = np.empty(n_entries, dtype=np.int32), np.empty(n_most + 1, dtype=np.int64)
+    of_couplings = (*np.empty((3, n_most), dtype=np.int64),)
+    count, place = _write_couplings(nodes, starts, of_couplings, surfaces, areas, n, group, first_multiplier)
+    return nodes[:place], starts[: count + 1], *[each[:count] for each in of_couplings]
+
+
+@compile_kernel
+def _write_couplings(
+    nodes: NumberArray,
+    starts: IntArray,
+    of_couplings: Fields,
+    surfaces: Fields,
+    areas: Fields,
+    n: int,
+    group: int,
+    first_multiplier: int,
+) -> tuple[int, int]:
+    """Write the fields of `Box3Couplings`; return the number of couplings, and of the entries of `nodes`."""
     _, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, _, _, active = areas
+    first_point, end_point, segment = of_couplings
     has_multipliers = first_multiplier != NO_NODE
-    n_most, n_entries = _bound_couplings(neighbours, first, last, active, has_multipliers)
-    nodes, starts = np.empty(n_entries, dtype=np.int32), np.empty(n_most + 1, dtype=np.int64)
-    first_point, end_point, segment = np.empty((3, n_most), dtype=np.int64)
     coupling, place, starts[0] = 0, _BEGIN, 0
     for begin in range(0, len(active), group):
         i, end, j = begin, begin + group, WHOLE
@@ -71,13 +88,7 @@ def list_couplings(surfaces: Fields, areas: Fields, n: int, group: int, first_mu
                 first_point[coupling], end_point[coupling], segment[coupling] = i, end, j
                 starts[coupling + 1], coupling = place, coupling + 1
             i, end, j = _next_points(i, end, j, last, neighbours)
-    return (
-        nodes[:place],
-        starts[: coupling + 1],
-        first_point[:coupling],
-        end_point[:coupling],
-        segment[:coupling],
-    )
+    return coupling, place
 
 
 @compile_inline
@@ -128,7 +139,7 @@ def _insert_core(
     return place
 
 
-@compile_part
+@compile_kernel
 def _bound_couplings(
     neighbours: IntArray, first: IntArray, last: IntArray, active: BoolArray, has_multipliers: bool
 ) -> tuple[int, int]:

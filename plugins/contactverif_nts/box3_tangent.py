@@ -56,7 +56,6 @@ from contactverif_nts.box3_gains import (
 from contactverif_nts.eq6 import Fields
 
 
-@compile_kernel
 def add_forces_and_tangent(
     rows: FloatArray,
     matrix: Fields,
@@ -72,6 +71,25 @@ def add_forces_and_tangent(
 
     `matrix` has indptr, indices and data of a matrix with the pattern of the couplings.
     """
+    slots, runs = np.empty(len(x), dtype=np.int64), np.empty(MOST_NODES, dtype=np.int32)
+    room = slots, runs, np.empty((WIDTH, WIDTH)), np.empty(WIDTH)
+    _sweep(rows, matrix, x, multipliers, surfaces, areas, options, couplings, share, room)
+
+
+@compile_kernel
+def _sweep(
+    rows: FloatArray,
+    matrix: Fields,
+    x: FloatArray,
+    multipliers: FloatArray,
+    surfaces: Fields,
+    areas: Fields,
+    options: Fields,
+    couplings: Fields,
+    share: Fields,
+    room: Fields,
+) -> None:
+    """Do so, with room for the first unknowns of nodes in a coupling, its runs, its matrix and its forces."""
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     n, transmission, current_area, penalty = options
@@ -79,8 +97,7 @@ def add_forces_and_tangent(
     owner, part, begin, end, others = share
     indptr, indices, data = matrix
     has_multipliers = len(multipliers) > 0
-    slots, runs = np.empty(len(x), dtype=np.int64), np.empty(MOST_NODES, dtype=np.int32)
-    local, push = np.zeros((WIDTH, WIDTH)), np.zeros(WIDTH)
+    slots, runs, local, push = room
     for number in range(end - begin + len(others)):
         coupling = begin + number if number < end - begin else others[number - (end - begin)]
         start, n_coupled = starts[coupling], starts[coupling + 1] - starts[coupling]

@@ -15,8 +15,7 @@ Rules for the next editor:
 1. `pair` makes all decisions and returns integers and booleans. `residual` decides nothing.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
 3. A kernel gets the fields of `Surfaces`, `Points` and `Options` as plain tuples and unpacks them in its first lines.
-   numba reads a plain tuple in half the time of a named one, and an array that is read through a tuple inside a loop
-   costs two atomic operations each time. Named tuples of numbers, such as `Contact`, are free.
+   numba reads a plain tuple in half the time of a named one. Named tuples of numbers, such as `Contact`, are free.
 4. `eq6_tangent` differentiates this file line by line. Change both.
 
 Source: Zavarise & De Lorenzis (2009), Eq. 6.
@@ -165,16 +164,24 @@ def is_pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> boo
     return bool(multipliers[i] - penalty * g >= 0)
 
 
-@compile_kernel
 def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields) -> tuple[Array, Array]:
     """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
 
     `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
     """
+    forces, rows = np.zeros(x.shape, x.dtype), np.zeros(multipliers.shape, x.dtype)
+    _add_residual(forces, rows, x, multipliers, surfaces, points, options)
+    return forces, rows
+
+
+@compile_kernel
+def _add_residual(
+    forces: Array, rows: Array, x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields
+) -> None:
+    """Add forces and constraint rows to arrays of zeros."""
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
     places, weights, area_from, penalty = options
-    forces, rows = np.zeros_like(x), np.zeros_like(multipliers)
     has_multipliers = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
         now, r = x[state], forces[state]
@@ -199,7 +206,6 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, opt
             push(r, v.b, (1 + v.c) / 2 * f, v.normal)
             push(r, v.node_1, -(1 - v.xi) * f, v.normal)
             push(r, v.node_2, -v.xi * f, v.normal)
-    return forces, rows
 
 
 @compile_part

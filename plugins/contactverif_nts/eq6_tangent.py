@@ -15,7 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_column, add_entry, add_row
-from contactverif.geometry.compiled import compile_inline, compile_kernel
+from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import Vector, frame, node
 from contactverif_nts.eq6 import CURRENT, NODAL, REFERENCE, Contact, Fields, area_length, contact_at
 from contactverif_nts.turned_force import ZERO, add_turned_force, plus, times
@@ -45,7 +45,7 @@ class Force(NamedTuple):
     t_other: Vector  # the same of the other slave segment
 
 
-@compile_kernel
+@compile_maker
 def add_tangent(
     indptr: AnyIntArray,
     indices: AnyIntArray,
@@ -181,7 +181,7 @@ def _gains(k: int, v: Contact, force: Force) -> Gains:
     return Gains(omega, g, xi, area)
 
 
-@compile_kernel
+@compile_maker
 def list_couplings(
     surfaces: Fields, points: Fields, places: FloatArray, area_from: int, first_multiplier: int
 ) -> tuple[NumberArray, IntArray, IntArray]:
