@@ -79,8 +79,9 @@ class RemoteFormulation(Prefetching):
 
     def __init__(self, make: RemoteFactory, penalty: float) -> None:
         self._make, self._penalty, self.traits = make, penalty, make.traits
+        counted = self.traits.rules.enforcement == "multiplier"  # Else its process checks that there are none.
         for part in (*OPTIONAL_PARTS, *FAST_PARTS, "n_multipliers"):
-            if part not in make.provides:
+            if part not in make.provides or (part == "n_multipliers" and not counted):
                 setattr(self, part, None)
         self.warm = False  # True: what short calls take is measured when they are repeated.
         self._number, self._started = 0, -1

