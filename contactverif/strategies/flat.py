@@ -75,11 +75,7 @@ def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> C
     slide, shuffle = draw(_SLIDES), draw(shuffles())
     penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
     interface, z, along = assemble_panels([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
-    parameters = {
-        "penetration": np.array(penetration * motion.scale),
-        "along": along,
-        "direction": motion.direction,
-    }
+    parameters = {"penetration": np.array(penetration * motion.scale), "along": along, "direction": motion.direction}
     return Case(interface, z, penalty, parameters, seed)
 
 
@@ -92,13 +88,7 @@ def _panels() -> SearchStrategy[list[Sides]]:
 
 
 def _places(
-    refinement: int,
-    repeats: int,
-    slave: Sequence[float],
-    master: Sequence[float],
-    left: int,
-    right: int,
-    sevenths: int,
+    refinement: int, repeats: int, slave: Sequence[float], master: Sequence[float], left: int, right: int, sevenths: int
 ) -> Sides:
     """Return the ascending x of the nodes of a slave chain and of a master chain that covers it.
 

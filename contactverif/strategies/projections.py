@@ -72,9 +72,7 @@ def cases_of_kind(kind: str) -> SearchStrategy[Case]:
 def projections_by_kind(interface: None = None) -> dict[str, SearchStrategy[Case]]: ...
 @overload
 def projections_by_kind(interface: Interface | None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]: ...
-def projections_by_kind(
-    interface: Interface | None = None,
-) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
+def projections_by_kind(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
     """Return a strategy for each kind, so that each gets its share of a run; one strategy for a mesh of the user."""
     return {kind: cases_of_kind(kind) for kind in KINDS} if interface is None else _states(interface)
 

@@ -27,7 +27,7 @@ from contactverif_paper.figure_style import (
     plot_series,
     use_round_ticks,
 )
-from contactverif_paper.paper_columns import Column, Formulations, axis_column, values_column
+from contactverif_paper.paper_columns import Column, Formulations, series_columns
 from contactverif_paper.paper_formulations import BALANCED, STS, VTS_PPT, PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
@@ -42,21 +42,17 @@ _NEAR = 2.0**-40  # The distance to either side of the jump over the slave's len
 class Jump:
     """The jump of the forces where the end of an area of competence passes a master node."""
 
-    jump: Annotated[
-        Series,
-        (
-            axis_column("tilt", "rad", "tilt of the slave"),
-            values_column("tilt", "1", "largest jump over the slave's force"),
-        ),
-    ]
+    jump: Annotated[Series, series_columns("tilt", "rad", "tilt of the slave", "largest jump over the slave's force")]
     known: Annotated[FloatArray, Column("tilt", "1", "the jump of the printed algorithm, by formula")]
-    transmitted: Annotated[  # At `SLIDING_TILT`.
+    transmitted: Annotated[
         Series,
-        (
-            axis_column("shift", "1", "end of the area past the node over the slave's length"),
-            values_column("shift", "1", "force on the master over that on the slave"),
+        series_columns(
+            "shift",
+            "1",
+            "end of the area past the node over the slave's length",
+            "force on the master over that on the slave",
         ),
-    ]
+    ]  # At `SLIDING_TILT`.
     formulations: Formulations = FORMULATIONS
 
 
@@ -113,8 +109,7 @@ def plot(result: Jump) -> Figure:
     use_round_ticks(sliding)
     jump.plot(TILTS[1:], result.known[1:], **REFERENCE_LINE)
     plot_logarithmic(jump, result.jump)
-    jump.set_xlabel("tilt θ (rad)")
-    jump.set_ylabel("largest jump / slave force (–)")
+    jump.set(xlabel="tilt θ (rad)", ylabel="largest jump / slave force (–)")
     add_legend(figure, FORMULATIONS, reference="formula, printed algorithm", columns=2)
     return figure
 

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
 from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_logarithmic
-from contactverif_paper.paper_columns import Formulations, axis_column, values_column
+from contactverif_paper.paper_columns import Formulations, series_columns, values_column
 from contactverif_paper.paper_formulations import BALANCED, STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
@@ -57,12 +57,11 @@ class Imbalance:
 
     force: Annotated[
         Series,
-        (
-            axis_column("tilt", "rad", "tilt of the slave"),
-            values_column("tilt", "1", "force lost between slave and master over the slave's force"),
+        series_columns(
+            "tilt", "rad", "tilt of the slave", "force lost between slave and master over the slave's force"
         ),
     ]
-    moment: Annotated[Series, values_column("tilt", "1", "moment lost over the slave's force times its length")]
+    moment: Annotated[Series, values_column("tilt", "moment lost over the slave's force times its length")]
     formulations: Formulations = FORMULATIONS
 
 

@@ -104,13 +104,11 @@ def plot(study: PeakStudy) -> Figure:
     figure, (meshes, slopes) = new_panels(3.6, 2)
     meshes.axhline(study.winkler / _MEGA, **REFERENCE_LINE)
     plot_series(meshes, Series(FORMULATIONS, study.size, study.peaks / _MEGA))
-    meshes.set_xlabel("element size in the middle (length)")
-    meshes.set_ylabel("largest pressure\n(10⁶ force / length)")
+    meshes.set(xlabel="element size in the middle (length)", ylabel="largest pressure\n(10⁶ force / length)")
     slopes.axhline(0.0, **REFERENCE_LINE)
     numbers = [FORMULATIONS.index(row) for row in EXPLAINED]
     plot_series(slopes, Series(EXPLAINED, np.array(SLOPES), study.excess_over_slopes[numbers]))
-    slopes.set_xlabel("a/R over that of the paper (–)")
-    slopes.set_ylabel("excess over Hertz\non springs (–)")
+    slopes.set(xlabel="a/R over that of the paper (–)", ylabel="excess over Hertz\non springs (–)")
     for axes in (meshes, slopes):
         use_round_ticks(axes)
         axes.set_xlim(0, None)

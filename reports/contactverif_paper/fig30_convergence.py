@@ -260,8 +260,7 @@ def plot(convergence: Convergence) -> Figure:
         axes.set_ylim(*AXIS)
         axes.set_xlim(0, PRINTED_ITERATIONS)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
-        axes.set_xlabel("iteration")
-        axes.set_title(material)
+        axes.set(xlabel="iteration", title=material)
     panels[0].set_ylabel("largest residual (force)")
     rates = panels[2]
     rates.plot(STIFFNESS, convergence.radius, **REFERENCE_LINE)
@@ -269,8 +268,7 @@ def plot(convergence: Convergence) -> Figure:
     rates.set_xscale("log")
     rates.xaxis.set_minor_locator(NullLocator())
     rates.set_ylim(0, None)
-    rates.set_xlabel("ε̂ / E (1 / length)")
-    rates.set_ylabel("rate, basic version (–)")
+    rates.set(xlabel="ε̂ / E (1 / length)", ylabel="rate, basic version (–)")
     add_legend(figure, FORMULATIONS, reference="spectral radius", columns=4)
     return figure
 

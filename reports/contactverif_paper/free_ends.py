@@ -20,7 +20,7 @@ from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_paper.figure_style import Series, add_legend, new_panels, plot_logarithmic
-from contactverif_paper.paper_columns import Formulations, axis_column, values_column
+from contactverif_paper.paper_columns import Formulations, series_columns
 from contactverif_paper.paper_formulations import (
     BALANCED,
     MORTAR,
@@ -45,9 +45,12 @@ class FreeEnds:
 
     stress_error: Annotated[
         Series,
-        (
-            axis_column("overhang", "1", "part of a slave segment that overhangs"),
-            values_column("overhang", "1", "largest error of a stress over the pressure", fill=np.nan),
+        series_columns(
+            "overhang",
+            "1",
+            "part of a slave segment that overhangs",
+            "largest error of a stress over the pressure",
+            fill=np.nan,
         ),
     ]
     formulations: Formulations = FORMULATIONS

@@ -114,12 +114,7 @@ def eight_on_two() -> Scene:
 
 def statements(tests: Sequence[MultiplierTest]) -> tuple[Statement, ...]:
     """Compare who passes, which multipliers are uniform, and which are unique."""
-    return (
-        _pass_statement(tests),
-        _range_statement(tests),
-        _two_pass_statement(tests),
-        _stability_statement(tests),
-    )
+    return (_pass_statement(tests), _range_statement(tests), _two_pass_statement(tests), _stability_statement(tests))
 
 
 def _pass_statement(tests: Sequence[MultiplierTest]) -> Statement:

@@ -123,12 +123,10 @@ def plot(result: Locking) -> Figure:
     figure, (loss, pressure) = new_panels(3.8, 2)
     for formulation, values in zip(FORMULATIONS, result.drift, strict=True):
         loss.semilogx(PENALTIES, 100 * values, **line_style(formulation, 1))
-    loss.set_xlabel("penalty ε̂ h/E (–)")
-    loss.set_ylabel("loss of compliance (%)")
+    loss.set(xlabel="penalty ε̂ h/E (–)", ylabel="loss of compliance (%)")
     for formulation, contact in zip(WITH_PRESSURES, result.contacts, strict=True):
         pressure.plot(contact.x / LENGTH, contact.pressure, **line_style(formulation, 1))
-    pressure.set_xlabel("x / L (–)")
-    pressure.set_ylabel("pressure / mean load (–)")
+    pressure.set(xlabel="x / L (–)", ylabel="pressure / mean load (–)")
     add_legend(figure, FORMULATIONS, columns=3)
     return figure
 

@@ -62,14 +62,14 @@ def name_columns(dims: str) -> tuple[Column, Column]:
     )
 
 
-def axis_column(name: str, units: str, meaning: str) -> Column:
-    """Return the column of the parameter of a `Series`."""
-    return Column(name, units, meaning, part="at", name=name)
+def series_columns(axis: str, units: str, at: str, meaning: str, fill: float | None = None) -> tuple[Column, Column]:
+    """Return the columns of a `Series`: its parameter, and its numbers without dimension."""
+    return Column(axis, units, at, part="at", name=axis), values_column(axis, meaning, fill)
 
 
-def values_column(axis: str, units: str, meaning: str, fill: float | None = None) -> Column:
-    """Return the column of the numbers of a `Series`."""
-    return Column(f"formulation {axis}", units, meaning, fill=fill, part="values")
+def values_column(axis: str, meaning: str, fill: float | None = None) -> Column:
+    """Return the column of the numbers of a `Series`, which have no dimension."""
+    return Column(f"formulation {axis}", "1", meaning, fill=fill, part="values")
 
 
 Formulations = Annotated[tuple[PaperFormulation, ...], name_columns("formulation")]

@@ -50,8 +50,7 @@ def _draw_pressures(axes: Axes, patch: PatchSolution, limits: tuple[float, float
     for curve in patch.curves:
         inside = low <= curve.pressure.min() and curve.pressure.max() <= high
         axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(curve.formulation, len(curve.x)))
-    axes.set_xlabel("x coordinate (length)")
-    axes.set_ylabel("contact pressure / p (–)")
+    axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
     use_round_ticks(axes, 6)
     axes.set_xticks(_printed_ticks(*patch.setup.x_axis))
     axes.set_xlim(*patch.setup.x_axis)

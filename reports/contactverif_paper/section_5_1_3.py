@@ -62,9 +62,4 @@ def statements(errors: TwoPasses) -> tuple[Statement, ...]:
     )
 
 
-ITEM = Item(
-    name="section_5_1_3",
-    title="Section 5.1.3: one pass and two",
-    compute=compute,
-    statements=statements,
-)
+ITEM = Item(name="section_5_1_3", title="Section 5.1.3: one pass and two", compute=compute, statements=statements)

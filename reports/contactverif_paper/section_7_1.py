@@ -105,8 +105,5 @@ def _material_statement(section: Section71) -> Statement:
 
 
 ITEM = Item(
-    name="section_7_1",
-    title="Section 7.1: what is said of both examples",
-    compute=compute,
-    statements=statements,
+    name="section_7_1", title="Section 7.1: what is said of both examples", compute=compute, statements=statements
 )

@@ -6,10 +6,10 @@ whether the row comes from memory or from a file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,8 @@ from contactverif.contract.property import DECIDED, CheckedNumber, Outcome, Prop
 from contactverif.contract.result import Result, Row
 
 ORDER = "order of one Newton step"  # The quantity that measures the order of Newton's method.
-MESH_CHOICE_SHARE = (
-    0.5  # A smaller mesh is drawn if it shows at least this share of the largest difference, in decades.
-)
+# A smaller mesh is drawn if it shows at least this share of the largest difference, in decades.
+MESH_CHOICE_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,19 +44,18 @@ class Cell:
     def from_row(cls, row: Row) -> Cell:
         """Return the numbers of a row, collected in one pass over its cases."""
         facts = [_facts(row.info, outcome) for outcome in row.outcomes]
-        names = sorted({name for fact in facts for name in fact.details})
-        closest = max(
-            (fact.closest for fact in facts if fact.closest is not None), key=lambda number: number.ratio, default=None
-        )
+        verdicts, margins, orders, details, numbers, kinds, seconds = zip(*facts, strict=True) if facts else [()] * 7
+        names = sorted({name for of_case in details for name in of_case})
+        measured = (number for number in numbers if number is not None)
         return cls(
             row=row,
-            verdicts=freeze(np.array([fact.verdict for fact in facts], dtype=np.int64), np.int64),
-            margins=_column([fact.margin for fact in facts]),
-            orders=_column([fact.order for fact in facts]),
-            details={name: _column([fact.details.get(name, nan) for fact in facts]) for name in names},
-            closest=closest,
-            kinds=freeze(np.array([fact.kind for fact in facts], dtype=np.float64).reshape(-1, 5), np.float64),
-            seconds=float(np.median([fact.seconds for fact in facts])) if facts else nan,
+            verdicts=freeze(np.array(verdicts, dtype=np.int64), np.int64),
+            margins=_column(margins),
+            orders=_column(orders),
+            details={name: _column([of_case.get(name, nan) for of_case in details]) for name in names},
+            closest=max(measured, key=lambda number: number.ratio, default=None),
+            kinds=freeze(np.array(kinds, dtype=np.float64).reshape(-1, 5), np.float64),
+            seconds=float(np.median(seconds)) if facts else nan,
         )
 
     @property
@@ -111,36 +109,18 @@ class Cell:
         return standing
 
 
-class _Facts(NamedTuple):
-    """The numbers of one case."""
-
-    verdict: int
-    margin: float
-    order: float
-    details: Mapping[str, float]
-    closest: CheckedNumber | None
-    kind: tuple[float, ...]
-    seconds: float
-
-
-def _facts(info: PropertyInfo, outcome: Outcome) -> _Facts:
-    measurement = outcome.measurement
+def _facts(info: PropertyInfo, outcome: Outcome) -> tuple[Any, ...]:
+    """Return verdict, margin, order, details, closest number, kind and seconds of one case."""
+    measurement, case = outcome.measurement, outcome.summary
     closest = max(checked_numbers(info, measurement), key=lambda number: number.ratio, default=None)
-    case = outcome.summary
-    return _Facts(
-        verdict=int(outcome.verdict),
-        margin=margin(outcome.verdict, nan if closest is None else closest.ratio),
-        order=nan if measurement is None else measurement.values.get(ORDER, nan),
-        details={} if measurement is None else measurement.details,
-        closest=closest if outcome.decided else None,
-        kind=(
-            case.n_slave_segments,
-            case.n_master_segments,
-            case.penalty,
-            case.largest_coordinate,
-            case.shortest_segment,
-        ),
-        seconds=outcome.seconds,
+    return (
+        int(outcome.verdict),
+        margin(outcome.verdict, nan if closest is None else closest.ratio),
+        nan if measurement is None else measurement.values.get(ORDER, nan),
+        {} if measurement is None else measurement.details,
+        closest if outcome.decided else None,
+        (case.n_slave_segments, case.n_master_segments, case.penalty, case.largest_coordinate, case.shortest_segment),
+        outcome.seconds,
     )
 
 
@@ -153,7 +133,7 @@ def margin(verdict: Verdict, furthest: float) -> float:
     return furthest if furthest > 1 and verdict is Verdict.FAIL else inf
 
 
-def _column(values: list[float]) -> FloatArray:
+def _column(values: Sequence[float]) -> FloatArray:
     return freeze(np.array(values, dtype=np.float64), np.float64)
 
 

@@ -77,12 +77,7 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
             axes.grid(color="0.92", linewidth=0.5)
         panels[0].set_ylabel(f"error of the {kind}")
         panels[0].annotate(
-            "no solution",
-            (0.01, edge),
-            xycoords=("axes fraction", "data"),
-            va="bottom",
-            fontsize=6.5,
-            color="0.4",
+            "no solution", (0.01, edge), xycoords=("axes fraction", "data"), va="bottom", fontsize=6.5, color="0.4"
         )
         handles = [Line2D([], [], label=name, **pen) for name, pen in _pens(results)]
         handles.append(Line2D([], [], color="0.75", linewidth=4, label="Pareto front"))

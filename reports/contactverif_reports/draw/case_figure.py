@@ -136,8 +136,7 @@ def _gap_note(gaps: Gaps, roundoff: float) -> str:
 
 
 def _label_axes(axes: Axes, unit_name: str) -> None:
-    axes.set_xlabel(f"x / {unit_name}" if unit_name else "x")
-    axes.set_ylabel(f"y / {unit_name}" if unit_name else "y")
+    axes.set(xlabel=f"x / {unit_name}" if unit_name else "x", ylabel=f"y / {unit_name}" if unit_name else "y")
     axes.margins(0.05)
     axes.spines[["top", "right"]].set_visible(False)
 

@@ -242,7 +242,6 @@ def _advice(solved: SolvedScene) -> list[str]:
 
 def _bare(axes: Axes, *, alone: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set_xlabel("x (length)")
-    axes.set_ylabel("y (length)")
+    axes.set(xlabel="x (length)", ylabel="y (length)")
     if not alone:  # A panel that stands alone has a scale of its own.
         axes.label_outer()

@@ -49,10 +49,7 @@ _STYLE: dict[Any, Any] = {
     "xtick.major.size": 2.5,
     "ytick.major.size": 2.5,
 }
-_AXES_LABELS = (
-    "condition number κ = Σ ‖K‖ |z − z̄| / max |R| of the worst force",
-    "relative error of the worst force",
-)
+_AXES_LABELS = ("condition number κ = Σ ‖K‖ |z − z̄| / max |R| of the worst force", "relative error of the worst force")
 
 
 def draw_stability(panels: Sequence[SweepPanel], target: Path) -> None:

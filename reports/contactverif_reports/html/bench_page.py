@@ -21,7 +21,7 @@ from contactverif_reports.bench.work_precision import (
     pair_profiles,
     time_to_reach,
 )
-from contactverif_reports.html.pages import render, svg_inline
+from contactverif_reports.html.pages import origin, render, svg_inline
 
 _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "blas", "platform", "threads")
 
@@ -57,7 +57,7 @@ def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
         profile=svg_inline(profile, "performance profiles") if profile is not None else "",
         changes=changes,
         n_repeats=results.seconds.shape[-1],
-        about=_facts(results),
+        about=origin(results.provenance, _FACTS),
     )
 
 
@@ -71,11 +71,6 @@ def _figure(results: BenchResults, scene: str, kind: str) -> Markup:
 def _has_costs(results: BenchResults) -> bool:
     """Return whether there is anything to compare the reference with."""
     return REFERENCE in results.formulations and len(results.formulations) > 1 and bool(results.scenes)
-
-
-def _facts(results: BenchResults) -> dict[str, str]:
-    """Return the origin of the numbers, as far as a reader of the page wants to know it."""
-    return {name.replace("_", " "): results.provenance[name] for name in _FACTS if results.provenance.get(name)}
 
 
 def format_time(seconds: float) -> str:

@@ -17,7 +17,7 @@ from contactverif_reports.compare.comparison import PARTS, Comparison, Cost, Dif
 from contactverif_reports.compare.regression import Change, Changes
 from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
-from contactverif_reports.html.pages import render, svg_inline
+from contactverif_reports.html.pages import origin, render, svg_inline
 
 _FACTS = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "blas", "platform")
 _FIGURE_WIDTH = 5.6  # The width of a figure in inches; two stand side by side on a wide page.
@@ -53,7 +53,7 @@ def comparison_page(
         inf=inf,
         costs=_costs(costs, comparison.reference),
         meshes=[_mesh(*pair, comparison.reference) for pair in zip(differing, drawings, strict=True)],
-        about=_facts(comparison.provenance),
+        about=origin(comparison.provenance, _FACTS),
     )
 
 
@@ -70,8 +70,8 @@ def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> st
             for id_, example in examples.items()
         ],
         n_others=sum(change.paired is None for change in changes.changes),
-        old_about=_facts(changes.old.run.provenance),
-        new_about=_facts(changes.new.run.provenance),
+        old_about=origin(changes.old.run.provenance, _FACTS),
+        new_about=origin(changes.new.run.provenance, _FACTS),
     )
 
 
@@ -171,8 +171,3 @@ def _case_figure(case: Case, forces: FloatArray | None, exact: FloatArray | None
         beside = exact if forces is not None else None  # The exact multipliers are not known.
         figure = make_case_figure(case, title="", forces=forces, exact=beside, width=_FIGURE_WIDTH)
     return svg_inline(figure, label)
-
-
-def _facts(provenance: Mapping[str, str]) -> dict[str, str]:
-    """Return what a reader of the page wants to know of the origin of the numbers."""
-    return {name.replace("_", " "): provenance[name] for name in _FACTS if provenance.get(name)}

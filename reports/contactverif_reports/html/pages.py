@@ -10,6 +10,7 @@ import hashlib
 import io
 import os
 import re
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -100,6 +101,11 @@ def number(value: float, digits: int = 3) -> str:
         return "–"
     plain = re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
     return plain.replace("-", "−").replace("inf", "∞")
+
+
+def origin(provenance: Mapping[str, str], names: Iterable[str]) -> dict[str, str]:
+    """Return what a reader of a page wants to know of the origin of its numbers."""
+    return {name.replace("_", " "): provenance[name] for name in names if provenance.get(name)}
 
 
 @cache

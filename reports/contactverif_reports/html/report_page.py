@@ -148,14 +148,7 @@ def _sections(
 
 
 def _section(
-    number: int,
-    name: str,
-    run: Run,
-    cells: Sequence[Cell],
-    examples: Sequence[Example],
-    axis: Axis,
-    *,
-    is_open: bool,
+    number: int, name: str, run: Run, cells: Sequence[Cell], examples: Sequence[Example], axis: Axis, *, is_open: bool
 ) -> Section:
     example_of = {example.row.property_id: example.id for example in examples}
     lines = [

@@ -101,12 +101,7 @@ def _labels(results: BenchResults) -> dict[str, Any]:
         "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
         "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
         "mesh": numbers(["cell"], [cell.mesh for cell in cells], "fineness of the mesh, as the scene counts it", RATIO),
-        "stiffness": numbers(
-            ["cell"],
-            [cell.stiffness for cell in cells],
-            "penalty in the unit of the scene",
-            RATIO,
-        ),
+        "stiffness": numbers(["cell"], [cell.stiffness for cell in cells], "penalty in the unit of the scene", RATIO),
         "scene_label": words(["scene_name"], [results.labels.get(scene, "") for scene in scenes], "what a scene is"),
         "scene_unit": words(
             ["scene_name"], [results.units.get(scene, "") for scene in scenes], "unit of penalty; none for itself"

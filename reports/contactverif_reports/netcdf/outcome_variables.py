@@ -17,7 +17,7 @@ from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Variable
-from contactverif_reports.netcdf.variables import codes, flags, numbers, words
+from contactverif_reports.netcdf.variables import codes, numbers, words
 
 Table = dict[str, Variable]
 
@@ -109,12 +109,13 @@ class OutcomeVariables:
                 "missing where there is no such case",
                 fill=schema.NOT_PLANNED,
             ),
-            "state": flags(
+            "state": codes(
                 self._dims,
                 self._array([_state(outcome) for outcome in self._outcomes], np.int8),
                 schema.STATES,
                 "how the case was measured",
                 "bits: numbers were measured; nothing was in contact; the plugin broke the contract",
+                bits=True,
             ),
         }
         reasons = ["" if outcome is None else outcome.reason for outcome in self._outcomes]

@@ -1,4 +1,4 @@
-"""The kinds of netCDF variable in a report: numbers with a unit, codes with their meanings, flags, and words.
+"""The kinds of netCDF variable in a report: numbers with a unit, codes with their meanings, and words.
 
 Words are stored as fixed-width UTF-8 characters, not as netCDF strings: a file with variables of type `string` kills
 the process that opens it a second time while it is open (HDFGroup/hdf5#5359, Unidata/netcdf4-python#1444). A user does
@@ -34,26 +34,16 @@ def codes(
     comment: str = "",
     *,
     fill: int | None = None,
+    bits: bool = False,
 ) -> Variable:
-    """Return small integers, each with a meaning of one word."""
+    """Return small integers, each, or with `bits` each bit of them, with a meaning of one word."""
     attributes = {
         "long_name": long_name,
         "units": "1",
-        "flag_values": np.array(list(meanings.values()), dtype=np.int8),
+        "flag_masks" if bits else "flag_values": np.array(list(meanings.values()), dtype=np.int8),
         "flag_meanings": " ".join(meanings),
     }
     return _variable(dims, np.asarray(values, dtype=np.int8), attributes, comment, fill)
-
-
-def flags(dims: Dims, values: ArrayLike, meanings: Mapping[str, int], long_name: str, comment: str = "") -> Variable:
-    """Return small integers whose bits have a meaning of one word each."""
-    attributes = {
-        "long_name": long_name,
-        "units": "1",
-        "flag_masks": np.array(list(meanings.values()), dtype=np.int8),
-        "flag_meanings": " ".join(meanings),
-    }
-    return _variable(dims, np.asarray(values, dtype=np.int8), attributes, comment, None)
 
 
 def words(dims: Dims, values: Any, long_name: str, comment: str = "") -> Variable:
