@@ -1,4 +1,4 @@
-"""All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, uncompiled kernels."""
+"""All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, plain kernels."""
 
 from __future__ import annotations
 
