@@ -349,7 +349,7 @@ def test_a_mesh_of_the_user_is_judged(ask: Ask) -> None:
 
 
 def test_the_table_lines_up_at_any_width(ask: Ask, tmp_path: Path) -> None:
-    sampling = ("--examples", "3", "--seed", "1", "--out", tmp_path / "a.nc")
+    sampling = ("-p", "patch.*", "-p", "hard.*", "--examples", "3", "--seed", "1", "--out", tmp_path / "a.nc")
     check_table(ask("verify", "nts-ar", "vts-ppt-balanced", *sampling, columns=80), 80)
     for columns in (100, 140):
         check_table(ask("report", tmp_path / "a.nc", columns=columns), columns)
@@ -480,7 +480,20 @@ def test_the_same_seed_gives_the_same_report(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         reports[name] = folder / "r.nc"
-        arguments = ["verify", "nts", "-p", "p*", "--seed", seed, "--examples", "8", "--out", reports[name]]
+        arguments = [
+            "verify",
+            "nts",
+            "-p",
+            "patch.flat.*",
+            "-p",
+            "p[ru]*",
+            "--seed",
+            seed,
+            "--examples",
+            "8",
+            "--out",
+            reports[name],
+        ]
         variables = environment(PYTHONHASHSEED=hashes)
         subprocess.run(command(*arguments), cwd=folder, env=variables, capture_output=True, check=True)
     assert same_data(reports["a"], reports["b"]) == []
@@ -589,7 +602,7 @@ def test_the_examples_of_the_help_parse(ask: Ask, line: str, tmp_path: Path, mon
     monkeypatch.chdir(tmp_path)
     words = shlex.split(line)[1:]
     if words[0] == "verify":
-        words += ["--examples", "1"]
+        words += ["--examples", "1", "-p", "purity"]
     answer = ask(*words)
     assert "--help" not in answer.err
     assert answer.status == 0 or re.search(r"(ppt.nc|punch.msh|'mine')", answer.err)

@@ -68,17 +68,15 @@ def test_every_property_has_its_mutant() -> None:
     assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS) >= 15
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+WITH_OPTIONS = ("vts-me:n=3", "vts-ppt:free_end=extend", "vts-ppt-balanced:n=3,area=reference")
+
+
+# `test_verdicts.py` judges those without options with the cases of the seed 0, and with all lists.
 @pytest.mark.parametrize(
-    "name",
+    ("name", "seed"),
     [
-        "nts-ar",
-        "nts-lm",
-        "vts-me",
-        "vts-me:n=3",
-        "vts-ppt:free_end=extend",
-        "vts-ppt-balanced",
-        "vts-ppt-balanced:n=3,area=reference",
+        *((name, 0) for name in WITH_OPTIONS),
+        *((name, 1) for name in ("nts-ar", "nts-lm", "vts-me", "vts-ppt-balanced")),
     ],
 )
 def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> None:
