@@ -162,8 +162,6 @@ def nearest_place(v: PointOnSegment, x: FloatArray, segments: IntArray, order: I
     p = arm(origin, v)
     n_leaves = len(boxes) // 2
     best, best_distance, best_past, best_place = _NONE, np.inf, np.inf, _NONE
-    # The last bit of `waiting` says whether the other half beside this box is still to be opened, the bit before it
-    # says so of the box above, and so on.
     box, distance, waiting = _ROOT, 0.0, _NO_BIT
     while True:
         while box < n_leaves and distance <= best_distance:  # down to a leaf, the nearer box first
@@ -180,9 +178,7 @@ def nearest_place(v: PointOnSegment, x: FloatArray, segments: IntArray, order: I
                         best, best_distance, best_past, best_place = segment, distance, past, place
         if waiting == 0:
             return best_place
-        while waiting & 1 == 0:
-            box, waiting = box >> 1, waiting >> 1
-        box, waiting = box ^ 1, waiting - 1
+        box, waiting = _climb(box, waiting)
         distance = distance_to_box(origin, p, boxes[box])
 
 
@@ -192,6 +188,18 @@ def _nearer_half(box: int, origin: Vector, p: Vector, boxes: FloatArray) -> tupl
     first, second = 2 * box, 2 * box + 1
     d_1, d_2 = distance_to_box(origin, p, boxes[first]), distance_to_box(origin, p, boxes[second])
     return (second, d_2) if d_2 < d_1 else (first, d_1)
+
+
+@compile_inline
+def _climb(box: int, waiting: int) -> tuple[int, int]:
+    """Return the next box to open, and which are waiting then.
+
+    The last bit of `waiting` says whether the other half beside a box waits, the bit before it the same of the box
+    above, and so on.
+    """
+    while waiting & 1 == 0:
+        box, waiting = box >> 1, waiting >> 1
+    return box ^ 1, waiting - 1
 
 
 @compile_part

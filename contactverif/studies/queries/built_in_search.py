@@ -23,25 +23,26 @@ from contactverif.studies.queries.answers import Answer, Answers
 from contactverif.studies.queries.query_file import Queries
 
 _RUNS = 5  # The fastest of these runs counts: what disturbs a machine only adds time.
-_Arrays = tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray, IntArray]  # The arguments of the kernel.
+# The arguments of the kernel.
+_Arrays = tuple[IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray, IntArray]
 
 
 @compile_kernel
 def _search(
+    nearest: IntArray,
+    values: FloatArray,
     points: FloatArray,
     x: FloatArray,
     segments: IntArray,
     order: IntArray,
     boxes: FloatArray,
     begins: IntArray,
-) -> tuple[IntArray, FloatArray]:
-    """Return the nearest segment (n_points,) of each point, and gap, ξ and distance (n_points, 3).
+) -> None:
+    """Write the nearest segment (n_points,) of each point, and gap, ξ and distance (n_points, 3).
 
     The arrays hold one surface behind the other; row s of `begins` (n_surfaces + 1, 5) says where points, nodes,
     segments, places of the order and boxes of surface s begin.
     """
-    nearest = np.empty(len(points), dtype=np.int64)
-    values = np.empty((len(points), 3))
     for surface in range(len(begins) - 1):
         begin, end = begins[surface], begins[surface + 1]
         here, pairs = x[begin[1] : end[1]], segments[begin[2] : end[2]]
@@ -56,7 +57,6 @@ def _search(
             values[place, 0] = (towards[0] * along[1] - towards[1] * along[0]) / np.sqrt(squared)
             values[place, 1] = (towards[0] * along[0] + towards[1] * along[1]) / squared
             values[place, 2] = np.sqrt(distance_to_segment(p, (0.0, 0.0), first, second)[0])
-    return nearest, values
 
 
 def search_built_in(queries: Queries) -> Answers:
@@ -70,8 +70,8 @@ def search_built_in(queries: Queries) -> Answers:
     answers = [Answer(None)] * len(queries.queries)
     seconds = {}
     for kind, by_surface in by_kind.items():
-        arrays = _arrays(queries, by_surface)
-        nearest, values = _search(*arrays)
+        arrays = nearest, values, *_ = _arrays(queries, by_surface)
+        _search(*arrays)
         seconds[kind] = min(_time(arrays) for _ in range(_RUNS))
         numbers = [number for some in by_surface.values() for number in some]
         for number, segment, (gap, xi, distance) in zip(numbers, nearest.tolist(), values.tolist(), strict=True):
@@ -95,4 +95,5 @@ def _arrays(queries: Queries, by_surface: dict[int, list[int]]) -> _Arrays:
         columns.append((points, shape.nodes, shape.segments, *search_tree(shape.surface, shape.nodes)))
     lengths = np.array([[0] * 5, *([len(array) for array in arrays] for arrays in columns)], dtype=np.int64)
     points, x, segments, order, boxes = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return points, x, segments, order, boxes, lengths.cumsum(axis=0)
+    nearest, values = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
+    return nearest, values, points, x, segments, order, boxes, lengths.cumsum(axis=0)
