@@ -54,3 +54,4 @@ VTS_ME = MappingProxyType(
         "c-prime-swapped": "3/2 3 31/10 3 7/5; 15/16 33/16 2409/800 3207/800 99/50",
     }
 )
+BY_METHOD = {"nts": NTS, "nts-ar": NTS_AR, "vts-me": VTS_ME}

@@ -20,7 +20,7 @@ Source: Zavarise & De Lorenzis (2009), Boxes 1–3, Appendix A.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from scipy import sparse
@@ -215,17 +215,15 @@ def vts_ppt(
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Appendix A.
     """
-    # A segment that is continued past its free end has shares below zero.
-    pushes = None if free_end == "extend" else True
-    traits = _PRINTED.revise(overhang=free_end == "cover", nodes_push=pushes)
+    rule = choose("free_end", free_end, FREE_ENDS)
     return PatchTestPassing(
-        traits=add_locking(traits, check_count(n)),
+        traits=_promises_as_printed(rule, check_count(n)),
         penalty=check_penalty(penalty),
         n=check_count(n),
         transmission=box3.PRINTED,
         consistent=True,
         current_area=True,
-        free_end=choose("free_end", free_end, FREE_ENDS),
+        free_end=rule,
         tau=check_tau(tau),
         threads=check_count(threads, "threads"),
     )
@@ -244,9 +242,7 @@ def vts_ppt_basic(
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
-    witnesses = {**consistent.traits.evidence.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
-    traits = consistent.traits.revise(tangent="approximate", witnesses=witnesses)
-    return replace(consistent, consistent=False, traits=traits)
+    return replace(consistent, consistent=False, traits=_basic_promises(consistent.free_end, n))
 
 
 def vts_ppt_balanced(
@@ -263,7 +259,36 @@ def vts_ppt_balanced(
     Zavarise & De Lorenzis (2009), Boxes 1–3 and Appendix A; balance and "cover": here.
     """
     current = choose("area", area, AREAS) == CURRENT
-    covers = free_end == "cover" or None
+    consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
+    return replace(
+        consistent,
+        transmission=box3.BALANCED,
+        current_area=current,
+        traits=_balanced_promises(consistent.free_end, n, current),
+    )
+
+
+# No promise depends on the penalty, and a formulation is made for the penalty of each case. So promises are kept.
+@cache
+def _promises_as_printed(free_end: int, n: int) -> Traits:
+    """Return the promises of `vts_ppt`."""
+    # A segment that is continued past its free end has shares below zero.
+    pushes = None if free_end == walk.EXTEND else True
+    return add_locking(_PRINTED.revise(overhang=free_end == walk.COVER, nodes_push=pushes), n)
+
+
+@cache
+def _basic_promises(free_end: int, n: int) -> Traits:
+    """Return the promises of `vts_ppt_basic`."""
+    consistent = _promises_as_printed(free_end, n)
+    witnesses = {**consistent.evidence.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
+    return consistent.revise(tangent="approximate", witnesses=witnesses)
+
+
+@cache
+def _balanced_promises(free_end: int, n: int, current: bool) -> Traits:
+    """Return the promises of `vts_ppt_balanced`."""
+    covers = free_end == walk.COVER or None
     traits = _PRINTED.revise(
         overhang=covers,
         conserves_force=covers,
@@ -272,9 +297,4 @@ def vts_ppt_balanced(
         area="current" if current else "reference",
         witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"},
     )
-    return replace(
-        vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads),
-        transmission=box3.BALANCED,
-        current_area=current,
-        traits=add_locking(traits, n),
-    )
+    return add_locking(traits, n)

@@ -22,9 +22,8 @@ Source: Zavarise & De Lorenzis (2009), Sections 4.1, 4.2 and 5.1.2.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -177,8 +176,7 @@ def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
     ----------
     Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
     """
-    forces = force_tables.NTS
-    traits = _traits("a1", "nodal", None, symmetric=True, passes_normal=False, published_forces=forces)
+    traits = _traits("a1", "nodal", None, symmetric=True, passes_normal=False, table="nts")
     return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, eq6.NODAL, at_nodes=True)
 
 
@@ -202,7 +200,7 @@ def nts_ar(*, penalty: float, area: str = "current", tau: float = 1e-2) -> Point
     Zavarise & De Lorenzis (2009), Section 4.2, Eq. 6 with F = ε̂ g a.
     """
     area_from = choose("area", area, AREAS)
-    traits = _traits("b", "distributed", area_from, published_forces=force_tables.NTS_AR)
+    traits = _traits("b", "distributed", area_from, table="nts-ar")
     return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, area_from, at_nodes=True)
 
 
@@ -257,33 +255,35 @@ def vts_me(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e
     n = check_count(n)
     area_from = choose("area", area, AREAS)
     c = -1 + (2 * np.arange(n) + 1) / n
-    forces = force_tables.VTS_ME if n == 2 else {}
     even = n % 2 == 0
-    witness = "c-prime" if even else "b"
-    traits = _traits(witness, "distributed", area_from, n_points=n, passes_single=even, published_forces=forces)
+    witness, table = "c-prime" if even else "b", "vts-me" if n == 2 else ""
+    traits = _traits(witness, "distributed", area_from, n_points=n, passes_single=even, table=table)
     return _points_at(c, np.full(n, 1 / n), traits, penalty, tau, area_from)
 
 
+@cache  # No promise depends on the penalty, and a formulation is made for the penalty of each case.
 def _traits(
     patch_witness: str,
     penalty: str,
     area_from: int | None,
     *,
-    n_points: int = 1,
+    n_points: int = 0,
     symmetric: bool | None = None,
     linear: bool = False,
     passes_normal: bool = True,
     passes_single: bool = False,
-    published_forces: Mapping[str, str] = MappingProxyType({}),
+    table: str = "",
 ) -> Traits:
     """Return the promises of a method that fails the flat patch test, and all else it fails, on `patch_witness`.
 
-    Its points, `n_points` a segment, integrate a linear gap exactly if `linear`.
+    Its points, `n_points` a segment or the slave nodes alone, integrate a linear gap exactly if `linear`. Its forces
+    are those of a table in `force_tables`.
     """
     areas = {eq6.CURRENT: "current", eq6.REFERENCE: "reference", None: None}
-    return Traits(
+    traits = Traits(
         promises=Promises(
             patch=PatchPromises(flat=False, normal=passes_normal, single=passes_single, kinked=False, overhang=False),
+            locks=None if n_points else False,
             converges=False if n_points <= FEW_POINTS else None,
             tangent="exact",
             symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
@@ -316,10 +316,11 @@ def _traits(
                 "accuracy.wavy": "upper slave, 10 E/h",
                 "accuracy.wavy-curved": "upper slave, 100 E/h",
             },
-            published_forces=published_forces,
+            published_forces=force_tables.BY_METHOD.get(table, {}),
             source=_PAPER,
         ),
     )
+    return add_locking(traits, n_points)
 
 
 def add_locking(traits: Traits, n: int) -> Traits:
@@ -338,7 +339,7 @@ def _points_at(
 ) -> PointContact:
     """Return the formulation with points at c on each slave segment, its options checked."""
     return PointContact(
-        traits=traits.revise(locks=False) if at_nodes else add_locking(traits, len(np.atleast_1d(c))),
+        traits=traits,
         penalty=check_penalty(penalty),
         c=freeze(c, np.float64),
         weight=freeze(weight, np.float64),
