@@ -28,6 +28,7 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time,
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
+_COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
 
@@ -246,7 +247,7 @@ class CheckedFormulation:
         return _check_forces("residual", forces, z)
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
-        """Return the tangent (n_unknowns, n_unknowns) at z (n_unknowns,), an array or a coo array of scipy.sparse."""
+        """Return the tangent (n_unknowns, n_unknowns) at z (n_unknowns,), dense or a csr, csc or coo array of scipy."""
         self._check_size(interface, z)
         pairing = self._pairing_at(interface, pairing, z)
         tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
@@ -303,7 +304,7 @@ class CheckedFormulation:
             return [getattr(self, verb)(*arguments) for verb, *arguments in paired]
 
     def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
-        """Return a copy of the tangent (size, size), dense or coo; an error begins with the verb."""
+        """Return a copy of the tangent (size, size), dense or sparse; an error begins with the verb."""
         _check_matrix(verb, tangent, size)
         tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else self.copy_matrix(verb, tangent)
         entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
@@ -356,14 +357,14 @@ def _check_matrix(verb: str, tangent: Any, size: int) -> None:
 
 
 def copy_entries(verb: str, tangent: Any) -> Any:
-    """Return a copy of a sparse matrix as a coo array. Numbers of rows and columns are checked, as scipy does not.
+    """Return a copy of a sparse matrix, csr or csc as it is, else coo. Numbers of rows and columns are checked.
 
     A plugin that fills the arrays of a compressed matrix itself may number a row or a column that is not there. scipy
     would read or write outside of its arrays.
     """
     try:
-        if tangent.format in ("csr", "csc"):
-            return _expand(tangent)
+        if tangent.format in _COMPRESSED:
+            return _copy_compressed(tangent)
         if tangent.format == "bsr":
             tangent.check_format(full_check=True)
         return sparse.coo_array(tangent, copy=True)  # It checks the numbers of entries in the other formats.
@@ -371,18 +372,15 @@ def copy_entries(verb: str, tangent: Any) -> Any:
         raise ContractError(f"{verb}: returned a broken {tangent.format} matrix: {error}") from error
 
 
-def _expand(tangent: Any) -> Any:
-    """Return a copy of a csr or csc matrix as a coo array, in half the time of scipy's full check and conversion."""
-    tangent.check_format(full_check=False)
-    inner, size = tangent.indices, tangent.shape[0]
-    counts = np.diff(tangent.indptr.astype(np.int64, copy=False))
-    if counts.min(initial=0) < 0:
+def _copy_compressed(tangent: Any) -> Any:
+    """Return a copy of a csr or csc matrix, checked in half the time of scipy's full check."""
+    arrays = tangent.data, tangent.indices, tangent.indptr
+    copy = _COMPRESSED[tangent.format](arrays, shape=tangent.shape, copy=True)  # It checks the sizes of the arrays.
+    if (copy.indptr[1:] < copy.indptr[:-1]).any():  # A difference might overflow.
         raise ValueError("indptr must be a non-decreasing sequence")
-    if not 0 <= inner.min(initial=0) <= inner.max(initial=0) < size:
-        raise ValueError(f"indices must be < {size} and ≥ 0")
-    outer = np.repeat(np.arange(size, dtype=inner.dtype), counts)
-    coords = (outer, inner) if tangent.format == "csr" else (inner, outer)
-    return sparse.coo_array((tangent.data, coords), shape=tangent.shape, copy=True)
+    if not 0 <= copy.indices.min(initial=0) <= copy.indices.max(initial=0) < min(copy.shape):
+        raise ValueError(f"indices must be < {min(copy.shape)} and ≥ 0")
+    return copy
 
 
 def _describe_non_finite(values: Array) -> str:

@@ -181,6 +181,7 @@ def broken_compressed(format_: str, **arrays: Any) -> Any:
     return matrix
 
 
+MOST = 2**31 - 1
 NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, -np.inf, Z)
 
 
@@ -221,6 +222,12 @@ NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, 
         ),
         ("tangent", broken_compressed("csr", indptr=range(10)), ContractError, "broken csr matrix: index pointer size"),
         ("tangent", broken_compressed("csr", indptr=[0, 2, *range(1, 9), 10]), ContractError, "non-decreasing"),
+        (
+            "tangent",
+            broken_compressed("csr", indptr=np.array([0, MOST, -MOST - 1, -1, *range(4, 11)], np.int32)),
+            ContractError,
+            "non-decreasing",
+        ),
         (
             "tangent",
             broken_compressed("coo", coords=([0, 12], [1, 1]), data=[1.0, 1.0]),

@@ -137,7 +137,7 @@ def pattern_of(tangent: Any) -> BoolArray:
         pattern: BoolArray = np.asarray(tangent) != 0
         return pattern
     pattern = np.zeros(tangent.shape, dtype=np.bool_)
-    pattern[tangent.row, tangent.col] = True
+    pattern[tangent.tocoo().coords] = True
     return pattern
 
 
