@@ -17,7 +17,7 @@ from contactverif.geometry.compiled import compile_inline, compile_maker, consta
 
 LARGE_GROUP = 64  # Groups of more nodes count in the estimate of a product's size; smaller ones overlap too much.
 MOST_BYTES = 2**35  # 32 GiB: more than a workstation spares for one matrix.
-_ONE = constant(1)
+_FIRST_STEP = constant(1)
 BYTES_OF_ENTRY = 12  # A float64 and an int32.
 
 
@@ -129,7 +129,7 @@ def _segments_of_rows(active: BoolArray, slave: IntArray, dual: bool) -> IntArra
 @compile_inline
 def _sort(numbers: NumberArray, start: int, stop: int) -> None:
     """Sort a part of an array in place, by Shell's method."""
-    step = _ONE
+    step = _FIRST_STEP
     while 3 * step < stop - start:
         step = 3 * step + 1
     while step > 0:
