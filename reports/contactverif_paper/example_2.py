@@ -179,16 +179,9 @@ def datasets(example: Example2) -> dict[str, Group]:
 
 
 def mesh_lines(body: Body, box: FloatArray, tolerance: float) -> list[FloatArray]:
-    """Return polylines (n_points, 2) along the edges of a body's cells.
+    """Return polylines (n_points, 2) along the edges of the cells of a body that lie in a box, given by two corners.
 
-    Parameters
-    ----------
-    body : Body
-        The body, undeformed.
-    box : FloatArray, shape (2, 2)
-        Lower left and upper right corner; cells that lie outside are left out.
-    tolerance : float
-        Points that lie nearer than this to the line between their neighbours are left out, a length.
+    Points that lie nearer than the tolerance to the line between their neighbours are left out.
     """
     corners = body.nodes[body.cells]
     inside = (corners.max(axis=1) >= box[0]).all(axis=1) & (corners.min(axis=1) <= box[1]).all(axis=1)

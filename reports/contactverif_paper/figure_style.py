@@ -99,21 +99,7 @@ def add_legend(
     columns: int = 3,
     remarks: Mapping[PaperFormulation, str] = MappingProxyType({}),
 ) -> None:
-    """Put a legend below all panels.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    formulations : Sequence[PaperFormulation]
-        The formulations, in order.
-    reference : str
-        The legend of the exact answer; empty if there is none.
-    columns : int
-        The largest number of columns.
-    remarks : Mapping[PaperFormulation, str]
-        {formulation: words behind its legend}.
-    """
+    """Put a legend below all panels; `reference` is the legend of the exact answer, `remarks` stand behind legends."""
     handles = [
         Line2D([], [], label=f"{formulation.legend}{remarks.get(formulation, '')}", **line_style(formulation, 1))
         for formulation in formulations

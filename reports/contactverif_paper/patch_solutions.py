@@ -175,13 +175,7 @@ def departures(setup: PatchSetup, stiffness: float) -> dict[PaperFormulation, fl
 
 
 def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, float]], bool]) -> float:
-    """Return the ε̂/E below which a relation between departures holds, by bisection; NaN if no limit was found.
-
-    Returns
-    -------
-    float
-        The limit, per unit of length, within one per cent.
-    """
+    """Return the ε̂/E below which a relation between departures holds, by bisection to 1 %; NaN if there is none."""
     low, high = _STIFFNESS_RANGE
     if not holds(departures(setup, low)) or holds(departures(setup, high)):
         return np.nan

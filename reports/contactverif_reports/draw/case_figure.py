@@ -33,19 +33,7 @@ _SHORT = 0.04  # The length of a segment that is shorter is written below the ti
 def make_case_figure(
     case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
 ) -> Figure:
-    """Return the figure of a case: both surfaces, the hatched bodies and the forces.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    title : str
-        The title; it is wrapped.
-    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
-        Nodal forces of the formulation and exact ones, as they act on the nodes.
-    width : float
-        The width in inches.
-    """
+    """Return the figure of a case: both surfaces, the hatched bodies and the forces, as `draw_case` does."""
     course, gaps = Course.from_case(case), Gaps.from_case(case)
     with_forces = forces is not None or exact is not None
     lengths = _lengths(case)
@@ -107,17 +95,7 @@ def _positions_to_draw(case: Case, gaps: Gaps, roundoff: float, with_forces: boo
 
 
 def magnification(gap: FloatArray, roundoff: float, size: float) -> float:
-    """Return the factor, of one significant digit, that makes the largest gap visible.
-
-    Parameters
-    ----------
-    gap : FloatArray, shape (n_nodes,)
-        The gaps, a length each.
-    roundoff : float
-        The rounding of a length; gaps far below it are none.
-    size : float
-        The size of the interface, a length.
-    """
+    """Return the factor, of one significant digit, that makes the largest gap visible; 1 if all is roundoff."""
     largest = float(np.abs(gap).max())
     if largest <= roundoff * 1e-3 or largest >= _VISIBLE_GAP * size:
         return 1.0

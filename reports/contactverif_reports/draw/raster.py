@@ -15,17 +15,7 @@ _LABELLED = 12  # The nodes get their numbers if a side has at most so many.
 
 
 def draw_raster(case: Case, course: Course, gaps: Gaps, width: int) -> tuple[list[str], str]:
-    """Draw an interface to scale; surfaces that nearly touch are drawn apart.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    course, gaps : Course or Gaps
-        Its geometry.
-    width : int
-        The number of columns.
-    """
+    """Draw an interface to scale in so many columns; surfaces that nearly touch are drawn apart."""
     n_slave = case.interface.n_slave_nodes
     positions, is_apart = _positions_to_draw(case, course, gaps, width)
     cells = _cells(positions, _rows_per_length(positions, width))

@@ -18,18 +18,9 @@ _INKS = {"slave": "▒", "master": "░"}
 
 
 def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
-    """Draw the two blocks of a case as text.
+    """Draw two blocks, whose interface runs straight or nearly so, as text of at most `width` columns, 40 or more.
 
     Loads on the slave, and on the master beside it, are a row of arrows; a rigid master is hatched.
-
-    Parameters
-    ----------
-    case : Case
-        The case; its interface runs straight, or nearly so.
-    slave, master : Body
-        The blocks.
-    width : int
-        The largest number of columns, at least 40.
     """
     course = Course.from_case(case)
     lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
@@ -66,17 +57,7 @@ def _rigid(side: str) -> list[str]:
 
 
 def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> str:
-    """Draw two bodies of any shape as text: filled, to scale, with the loads on the slave.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    slave, master : Body
-        The bodies.
-    width : int
-        The largest number of columns.
-    """
+    """Draw two bodies of any shape as text: filled, to scale, with the loads on the slave."""
     inked = [(_INKS["master"], master), (_INKS["slave"], slave)]
     nodes = np.vstack([slave.nodes, master.nodes])
     (left, low), (right, high) = nodes.min(axis=0), nodes.max(axis=0)

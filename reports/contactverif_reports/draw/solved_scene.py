@@ -139,19 +139,9 @@ class SolvedScene:
 
 
 def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
-    """Return the pressure across the interface in each cell.
+    """Return −σ across the first axis of a body, along which its interface lies, in each cell.
 
-    Parameters
-    ----------
-    body : Body
-        The body; its interface lies along its first axis.
-    stresses : FloatArray, shape (n_cells, 3)
-        Stresses xx, yy and xy in global axes, force per length².
-
-    Returns
-    -------
-    FloatArray, shape (n_cells,)
-        −σ across the first axis, force per length².
+    `stresses` (n_cells, 3) are xx, yy and xy in global axes.
     """
     x, y = body.axis
     xx, yy, xy = stresses.T

@@ -29,18 +29,9 @@ class _Link:
 
 
 def draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[str], str]:
-    """Draw the surfaces as two lines, with node numbers above and below.
+    """Draw the surfaces of a flat or nearly flat interface as two lines, with node numbers above and below.
 
-    Parameters
-    ----------
-    case : Case
-        The case.
-    course : Course
-        Its geometry; the interface is flat or nearly so.
-    unit : float
-        The unit of the lengths that are written.
-    width : int
-        The largest number of columns.
+    `unit` is that of the lengths that are written, `width` the largest number of columns.
     """
     places, number = _places(course, case.interface.n_slave_nodes)
     width -= MARGIN + len(str(case.interface.n_nodes)) - 1  # The last node number ends behind its node.

@@ -50,24 +50,9 @@ _ARROWS: dict[str, dict[str, Any]] = {
 def draw_surface(
     axes: Axes, surface: Surface, nodes: FloatArray, labels: Sequence[str], pen: Pen, *, body: float, side: float
 ) -> None:
-    """Draw segments, nodes and a hatched strip of the body.
+    """Draw segments with the texts of their lengths, nodes, and a hatched strip of the body that is `body` wide.
 
-    Parameters
-    ----------
-    axes : Axes
-        The axes to draw to.
-    surface : Surface
-        The surface.
-    nodes : FloatArray, shape (n_nodes, 2)
-        Positions of all nodes of the interface.
-    labels : Sequence[str]
-        The length of each segment, as text.
-    pen : Pen
-        The look of the surface.
-    body : float
-        The width of the hatched strip, a length.
-    side : float
-        1 writes labels and node numbers on the side of the body, −1 on the other side.
+    `side` is 1 for labels and node numbers on the side of the body, −1 for the other side.
     """
     ends = nodes[surface.segments]  # (n_segments, 2, 2)
     lefts = _lefts(surface, nodes)
@@ -104,16 +89,7 @@ def draw_arrows(
 ) -> None:
     """Draw nodal forces as arrows of one scale: those of the formulation, thin, over the exact ones, broad and light.
 
-    Parameters
-    ----------
-    axes : Axes
-        The axes to draw to.
-    nodes : FloatArray, shape (n_nodes, 2)
-        The positions of the nodes.
-    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
-        Nodal forces of the formulation and exact ones; None is not drawn.
-    longest : float
-        The length of the longest arrow.
+    `longest` is the length of the longest arrow; forces of None are not drawn.
     """
     by_kind = {
         kind: np.asarray(values, dtype=np.float64).reshape(-1, 2)

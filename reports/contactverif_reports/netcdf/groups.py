@@ -35,6 +35,17 @@ class Group(Mapping[str, Variable]):
     def __len__(self) -> int:
         return len(self.variables)
 
+    def words(self, name: str) -> list[str]:
+        """Return the entries of a variable as words; none if there is no such variable."""
+        return [str(word) for word in self[name].values] if name in self else []
+
+    def labels(self, name: str) -> list[str]:
+        """Return the names along a dimension, which are all different."""
+        labels = self.words(name)
+        if len(set(labels)) != len(labels):
+            raise ValueError(f"two of {name} have one name")
+        return labels
+
     @cached_property
     def sizes(self) -> Mapping[str, int]:
         """The lengths of all dimensions of its variables."""

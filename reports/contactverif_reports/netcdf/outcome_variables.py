@@ -24,25 +24,13 @@ Table = dict[str, Variable]
 
 @dataclass(frozen=True, slots=True)
 class SharedNames:
-    """The names that all outcomes of a group share, so that random cases and witnesses have the same dimensions.
+    """The names that all outcomes of a group share, so that random cases and witnesses have the same dimensions."""
 
-    Attributes
-    ----------
-    details : tuple[str, ...]
-        The names of the further numbers, in the order in which they first occur.
-    parameters : tuple[str, ...]
-        The names of the parameters that are one number each.
-    n_iterates : int
-        The length of the longest series.
-    kinds : tuple[str, ...]
-        The kinds of situation: those that the property declares, then others.
-    """
-
-    details: tuple[str, ...]
-    parameters: tuple[str, ...]
-    n_iterates: int
-    kinds: tuple[str, ...] = ()
-    n_components: int = 0
+    details: tuple[str, ...]  # The further numbers, in the order in which they first occur.
+    parameters: tuple[str, ...]  # The parameters that are one number each.
+    n_iterates: int  # The length of the longest series.
+    kinds: tuple[str, ...] = ()  # The kinds of situation: those that the property declares, then others.
+    n_components: int = 0  # The largest number of components of what was found beside what is right.
 
     @classmethod
     def from_outcomes(cls, info: PropertyInfo, outcomes: Iterable[Outcome]) -> SharedNames:
@@ -63,20 +51,9 @@ class SharedNames:
 
 
 class OutcomeVariables:
-    """Makes variables of outcomes along some dimensions.
+    """Makes variables of flat outcomes along some axes {dimension: length}; None is no outcome.
 
-    Parameters
-    ----------
-    info : PropertyInfo
-        The property that was checked.
-    outcomes : Sequence[Outcome | None]
-        The outcomes, flat; None where there is none.
-    axes : Mapping[str, int]
-        {dimension: length}; the product of the lengths is the number of outcomes.
-    names : SharedNames
-        The names that all outcomes of the group share.
-    prefix : str
-        The beginning of the names of all variables, such as `witness_`.
+    `prefix` is the beginning of the names of all variables, such as `witness_`.
     """
 
     def __init__(

@@ -122,8 +122,8 @@ class _Reader:
 
     def run(self) -> Run:
         """Return the run."""
-        formulations = self._labels("formulation")
-        names, reasons = (self._words(name) for name in ("not_loaded", "not_loaded_reason"))
+        formulations = self._summary.labels("formulation")
+        names, reasons = (self._summary.words(name) for name in ("not_loaded", "not_loaded_reason"))
         run = Run(
             rows=self._rows(formulations),
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
@@ -138,7 +138,7 @@ class _Reader:
     def _rows(self, formulations: list[str]) -> tuple[Row, ...]:
         """Return all rows, formulation by formulation."""
         by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
-        for j, property_id in enumerate(self._labels("property")):
+        for j, property_id in enumerate(self._summary.labels("property")):
             for i, row in self._rows_of(j, property_id, formulations):
                 by_formulation[i][j] = row
         return tuple(row for rows in by_formulation for row in rows.values())
@@ -217,7 +217,7 @@ class _Reader:
             return {}
         provided = {}
         for name, codes in zip(formulations, self._summary["provided"].values.tolist(), strict=True):
-            parts = zip(self._words("part"), codes, strict=True)
+            parts = zip(self._summary.words("part"), codes, strict=True)
             provided[name] = {part: bool(code) for part, code in parts if code != schema.UNSAID}
         return provided
 
@@ -226,16 +226,6 @@ class _Reader:
             return ()
         opposite = self._summary["sign"].values == schema.SIGNS["opposite"]
         return tuple(name for name, turned in zip(formulations, opposite.tolist(), strict=True) if turned)
-
-    def _words(self, name: str) -> list[str]:
-        return [str(word) for word in self._summary[name].values] if name in self._summary else []
-
-    def _labels(self, name: str) -> list[str]:
-        """Return the names along a dimension, which are all different."""
-        labels = self._words(name)
-        if len(set(labels)) != len(labels):
-            raise ValueError(f"two of {name} have one name")
-        return labels
 
 
 def _examples(groups: Groups) -> dict[tuple[str, str], tuple[Group, Case]]:

@@ -35,26 +35,7 @@ _KINDS |= dict.fromkeys((*_TEXTS, "case_name"), "U")
 
 
 class OutcomeArrays:
-    """The outcomes of a group along some dimensions, by their flat number.
-
-    Parameters
-    ----------
-    dataset : Group
-        The group.
-    info : PropertyInfo
-        The property of the group.
-    dims : Sequence[str]
-        The dimensions along which outcomes are counted.
-    prefix : str
-        The beginning of the names of the variables, such as `witness_`.
-
-    Raises
-    ------
-    ValueError
-        If a variable has other dimensions, or a code has no meaning.
-    KeyError
-        If a variable is missing.
-    """
+    """The outcomes of a group along some dimensions, by flat number; names of variables begin with `prefix`."""
 
     def __init__(self, dataset: Group, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
         self._dataset, self._dims, self._prefix = dataset, tuple(dims), prefix
@@ -69,7 +50,7 @@ class OutcomeArrays:
             for name in ("found", "right")
         )
         self._quantities = info.quantities
-        self._details = _labels(dataset, "detail")
+        self._details = dataset.labels("detail")
         self._values, self._tolerances, self._detail_values = (
             self._read(name, axis) if along else np.empty((len(self.verdicts), 0))
             for name, axis, along in (
@@ -108,14 +89,14 @@ class OutcomeArrays:
                 raise ValueError(f"the cases {place} have fewer than no segments")
 
     def _read_summaries(self) -> None:
-        self._parameters = _labels(self._dataset, "parameter")
+        self._parameters = self._dataset.labels("parameter")
         if not self._dims:  # The whole case of a single outcome stands elsewhere.
             return
         self._counts = np.column_stack([self._read("n_slave_segments"), self._read("n_master_segments")])
         columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
         self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
         self._case_names = self._read("case_name") if self._has("case_name") else None
-        self._kinds = [*_labels(self._dataset, "kind"), ""]  # A case of none has the code −1, which is the last.
+        self._kinds = [*self._dataset.labels("kind"), ""]  # A case of none has the code −1, which is the last.
         self._case_kinds = self._read("case_kind") if self._has("case_kind") else np.full(len(self.verdicts), -1)
 
     def outcome(self, number: int, case: Case | None = None, seconds: float = 0.0) -> Outcome | None:
@@ -196,16 +177,7 @@ class OutcomeArrays:
 class StoredOutcomes(Sequence[Outcome]):
     """The outcomes of one row, in the order of the run.
 
-    Parameters
-    ----------
-    arrays : OutcomeArrays
-        The outcomes of all formulations.
-    first, n_cases : int
-        The flat number of the first outcome, and the number of outcomes.
-    seconds : FloatArray, shape (n_cases,)
-        The time that each took.
-    named : Mapping[str, Case]
-        {name: case} of the cases that the report stores whole, of a property whose cases have names.
+    `first` is the flat number of the first, and `named` has the cases that the report stores whole, by their names.
     """
 
     def __init__(
@@ -234,17 +206,11 @@ class StoredOutcomes(Sequence[Outcome]):
 
 
 def read_info(dataset: Group) -> PropertyInfo:
-    """Return the property of a group.
-
-    Raises
-    ------
-    KeyError
-        If an attribute or variable is missing.
-    """
+    """Return the property of a group."""
     columns = ("quantity", "tolerance_formula", "tolerance_reason", "quantity_units", "sense")
     needs = str(dataset.attrs["needs"])
-    _labels(dataset, "quantity")
-    strangers = set(_names(dataset, "sense")) - {"at most", "at least"}
+    dataset.labels("quantity")
+    strangers = set(dataset.words("sense")) - {"at most", "at least"}
     if strangers:
         raise ValueError(f"the sense of a quantity is {strangers.pop()!r}")
     return PropertyInfo(
@@ -253,27 +219,15 @@ def read_info(dataset: Group) -> PropertyInfo:
         str(dataset.attrs["summary"]),
         tuple(
             Quantity(*words, unit=unit, sense=sense)
-            for *words, unit, sense in zip(*(_names(dataset, name) for name in columns), strict=True)
+            for *words, unit, sense in zip(*(dataset.words(name) for name in columns), strict=True)
         ),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
-        series=dict(zip(_labels(dataset, "series"), _names(dataset, "series_units"), strict=True)),
-        kinds=tuple(_labels(dataset, "kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
+        series=dict(zip(dataset.labels("series"), dataset.words("series_units"), strict=True)),
+        kinds=tuple(dataset.labels("kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
         # Reports that are older than these two have no such attribute.
         least_contact=float(dataset.attrs.get("least_contact", LEAST_CONTACT)),
         usual_undecided=float(dataset.attrs.get("usual_undecided", NONE_UNDECIDED)),
     )
-
-
-def _labels(dataset: Group, name: str) -> list[str]:
-    """Return the names along a dimension, which are all different."""
-    names = _names(dataset, name)
-    if len(set(names)) != len(names):
-        raise ValueError(f"two of {name} have one name")
-    return names
-
-
-def _names(dataset: Group, name: str) -> list[str]:
-    return [str(word) for word in dataset.variables[name].values] if name in dataset.variables else []
 
 
 def _present(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

@@ -19,14 +19,9 @@ _WORTH_COMPRESSING = 4096  # The bytes from which on a variable is compressed, w
 
 
 def write_tree(groups: Mapping[str, Group], path: str | os.PathLike[str]) -> None:
-    """Write groups into a new file.
+    """Write groups {path: group}, ``"/"`` first, into a file; one that is there is replaced.
 
-    Parameters
-    ----------
-    groups : Mapping[str, Group]
-        {path of the group: group}, ``"/"`` first. A dimension of a group is that of a group above if it has its length.
-    path : str | os.PathLike[str]
-        The file. One that is there is replaced.
+    A dimension of a group is that of a group above if it has its length.
     """
     with netCDF4.Dataset(os.fspath(path), "w", format="NETCDF4") as file:
         declared = []
