@@ -130,8 +130,7 @@ def run(
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     with closing(journal):
         try:
-            scheduler.work(jobs.first_calls())
-            scheduler.work(jobs)
+            scheduler.work(chain(jobs.first_calls(), jobs))
         except KeyboardInterrupt:
             raise RunStopped(jobs.result(not_loaded, resolved.name)) from None
     return jobs.result(not_loaded, resolved.name)
@@ -150,8 +149,7 @@ def judge_share(
     scheduler = Scheduler(None, progress)
     jobs = RunJobs(subjects, questions, sampling, journal, scheduler.report, {}, share)
     with closing(journal):
-        scheduler.work(jobs.first_calls())
-        scheduler.work(jobs)
+        scheduler.work(chain(jobs.first_calls(), jobs))
     jobs.check_written()
 
 

@@ -45,8 +45,8 @@ from contactverif.run.registry import installed_properties, load_property
 
 Phase = Literal["first call (compiles)", "drawing", "judging", "shrinking"]
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
-# The modules that the server of processes imports once for all workers: the judge, and libraries that import slowly.
-_PRELOAD = ["contactverif.run.run", "contactverif.mechanics.accuracy", "contactverif.strategies", "numba"]
+# What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.
+_PRELOAD = ["contactverif.run.run", "contactverif.run.preload"]
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
 

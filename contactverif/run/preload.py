@@ -1,0 +1,5 @@
+"""A module whose import loads all installed properties: the server of worker processes imports it once for all."""
+
+from contactverif.run.registry import load_properties
+
+load_properties()  # One that does not load is `NotLoaded` in each worker, too.
