@@ -101,9 +101,9 @@ class PluginProcess:
         self._follow()
         try:
             self._child.channel.send(frame, seconds=self._limits.start_seconds)
-            if not questions:
-                return
-            replies = _read_replies(self._receive(questions), questions)
+            replies = decode_replies(self._receive(questions)) if questions else []
+            if [reply.question for reply in replies] != [question.number for question in questions]:
+                raise MessageError("answers to other questions")
         except TooLateError:
             raise self._end_with(f"{self._last_verb(questions)}: its process does not listen", "hang") from None
         except ClosedError:
@@ -131,9 +131,10 @@ class PluginProcess:
         while True:
             verb = questions[number].verb
             seconds = self._limits.seconds if verb in self._known_verbs else self._limits.start_seconds
-            with suppress(TooLateError):
+            try:
                 return self._child.channel.receive(seconds)
-            before, number = number, self._count_answers(questions)
+            except TooLateError:
+                before, number = number, self._count_answers(questions)
             if number <= before:
                 raise self._end_with(f"{verb}: no answer within {seconds:g} s", "hang")
 
@@ -162,16 +163,6 @@ class PluginProcess:
         self._child.end()
         self.output.wait()
         self._progress.close()
-
-
-def _read_replies(data: bytes, questions: Sequence[Question]) -> list[Reply]:
-    """Return one reply to each question, in their order."""
-    replies = decode_replies(data)
-    if len(replies) != len(questions):
-        raise MessageError(f"{len(replies)} answers to {len(questions)} questions")
-    if [reply.question for reply in replies] != [question.number for question in questions]:
-        raise MessageError("an answer to another question")
-    return replies
 
 
 class Output:
