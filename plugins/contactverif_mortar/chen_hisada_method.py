@@ -18,9 +18,9 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_maker
+from contactverif.geometry.compiled import compile_maker
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -35,6 +35,7 @@ from contactverif.geometry.projection import (
 )
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
+from contactverif_mortar.cell_traits import CELL_TRAITS
 from contactverif_mortar.integration_cells import AREAS, C, Cells, Quadrature
 from contactverif_mortar.node_groups import group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
@@ -228,33 +229,12 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     """
     current = choose("area", area, AREAS)
     return ChenHisada(
-        Traits(
-            promises=Promises(
-                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=False),
-                converges=True,
-                locks=False,
-                tangent="exact",
-                symmetric=False,
-                conserves_force=True,
-                conserves_moment=True,
-                integrates_linear_gap=True,
-                local=True,
-                nodes_push=True,
-                unbiased=False,
-                continuity="C0",
-                translation_stable=True,
-            ),
-            rules=Rules(
-                area="current" if current else "reference",
-                gap="cells and nodes",
-                force_along="slave normal",
-                penalty="distributed",
-            ),
-            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-            evidence=Evidence(
-                witnesses={"patch.dead-zone": "dead-zone", "symmetric": "offset-c", "swap": "tilted"},
-                source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
-            ),
+        CELL_TRAITS.revise(
+            overhang=False,
+            area="current" if current else "reference",
+            gap="cells and nodes",
+            witnesses={"patch.dead-zone": "dead-zone", **CELL_TRAITS.evidence.witnesses},
+            source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
         ),
         check_penalty(penalty),
         Quadrature.gauss(N_POINTS, current),

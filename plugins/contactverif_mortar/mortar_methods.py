@@ -21,9 +21,10 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
+from contactverif.contract.traits import Traits
+from contactverif.geometry.compiled import match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
+from contactverif_mortar.cell_traits import CELL_TRAITS
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
 from contactverif_mortar.node_factors import Factors
 from contactverif_mortar.node_rows import NodeState
@@ -237,38 +238,15 @@ def _traits(area: str, normals: str, dual: bool) -> Traits:
     averaged = bool(choose("normals", normals, NORMALS))
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}
-    return Traits(
-        promises=Promises(
-            patch=PatchPromises(
-                flat=True,
-                normal=True,
-                single=True,
-                kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
-                overhang=True,
-            ),
-            converges=True,
-            locks=False,
-            tangent="exact",
-            symmetric=False,
-            conserves_force=True,
-            conserves_moment=True,
-            # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
-            continuity=None if averaged else "C0",
-            integrates_linear_gap=None if averaged else False,
-            local=True,
-            nodes_push=not dual,  # Dual shapes are negative in places.
-            unbiased=False,
-            translation_stable=True,
-        ),
-        rules=Rules(
-            area="current" if choose("area", area, AREAS) else "reference",
-            gap=None if averaged else "cells",
-            force_along=None if averaged else "slave normal",
-            penalty="distributed",
-        ),
-        abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-        evidence=Evidence(
-            witnesses={**kinked, **pulls, "patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted"},
-            source=_SOURCES[dual],
-        ),
+    return CELL_TRAITS.revise(
+        kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
+        # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
+        continuity=None if averaged else "C0",
+        integrates_linear_gap=None if averaged else False,
+        nodes_push=not dual,  # Dual shapes are negative in places.
+        area="current" if choose("area", area, AREAS) else "reference",
+        gap=None if averaged else "cells",
+        force_along=None if averaged else "slave normal",
+        witnesses={**kinked, **pulls, "patch.tilted": "tilted", **CELL_TRAITS.evidence.witnesses},
+        source=_SOURCES[dual],
     )

@@ -17,11 +17,11 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE
+from contactverif.contract.traits import Traits
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
 from contactverif_mortar.cell_tangent import springs_at_points, touching_points
+from contactverif_mortar.cell_traits import CELL_TRAITS
 from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
@@ -102,38 +102,15 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
     Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here.
     """
     return SegmentToSegment(
-        Traits(
-            promises=Promises(
-                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=True),
-                converges=True,
-                locks=True,
-                tangent="exact",
-                symmetric=False,
-                conserves_force=True,
-                conserves_moment=True,
-                continuity="C0",
-                integrates_linear_gap=True,
-                local=True,
-                nodes_push=True,
-                unbiased=False,
-                translation_stable=True,
-            ),
-            rules=Rules(
-                area="current" if choose("area", area, AREAS) else "reference",
-                gap="cells",
-                force_along="slave normal",
-                penalty="distributed",
-            ),
-            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-            evidence=Evidence(
-                witnesses={
-                    "symmetric": "offset-c",
-                    "swap": "tilted",
-                    "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                    "accuracy.wavy-curved": "upper slave, 100 E/h",
-                },
-                source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
-            ),
+        CELL_TRAITS.revise(
+            locks=True,
+            area="current" if choose("area", area, AREAS) else "reference",
+            witnesses={
+                **CELL_TRAITS.evidence.witnesses,
+                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
+                "accuracy.wavy-curved": "upper slave, 100 E/h",
+            },
+            source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
         ),
         check_penalty(penalty),
         Quadrature.gauss(N_POINTS, choose("area", area, AREAS)),

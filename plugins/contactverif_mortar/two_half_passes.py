@@ -28,12 +28,13 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, compile_maker
+from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.cell_forces import Shapes, integrals
+from contactverif_mortar.cell_traits import CELL_TRAITS
 from contactverif_mortar.covered_ranges import Ranges
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
 from contactverif_mortar.node_factors import NodeRows
@@ -244,35 +245,24 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
     Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179.
     """
     return TwoHalfPasses(
-        Traits(
-            promises=Promises(
-                patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=True),
-                locks=True,
-                tangent="exact",
-                symmetric=False,
-                conserves_force=False,
-                conserves_moment=False,
-                local=True,
-                unbiased=True,
-                nodes_push=True,
-                translation_stable=True,
-            ),
-            rules=Rules(
-                area="current" if choose("area", area, AREAS) else "reference",
-                force_along="slave normal",
-                penalty="distributed",
-            ),
-            abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-            evidence=Evidence(
-                witnesses={
-                    "balance.force": "tilted",
-                    "balance.moment": "tilted",
-                    "symmetric": "offset-c",
-                    "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                    "accuracy.wavy-curved": "upper slave, 100 E/h",
-                },
-                source=_SOURCE,
-            ),
+        CELL_TRAITS.revise(
+            converges=None,
+            locks=True,
+            conserves_force=False,
+            conserves_moment=False,
+            continuity=None,
+            integrates_linear_gap=None,
+            unbiased=True,
+            area="current" if choose("area", area, AREAS) else "reference",
+            gap=None,
+            witnesses={
+                "balance.force": "tilted",
+                "balance.moment": "tilted",
+                "symmetric": "offset-c",
+                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
+                "accuracy.wavy-curved": "upper slave, 100 E/h",
+            },
+            source=_SOURCE,
         ),
         check_penalty(penalty),
         Quadrature.gauss(max(2, check_count(n)), choose("area", area, AREAS)),

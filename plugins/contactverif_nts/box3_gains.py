@@ -218,17 +218,14 @@ def gain_of_force(d: Gain, force: Force) -> float:
 
 
 @compile_inline
-def gains_on_slave(d: Gain, v: VirtualSlaveNode, force: Force) -> tuple[float, float]:
-    """Return Δ of (1 ∓ c)/2 F_V."""
-    d_f, by_c = gain_of_force(d, force), force.f_v / 2 * ((d.c_p + d.c_q) / 2)
-    return (1 - v.c) / 2 * d_f - by_c, (1 + v.c) / 2 * d_f + by_c
-
-
-@compile_inline
-def gains_on_segment(d: Gain, v: VirtualSlaveNode, force: Force) -> tuple[float, float]:
-    """Return Δ of −(1−ξ) F_V and of −ξ F_V."""
-    d_f, by_xi = gain_of_force(d, force), force.f_v * (d.s / v.l_12)
-    return -(1 - force.xi) * d_f + by_xi, -force.xi * d_f - by_xi
+def gains_on_segment(
+    d: Gain, v: VirtualSlaveNode, force: Force, share_1: float, share_2: float, is_slave: bool
+) -> tuple[float, float]:
+    """Return Δ of two shares of F_V: (1 ∓ c)/2 F_V on the slave segment, −(1−ξ) F_V and −ξ F_V on a master segment."""
+    d_f, by_share = gain_of_force(d, force), -force.f_v * (d.s / v.l_12)
+    if is_slave:
+        by_share = force.f_v / 2 * ((d.c_p + d.c_q) / 2)
+    return share_1 * d_f - by_share, share_2 * d_f + by_share
 
 
 @compile_inline

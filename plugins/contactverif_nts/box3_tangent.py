@@ -49,7 +49,6 @@ from contactverif_nts.box3_gains import (
     gains_of_node,
     gains_on_part,
     gains_on_segment,
-    gains_on_slave,
     part_under_area,
     pressure_on_master,
 )
@@ -126,11 +125,11 @@ def _sweep(
             p_cut = cut_end(x, master, slots, v, v.c_p, area.frame, area.cut_p)
             q_cut = cut_end(x, master, slots, v, v.c_q, area.frame, area.cut_q)
             if only[coupling] in (WHOLE, area.first):
-                _add_slave_forces(local, push, at, v, force, p_cut, q_cut)
+                _add_segment_forces(local, push, at, v, force, p_cut, q_cut, True)
                 if has_multipliers:
                     _add_constraint(local, push, at, v, force, p_cut, q_cut)
             if area.first == area.last:  # IF only one segment is involved THEN Eq. 6
-                _add_eq6_forces(local, push, at, v, force, p_cut, q_cut)
+                _add_segment_forces(local, push, at, v, force, p_cut, q_cut, False)
             else:  # ELSE assembly of all the involved segments
                 pressure = pressure_on_master(v, force, transmission == BALANCED)
                 j, j_last = (area.first, area.last) if only[coupling] == WHOLE else (only[coupling], only[coupling])
@@ -244,49 +243,37 @@ def _add_unit(local: FloatArray, row: int, size: float, v: VirtualSlaveNode, at:
 
 
 @compile_inline
-def _add_slave_forces(
-    local: FloatArray, push: FloatArray, at: Places, v: VirtualSlaveNode, force: Force, p_cut: Cut, q_cut: Cut
+def _add_segment_forces(
+    local: FloatArray,
+    push: FloatArray,
+    at: Places,
+    v: VirtualSlaveNode,
+    force: Force,
+    p_cut: Cut,
+    q_cut: Cut,
+    is_slave: bool,
 ) -> None:
-    """Add the forces (1 ∓ c)/2 F_V n on A and B, and their Δ."""
-    f_a, f_b = (1 - v.c) / 2 * force.f_v, (1 + v.c) / 2 * force.f_v
-    _add_force(push, at.a, f_a, v)
-    _add_force(push, at.b, f_b, v)
+    """Add the forces on A and B, or on 1 and 2 (Eq. 6), and their Δ."""
+    first, second, share_1, share_2 = at.node_1, at.node_2, -(1 - force.xi), -force.xi
+    if is_slave:
+        first, second, share_1, share_2 = at.a, at.b, (1 - v.c) / 2, (1 + v.c) / 2
+    f_1, f_2 = share_1 * force.f_v, share_2 * force.f_v
+    _add_force(push, first, f_1, v)
+    _add_force(push, second, f_2, v)
     for k in range(N_CORE):
         column, d_n, d_t, _ = gains_of_node(k, v, force, at)
-        (a_n, b_n), (a_t, b_t) = gains_on_slave(d_n, v, force), gains_on_slave(d_t, v, force)
-        _add_block(local, at.a, column, v, a_n, a_t, f_a * d_n.omega)
-        _add_block(local, at.b, column, v, b_n, b_t, f_b * d_n.omega)
+        on_1_n, on_2_n = gains_on_segment(d_n, v, force, share_1, share_2, is_slave)
+        on_1_t, on_2_t = gains_on_segment(d_t, v, force, share_1, share_2, is_slave)
+        _add_block(local, first, column, v, on_1_n, on_1_t, f_1 * d_n.omega)
+        _add_block(local, second, column, v, on_2_n, on_2_t, f_2 * d_n.omega)
     if p_cut.is_cut or q_cut.is_cut:
         for d, cut in ((gain_of_p(force), p_cut), (gain_of_q(force), q_cut)):
-            d_a, d_b = gains_on_slave(d, v, force)
-            _add_cut_blocks(local, at.a, d_a, v, at, cut)
-            _add_cut_blocks(local, at.b, d_b, v, at, cut)
+            on_1, on_2 = gains_on_segment(d, v, force, share_1, share_2, is_slave)
+            _add_cut_blocks(local, first, on_1, v, at, cut)
+            _add_cut_blocks(local, second, on_2, v, at, cut)
     if force.by_gap == 0.0:
-        _add_unit(local, at.a, -(1 - v.c) / 2 * force.size, v, at)
-        _add_unit(local, at.b, -(1 + v.c) / 2 * force.size, v, at)
-
-
-@compile_inline
-def _add_eq6_forces(
-    local: FloatArray, push: FloatArray, at: Places, v: VirtualSlaveNode, force: Force, p_cut: Cut, q_cut: Cut
-) -> None:
-    """Add the forces −(1−ξ) F_V n and −ξ F_V n on the nodes of one master segment, and their Δ."""
-    f_1, f_2 = -(1 - force.xi) * force.f_v, -force.xi * force.f_v
-    _add_force(push, at.node_1, f_1, v)
-    _add_force(push, at.node_2, f_2, v)
-    for k in range(N_CORE):
-        column, d_n, d_t, _ = gains_of_node(k, v, force, at)
-        (on_1_n, on_2_n), (on_1_t, on_2_t) = gains_on_segment(d_n, v, force), gains_on_segment(d_t, v, force)
-        _add_block(local, at.node_1, column, v, on_1_n, on_1_t, f_1 * d_n.omega)
-        _add_block(local, at.node_2, column, v, on_2_n, on_2_t, f_2 * d_n.omega)
-    if p_cut.is_cut or q_cut.is_cut:
-        for d, cut in ((gain_of_p(force), p_cut), (gain_of_q(force), q_cut)):
-            on_1, on_2 = gains_on_segment(d, v, force)
-            _add_cut_blocks(local, at.node_1, on_1, v, at, cut)
-            _add_cut_blocks(local, at.node_2, on_2, v, at, cut)
-    if force.by_gap == 0.0:
-        _add_unit(local, at.node_1, (1 - force.xi) * force.size, v, at)
-        _add_unit(local, at.node_2, force.xi * force.size, v, at)
+        _add_unit(local, first, -share_1 * force.size, v, at)
+        _add_unit(local, second, -share_2 * force.size, v, at)
 
 
 @compile_inline
