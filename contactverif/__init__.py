@@ -18,16 +18,11 @@ if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.cases import Cases
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
-    from contactverif.contract.formulation import (
-        ContactPoints,
-        Formulation,
-        Handle,
-        Pairing,
-        ResidualOnly,
-        evaluate_both,
-    )
+    from contactverif.contract.formulation import ContactPoints, Formulation, ResidualOnly, evaluate_both
     from contactverif.contract.interface import Interface, Surface
-    from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict
+    from contactverif.contract.measurement import Finding, Measurement, Quantity
+    from contactverif.contract.pairing import Handle, Pairing
+    from contactverif.contract.property import Outcome, Property, Verdict
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
     from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
@@ -52,9 +47,11 @@ _HOMES = {
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
-    "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
+    "contract.formulation": ("ContactPoints", "Formulation", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
-    "contract.property": ("Finding", "Measurement", "Outcome", "Property", "Quantity", "Verdict"),
+    "contract.measurement": ("Finding", "Measurement", "Quantity"),
+    "contract.pairing": ("Handle", "Pairing"),
+    "contract.property": ("Outcome", "Property", "Verdict"),
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
     "contract.traits": ("Abilities", "Evidence", "PatchPromises", "Promises", "Rules", "Traits"),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import contactverif_nts
-from contactverif.contract.formulation import Handle
+from contactverif.contract.pairing import Handle
 
 
 class Handled:

@@ -44,7 +44,8 @@ from subjects import load_property, load_subject, with_promises
 import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, Property, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import Row
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits

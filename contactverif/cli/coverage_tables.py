@@ -12,8 +12,7 @@ from rich.text import Text
 
 from contactverif.cli.console import fold, line
 from contactverif.contract.case_counts import CaseCounts, add_by_kind, percent, total
-from contactverif.contract.coverage import Coverage, coverage_of
-from contactverif.contract.result import Run
+from contactverif.contract.result import Coverage, Run, coverage_of
 
 _MOST_REASONS = 3  # The most frequent reasons of undecided cases that are shown.
 _KIND_COLUMNS = ("planned", "judged", "failed", "undecided", "idle")

@@ -1,20 +1,33 @@
 """The model of what a run found: a `Row` for each formulation and property, all rows in a `Run`.
 
-The runner makes a `Run`, a report stores it, and the reader makes it again from the file; a table, a page or a
-comparison never asks where it comes from. What follows from other attributes is computed here and only here.
+A `Coverage` says what the cases of a property were worth, all formulations together. The runner makes a `Run`, a report
+stores it, and the reader makes it again from the file; a table, a page or a comparison never asks where it comes from.
+What follows from other attributes is computed here and only here.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from contactverif.contract.case_counts import CaseCounts, CaseKey, count_by_kind, exceeds, key_of, percent, total
+from contactverif.contract.case_counts import (
+    CaseCounts,
+    CaseKey,
+    add_by_kind,
+    count_by_kind,
+    exceeds,
+    key_of,
+    percent,
+    total,
+)
 from contactverif.contract.foreign_text import LONGEST_FACT, clean, name_line, one_line
-from contactverif.contract.property import CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.measurement import CheckedNumber
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
 
+_NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
@@ -336,3 +349,41 @@ class Run:
     def rows_of(self, formulation: str) -> Iterator[Row]:
         """Return the rows of a formulation."""
         return (row for row in self.rows if row.formulation == formulation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """The cases of one property, of all formulations that it was judged for."""
+
+    info: PropertyInfo
+    n_formulations: int  # The number of formulations with at least one case.
+    counts: CaseCounts
+    # {kind of situation: counts}, in the order of the property; empty if its cases are of no kind.
+    kinds: Mapping[str, CaseCounts]
+    # {reason: number of cases} of the undecided cases, the most frequent first. Numbers in a reason are replaced by
+    # "…", so that cases that differ in a number alone have one reason.
+    reasons: Mapping[str, int]
+
+    @classmethod
+    def from_rows(cls, info: PropertyInfo, rows: list[Row]) -> Coverage:
+        """Add up the rows of a property."""
+        reasons: Counter[str] = Counter()
+        for row in rows:
+            for reason, number in row.tally.reasons.items():
+                reasons[_NUMBER.sub("…", reason)] += number
+        return cls(
+            info,
+            n_formulations=len(rows),
+            counts=total(row.tally.counts for row in rows),
+            kinds=add_by_kind(row.tally.kinds for row in rows),
+            reasons=dict(reasons.most_common()),
+        )
+
+
+def coverage_of(run: Run) -> tuple[Coverage, ...]:
+    """Return the coverage of each property of which a case was judged, in the order of the run."""
+    judged = [row for row in run.rows if row.outcomes]
+    by_property: dict[str, list[Row]] = {id_: [] for id_ in run.properties}
+    for row in judged:
+        by_property[row.property_id].append(row)
+    return tuple(Coverage.from_rows(rows[0].info, rows) for rows in by_property.values() if rows)

@@ -19,8 +19,9 @@ from contactverif.contract.arrays import Array, FloatArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import describe_error, name_line
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")

@@ -17,8 +17,8 @@ import psutil
 from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import one_line
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import (
     Answer,

@@ -18,8 +18,9 @@ from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.errors import ContractError, MisuseError, PluginError
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
 from contactverif.contract.traits import Traits
 from contactverif.isolation.host import Host, answer_of, host_of

@@ -16,7 +16,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics.linear import Step
 from contactverif.mechanics.scene import Scene

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics import linear
 from contactverif.mechanics.scene import Scene

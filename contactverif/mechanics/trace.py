@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, freeze
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 from contactverif.mechanics.scene import Scene
 
 

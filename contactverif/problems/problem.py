@@ -11,7 +11,7 @@ from typing import Protocol
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.property import Quantity
+from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
     Field,

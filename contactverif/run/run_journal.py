@@ -21,7 +21,8 @@ import numpy as np
 from contactverif.contract.arrays import freeze
 from contactverif.contract.case import CaseSummary
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
 
 FORMAT = 2

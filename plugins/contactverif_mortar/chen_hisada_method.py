@@ -15,9 +15,10 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
 from contactverif.geometry.compiled import compile_maker

@@ -18,8 +18,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_maker, match_precision
 from contactverif.geometry.projection import frame, node

@@ -17,9 +17,10 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import match_precision

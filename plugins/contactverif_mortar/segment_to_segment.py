@@ -14,9 +14,10 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points

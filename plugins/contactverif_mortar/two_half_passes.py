@@ -25,9 +25,10 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif.geometry.compiled import compile_maker

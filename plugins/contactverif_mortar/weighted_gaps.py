@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_forces import Shapes, integrals

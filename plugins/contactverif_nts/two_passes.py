@@ -19,8 +19,9 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints, Handle, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.published_forces import Fractions, format_forces, parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits

@@ -7,8 +7,9 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases

@@ -10,7 +10,8 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.sliding import sliding_cases

@@ -10,8 +10,9 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, prepare_state

@@ -18,7 +18,8 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import WITHOUT_BARRIER, Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import WITHOUT_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.problems.flat_states import touching_states
 from contactverif.problems.hard_corner_states import (

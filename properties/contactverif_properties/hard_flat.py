@@ -15,7 +15,8 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, check_all
+from contactverif.contract.measurement import Measurement, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import deep_states, node_hit_states, offset_states, search_states

@@ -11,7 +11,8 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve

@@ -11,7 +11,8 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases

@@ -13,8 +13,9 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import solve

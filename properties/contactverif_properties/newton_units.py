@@ -10,7 +10,8 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.changed_scenes import change_units

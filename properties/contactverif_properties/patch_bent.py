@@ -13,7 +13,8 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy

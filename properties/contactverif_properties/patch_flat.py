@@ -15,7 +15,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.errors import ContractError
-from contactverif.contract.property import Measurement, Property, check_all
+from contactverif.contract.measurement import Measurement, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits

@@ -11,7 +11,8 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes

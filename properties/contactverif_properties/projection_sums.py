@@ -10,7 +10,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.property import Measurement, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow

@@ -8,7 +8,8 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.interleaved_calls import Question, compare_two_pairings, count_changes, renumber

@@ -14,7 +14,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases, general_cases

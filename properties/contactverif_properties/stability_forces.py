@@ -11,9 +11,10 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact

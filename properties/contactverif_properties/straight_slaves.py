@@ -8,7 +8,8 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.property import Measurement, Property, check_all
+from contactverif.contract.measurement import Measurement, check_all
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.straight import bent_end_cases, tilted_cases

@@ -11,9 +11,10 @@ from scipy.sparse import csgraph, csr_array
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Surface
-from contactverif.contract.property import Finding, Measurement, Property, Quantity, Verdict, check_all, judge
+from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property, Verdict, judge
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import prepare_state, random_directions

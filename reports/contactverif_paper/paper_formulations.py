@@ -11,7 +11,8 @@ from functools import cache
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Measurement, Property
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import judge_case

@@ -18,7 +18,8 @@ from contactverif.contract.foreign_text import (
     printable,
 )
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo, Quantity, Verdict
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 

@@ -13,7 +13,8 @@ import pytest
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict, judge
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import Outcome, Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.named_states import named_case

@@ -13,8 +13,9 @@ from scipy import sparse
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.formulation import ContactPoints, Pairing, evaluate_both
+from contactverif.contract.formulation import ContactPoints, evaluate_both
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Abilities, Promises, Rules, Traits
 from contactverif.problems.named_states import named_case

@@ -16,8 +16,8 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import Subject
 from contactverif.geometry import chain_search, projection
 from contactverif.geometry.compiled import python_function

@@ -12,7 +12,7 @@ from subjects import load_property
 import contactverif_mortar
 import contactverif_nts
 from contactverif.contract.errors import ContractError
-from contactverif.contract.formulation import Handle, Pairing
+from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.catalogue import load_scene

@@ -13,7 +13,8 @@ from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.run.judge import judge_case

@@ -16,7 +16,8 @@ import contactverif_mortar
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.property import Measurement, Outcome, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
 
-from contactverif.contract.property import Measurement, Quantity, Verdict
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import judge_case
 from contactverif_properties.purity import (

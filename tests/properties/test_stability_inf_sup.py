@@ -8,7 +8,8 @@ from subjects import load_property, load_subject
 from textbook_springs import NodalMultipliers
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
 from contactverif.run.judge import judge_case

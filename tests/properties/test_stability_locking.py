@@ -11,7 +11,8 @@ from subjects import Changed, load_property, load_subject
 from textbook_cells import WeightedGaps
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.wave_blocks import (
     COLUMNS,

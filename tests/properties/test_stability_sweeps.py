@@ -10,7 +10,8 @@ import pytest
 from gauss_springs import RIGHT, WRONG, springs_of
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Measurement, Property, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Promises, Rules, Traits
 from contactverif.mechanics.scene import scene_of

@@ -12,7 +12,8 @@ from subjects import load_property
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import judge_case

@@ -9,8 +9,8 @@ import pytest
 from subjects import load_subject
 
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import Subject

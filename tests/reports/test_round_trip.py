@@ -22,7 +22,8 @@ from contactverif.cli.report_comparison import ChangesTable, regressions_text
 from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Finding, Measurement, Outcome, Verdict
+from contactverif.contract.measurement import Finding, Measurement
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run as verify

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Measurement, Property, PropertyInfo, Quantity, Verdict
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property, PropertyInfo, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Rules, Traits

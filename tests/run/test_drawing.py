@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity, Verdict
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.run.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name

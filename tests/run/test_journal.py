@@ -14,7 +14,8 @@ from lossy_store import lose_one_outcome
 from test_scheduler import facts
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Finding, Measurement, Outcome, Quantity, Verdict
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case

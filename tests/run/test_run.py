@@ -19,7 +19,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits

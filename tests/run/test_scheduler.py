@@ -17,11 +17,11 @@ import pytest
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.formulation import Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Outcome
 from contactverif.contract.result import Row, Run
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run import scheduler
 from contactverif.run.registry import load_formulation, load_properties

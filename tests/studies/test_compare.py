@@ -14,7 +14,8 @@ from contactverif.cli.report_comparison import regressions_text
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, judge
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Outcome, Property, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve

@@ -16,8 +16,8 @@ import numpy as np
 
 from contactverif.contract.arrays import Array
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.isolation.remote_formulation import RemoteFormulation
 

@@ -16,8 +16,8 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
 

@@ -20,8 +20,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 
 STEPS = (8.0, 1.0, 0.125)  # Steps over the one at which truncation and roundoff are equal.

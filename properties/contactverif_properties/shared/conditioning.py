@@ -28,8 +28,8 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import Measurement, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.roundoff import ratio

@@ -13,8 +13,8 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 
 BOTH = "residual_and_tangent"

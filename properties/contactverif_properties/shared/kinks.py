@@ -17,7 +17,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
 from contactverif_properties.shared.any_state import random_directions

@@ -12,7 +12,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
 from contactverif.contract.case import Case
-from contactverif.contract.property import Quantity
+from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 
 GAP_TOLERANCE = "u(8X/|g| + 4N)"

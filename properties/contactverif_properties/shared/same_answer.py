@@ -14,8 +14,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.property import CheckedNumber, Measurement, Quantity, check_all
+from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.oracle import default_points, nearest_segments
 from contactverif_properties.shared.any_state import ask_forces_and_tangents

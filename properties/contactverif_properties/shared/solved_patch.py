@@ -12,9 +12,10 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints, Pairing
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Surface
-from contactverif.contract.property import Measurement, Quantity, check_all
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.property import Quantity
+from contactverif.contract.measurement import Quantity
 from contactverif.contract.subject import Subject
 from contactverif_properties.shared.any_state import prepare_state
 from contactverif_properties.shared.block_derivatives import (

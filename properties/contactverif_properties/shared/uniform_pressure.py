@@ -7,7 +7,7 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.scene import Scene

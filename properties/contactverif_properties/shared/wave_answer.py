@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.system import System

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
-from contactverif.contract.property import DECIDED, CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.measurement import CheckedNumber
+from contactverif.contract.property import DECIDED, Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Result, Row
 
 ORDER = "order of one Newton step"  # The quantity that measures the order of Newton's method.

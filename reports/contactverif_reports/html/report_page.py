@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.coverage import coverage_of
-from contactverif.contract.property import CheckedNumber, checked_numbers
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.measurement import CheckedNumber
+from contactverif.contract.property import checked_numbers
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Iterations, count_iterations
 from contactverif_reports.draw import as_text

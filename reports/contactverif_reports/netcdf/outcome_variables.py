@@ -14,7 +14,8 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import CaseSummary
 from contactverif.contract.counterexample import distinct, typeable
-from contactverif.contract.property import Finding, Measurement, Outcome, PropertyInfo
+from contactverif.contract.measurement import Finding, Measurement
+from contactverif.contract.property import Outcome, PropertyInfo
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Variable
 from contactverif_reports.netcdf.variables import codes, numbers, words

@@ -13,16 +13,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.case import Case, CaseSummary
-from contactverif.contract.property import (
-    LEAST_CONTACT,
-    NONE_UNDECIDED,
-    Finding,
-    Measurement,
-    Outcome,
-    PropertyInfo,
-    Quantity,
-    Verdict,
-)
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import LEAST_CONTACT, NONE_UNDECIDED, Outcome, PropertyInfo, Verdict
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.outcome_variables import safe_names

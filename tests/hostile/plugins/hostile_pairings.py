@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from hostile_kit import EITHER, answers
 
-from contactverif.contract.formulation import Pairing
+from contactverif.contract.pairing import Pairing
 
 NUMBER_OF_NAMES = 200_000
 
