@@ -24,7 +24,7 @@ from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity
 
-ERROR = Quantity("error", "1", "1e-6", "a number for a test")
+ERROR = Quantity("error", "1e-6", "a number for a test")
 
 def a_case(size):
     x = np.arange(size + 1.0)
