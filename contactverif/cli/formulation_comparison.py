@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -71,9 +70,8 @@ def load_plan(
 
 def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
     """Run all properties, show the tables and write the files; return the exit status."""
-    with watch_for_stops(job), ExitStack() as stack:
+    with watch_for_stops(job), job.journal() as journal:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            journal = stack.enter_context(job.journal())
             study = run_comparison(
                 plan.reference,
                 plan.candidates,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -105,10 +104,9 @@ def run_job(job: VerifyJob) -> int:
     from contactverif.run.run import run
     from contactverif.run.scheduler import worker_pool
 
-    with watch_for_stops(job), ExitStack() as stack:
+    with watch_for_stops(job), job.journal() as journal:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             subjects, questions = job.load()
-            journal = stack.enter_context(job.journal())
             result = run(
                 subjects,
                 questions,

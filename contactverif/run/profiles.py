@@ -19,21 +19,11 @@ Shrink = Literal["new", "all", "none"]
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """The size of a run.
-
-    Attributes
-    ----------
-    name : str
-        The name on the command line.
-    examples : int
-        The number of planned cases of each property.
-    seed : int | None
-        The seed of all cases; None means a fresh seed in every run.
-    """
+    """The size of a run under a name on the command line."""
 
     name: str
-    examples: int
-    seed: int | None
+    examples: int  # The number of planned cases of each property.
+    seed: int | None  # The seed of all cases; None means a fresh seed in every run.
 
     @property
     def derandomised(self) -> bool:
@@ -43,22 +33,7 @@ class Profile:
     def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
         """Return the profile with the numbers of the user and with a seed, which can be printed and used again.
 
-        Parameters
-        ----------
-        examples, seed : int | None
-            The numbers of the user; None keeps those of the profile.
-        fresh : int | None
-            The seed if neither the user nor the profile names one; None draws a new one.
-
-        Returns
-        -------
-        Profile
-            A profile whose seed is a number.
-
-        Raises
-        ------
-        MisuseError
-            If there is less than one example or more than a billion, or the seed is not from 0 to 2^63 − 1.
+        Where neither the user nor the profile names a seed, it is the fresh one, or a new one.
         """
         examples = self.examples if examples is None else examples
         seed = self.seed if seed is None else seed
@@ -78,13 +53,7 @@ PROFILES = {
 
 
 def profile_named(name: str) -> Profile:
-    """Return the profile of that name.
-
-    Raises
-    ------
-    MisuseError
-        If there is none; the error suggests the nearest name.
-    """
+    """Return the profile of that name."""
     if name not in PROFILES:
         raise unknown_name_error("profile", name, PROFILES)
     return PROFILES[name]

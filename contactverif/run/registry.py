@@ -57,13 +57,7 @@ def formulation_names() -> tuple[str, ...]:
 
 
 def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
-    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which.
-
-    Parameters
-    ----------
-    limits : Limits | None
-        The limits of the process that loads them; None to load them in this one.
-    """
+    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which."""
     if limits is None:
         installed = _entries_by_name(FORMULATIONS)
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
@@ -104,25 +98,10 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
-    """Call a factory `make(*, penalty)` once, and return its formulation with every answer checked.
+    """Call a factory `make(*, penalty)` once, and return its formulation under a name, with every answer checked.
 
-    Parameters
-    ----------
-    name : str
-        The name under which the formulation is shown.
-    make : Callable[..., Any]
-        The factory.
-
-    Returns
-    -------
-    Subject | NotLoaded
-        `NotLoaded` if the factory raises an error or makes no formulation.
-
-    Raises
-    ------
-    MisuseError
-        If the factory raises one about a name with options or with an inner formulation. In a mere name there is
-        nothing that a user could have done wrong, so the others are judged.
+    It is `NotLoaded` if the factory raises an error or makes no formulation. A `MisuseError` about a name with options
+    or with an inner formulation goes on; in a mere name there is nothing that a user could have done wrong.
     """
     try:
         return Subject(name, make)
@@ -133,13 +112,7 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
 
 
 def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
-    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`.
-
-    Parameters
-    ----------
-    limits : Limits | None
-        The limits of the process that loads them; None to load them in this one.
-    """
+    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
     if limits is None:
         return tuple(map(load_with_defaults, formulation_names()))
     return tuple(survey(_worker(), formulation_names(), limits))
@@ -186,13 +159,7 @@ def the_property(property_id: str) -> Property:
 
 
 def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
-    """Return the ids of the properties that `load_properties` loads; it imports none of them.
-
-    Raises
-    ------
-    MisuseError
-        If a pattern matches nothing.
-    """
+    """Return the ids of the properties that `load_properties` loads; it imports none of them."""
     return _matches(globs, property_ids())
 
 

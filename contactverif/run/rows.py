@@ -1,4 +1,4 @@
-"""The rows of a run while their cases are judged, and what their outcomes come to.
+"""The rows of a run while their cases are judged, the jobs that judge and shrink them, and what their outcomes come to.
 
 Jobs may end in any order, and a row does not depend on it. A row may have a million outcomes: the first stay whole, and
 so do the first failures. Of all others the numbers stay, in one long array and without their meshes: all that a report
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from math import sqrt
@@ -20,14 +20,17 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
+from contactverif.isolation.remote_formulation import count_ends
 from contactverif.problems.named_states import named_case
-from contactverif.run.draw import CaseSource, Sampling, draw_cases
+from contactverif.run import judge
+from contactverif.run.draw import CaseSource, Sampling, draw_cases, shrink
 from contactverif.run.judge import badness, verdict_over_all
-from contactverif.run.run_journal import OutcomeForm, decode_outcome, encode_outcome
+from contactverif.run.run_journal import Notes, OutcomeForm, decode_outcome, encode_outcome
 from contactverif.run.scheduler import CaseChunk
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.
+SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
 CLEAR_RATIO = 1000.0  # A shrunk case need not fail by more than this many tolerances.
 
 
@@ -282,6 +285,70 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
     from contactverif.problems.catalogue import load_scene_case
 
     return load_scene_case(name)
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedCases:
+    """The outcomes of some cases, in their order."""
+
+    outcomes: tuple[Outcome, ...]
+    trouble: str = ""  # What kept the process from noting them in the journal.
+
+
+def judge_cases(
+    question: Property,
+    subject: Subject,
+    chunk: CaseChunk,
+    notes: Notes,
+    earlier: Mapping[int, Outcome],
+    count: Callable[[int], None] | None = None,
+) -> JudgedCases:
+    """Judge the cases of a chunk but for those at the places of `earlier`, and note each outcome at once.
+
+    The outcomes hold summaries, because the parent has the cases.
+    """
+    outcomes: list[Outcome] = []
+    for place, case in enumerate(chunk.cases):
+        if place in earlier:
+            outcomes.append(earlier[place])
+            continue
+        outcome = judge.judge_case(question, case, subject)
+        outcomes.append(replace(outcome, case_or_summary=outcome.summary))
+        notes.add(place, outcomes[-1])
+        if count is not None:
+            count(place + 1)
+    return JudgedCases(tuple(outcomes), notes.trouble)
+
+
+def shrink_case(
+    sampling: Sampling,
+    question: Property,
+    subject: Subject,
+    goal: Shrinking,
+    count: Callable[[int], None] | None = None,
+) -> Outcome | None:
+    """Return the outcome of the smallest case that is bad enough; None if the search judged none."""
+    source = sampling.source(question)
+    assert source is not None
+    smallest: Outcome | None = None
+    calls, ended = 0, count_ends(subject)
+
+    def fails(case: Case) -> bool:
+        nonlocal smallest, calls
+        if count_ends(subject) - ended >= SHRINK_ENDS:
+            return False
+        calls += 1
+        if count is not None:
+            count(calls)
+        outcome = judge.judge_case(question, case, subject)
+        bad = badness(question.info, outcome)
+        if bad[0] != goal.kind or bad < goal.least:
+            return False
+        smallest = outcome
+        return True
+
+    shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    return smallest
 
 
 def find_gap(

@@ -26,30 +26,22 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-from contactverif.isolation.remote_formulation import count_ends
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.rows import WHOLE, OpenRow, Shrinking, open_row
-from contactverif.run.run_journal import WITNESS, BlockRecord, Journal, Notes
+from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, judge_cases, open_row, shrink_case
+from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
-SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
 
 _Kind = TypeVar("_Kind")
 
 
 class RunStopped(KeyboardInterrupt):
-    """The user has stopped a run.
-
-    Parameters
-    ----------
-    run : Run
-        The rows as far as they are judged; a row that is not complete is not judged, and its reason says so.
-    """
+    """The user has stopped a run: a row that is not complete is not judged, and its reason says so."""
 
     def __init__(self, run: Run) -> None:
         super().__init__("the run was stopped")
@@ -118,7 +110,7 @@ def run(
         If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
     """
     known = known or {}
-    _check_known(known, properties)
+    check_known(known, properties)
     if shrink not in get_args(Shrink):
         raise MisuseError("shrink", repr(shrink), "new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
@@ -411,70 +403,6 @@ def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseC
     return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
 
 
-@dataclass(frozen=True, slots=True)
-class JudgedCases:
-    """The outcomes of some cases, in their order."""
-
-    outcomes: tuple[Outcome, ...]
-    trouble: str = ""  # What kept the process from noting them in the journal.
-
-
-def judge_cases(
-    question: Property,
-    subject: Subject,
-    chunk: CaseChunk,
-    notes: Notes,
-    earlier: Mapping[int, Outcome],
-    count: Callable[[int], None] | None = None,
-) -> JudgedCases:
-    """Judge the cases of a chunk but for those at the places of `earlier`, and note each outcome at once.
-
-    The outcomes hold summaries, because the parent has the cases.
-    """
-    outcomes: list[Outcome] = []
-    for place, case in enumerate(chunk.cases):
-        if place in earlier:
-            outcomes.append(earlier[place])
-            continue
-        outcome = judge.judge_case(question, case, subject)
-        outcomes.append(replace(outcome, case_or_summary=outcome.summary))
-        notes.add(place, outcomes[-1])
-        if count is not None:
-            count(place + 1)
-    return JudgedCases(tuple(outcomes), notes.trouble)
-
-
-def shrink_case(
-    sampling: Sampling,
-    question: Property,
-    subject: Subject,
-    goal: Shrinking,
-    count: Callable[[int], None] | None = None,
-) -> Outcome | None:
-    """Return the outcome of the smallest case that is bad enough; None if the search judged none."""
-    source = sampling.source(question)
-    assert source is not None
-    smallest: Outcome | None = None
-    calls, ended = 0, count_ends(subject)
-
-    def fails(case: Case) -> bool:
-        nonlocal smallest, calls
-        if count_ends(subject) - ended >= SHRINK_ENDS:
-            return False
-        calls += 1
-        if count is not None:
-            count(calls)
-        outcome = judge.judge_case(question, case, subject)
-        bad = judge.badness(question.info, outcome)
-        if bad[0] != goal.kind or bad < goal.least:
-            return False
-        smallest = outcome
-        return True
-
-    draw.shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
-    return smallest
-
-
 def _of_kind(kind: type[_Kind], items: Iterable[object]) -> list[_Kind]:
     return [item for item in items if isinstance(item, kind)]
 
@@ -486,7 +414,8 @@ def _check_once(argument: str, names: Iterable[str]) -> None:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")
 
 
-def _check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoaded]) -> None:
+def check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoaded]) -> None:
+    """Check that each known failure is that of a property of the run."""
     ids = [item.id if isinstance(item, Property) else item.formulation for item in properties]
     for property_id in known:
         if property_id not in ids:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.registry import load_formulation, load_properties, subject_of
-from contactverif.run.run import run
+from contactverif.run.run import check_known, run
 from contactverif.testing.failure_text import explain
 from contactverif.testing.parametrize import CheckOptions
 
@@ -73,7 +72,7 @@ class Check:
 def make_checks(arguments: CheckOptions, options: Any, fresh_seed: int) -> list[Check]:
     """Return the checks of a decorated test."""
     questions = load_properties(arguments.properties)
-    _check_known(arguments.known, [_id(question) for question in questions])
+    check_known(arguments.known, questions)
     profile = profile_named(options.contactverif_profile or arguments.profile or "dev").resolve(
         examples=_first(options.contactverif_examples, arguments.examples),
         seed=_first(options.contactverif_seed, arguments.seed),
@@ -84,13 +83,6 @@ def make_checks(arguments: CheckOptions, options: Any, fresh_seed: int) -> list[
         for subject in map(_load_subject, arguments.formulations)
         for question in questions
     ]
-
-
-def _check_known(known: Mapping[str, str], ids: Sequence[str]) -> None:
-    """Refuse a known failure of a property that is not checked."""
-    for property_id in known:
-        if property_id not in ids:
-            raise unknown_name_error("known", property_id, ids)
 
 
 def _known_of(question: Property | NotLoaded, known: Mapping[str, str]) -> dict[str, str]:

@@ -168,7 +168,7 @@ def test_what_becomes_of_a_row(author: pytest.Pytester, arguments: str, outcome:
         ("'good:n=1'", "option of 'good:n=1': found 'n'*it has none"),
         ("'good', properties=('patch.zeros',)", "property: found 'patch.zeros'*nearest: patch.zero*"),
         ("'good', profile='nigtly'", "profile: found 'nigtly'*nearest: nightly"),
-        ("'good', known={'patch.zer': 'why'}", "known: found 'patch.zer'*nearest: patch.zero*"),
+        ("'good', known={'patch.zer': 'why'}", "known failure: found 'patch.zer'*nearest: patch.zero*"),
         ("'good', properties='patch.zero'", "*properties: found 'patch.zero'; needed a sequence*"),
         ("properties=('patch.zero',)", "*formulations: found (); needed names or factories, at least one*"),
         ("'good', examples=0", "examples: found 0; needed at least 1, at most 1000000000"),
