@@ -1,4 +1,4 @@
-"""What the methods on cells promise alike; each method says what it changes."""
+"""The promises that the methods on cells have in common; each method says what it changes."""
 
 from __future__ import annotations
 
