@@ -6,8 +6,11 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from contactverif.contract.case import Case
+from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
+from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties
 
 
@@ -25,6 +28,13 @@ def load_property(property_id: str) -> Property:
     (question,) = load_properties([property_id])
     assert isinstance(question, Property), question
     return question
+
+
+def measure_case(question: Property, case: Case, subject: Subject) -> Measurement:
+    """Judge a case, and return what was measured; fail if there is nothing."""
+    outcome = judge_case(question, case, subject)
+    assert outcome.measurement is not None, outcome.reason
+    return outcome.measurement
 
 
 class Changed:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 from scene_work import measure_work
+from subjects import load_subject
 
 from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
-from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.registry import load_properties
 
 WITH_BODIES = {item.id: item for item in load_properties(["*"]) if isinstance(item, Property) and item.bodies}
 MOST_VISITED = 1.5  # Facets that are visited for each one that touches: where contact ends must be found.
@@ -15,8 +15,7 @@ MOST_VISITED = 1.5  # Facets that are visited for each one that touches: where c
 
 @pytest.mark.parametrize("property_id", WITH_BODIES)
 def test_no_body_is_built_twice(property_id: str) -> None:
-    subject = load_formulation("vts-ppt")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-ppt")
     if WITH_BODIES[property_id].refusal(subject.traits):
         pytest.skip("it does not apply to this formulation")
     work = measure_work(WITH_BODIES[property_id], subject)

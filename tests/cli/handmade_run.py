@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from subjects import load_property
+
 from contactverif.contract.case import Case
-from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Row, Run
-from contactverif.run.registry import load_properties
 
 
 def run_with(case: Case, formulation: str, property_id: str = "patch.flat.transmission") -> Run:
     """Return a run in which the formulation failed an installed property on the case."""
-    (question,) = load_properties([property_id])
-    assert isinstance(question, Property)
+    question = load_property(property_id)
     failed = Outcome(case, Verdict.FAIL, "made by hand")
     row = Row(formulation, question, Verdict.FAIL, None, planned=1, outcomes=(failed,), shrunk=failed)
     parts = {"pair": True, "tangent": True, "contact_points": True}

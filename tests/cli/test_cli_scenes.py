@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from asking import Ask, check_mistake
 from handmade_run import run_with
+from subjects import load_subject
 
 from contactverif.cli import scene_drawing
 from contactverif.cli.gallery import MEANINGS
@@ -21,7 +22,6 @@ from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.problems.named_states import named_case
 from contactverif.run import judge as judging
-from contactverif.run.registry import load_formulation
 from contactverif.studies import solved_scenes as pictures
 from contactverif_reports.netcdf.write import write
 
@@ -195,8 +195,7 @@ class WrongTangent:
     """VTS-PPT with a tangent of the wrong sign, so that Newton's method diverges."""
 
     def __init__(self, penalty: float) -> None:
-        subject = load_formulation("vts-ppt")
-        assert isinstance(subject, Subject)
+        subject = load_subject("vts-ppt")
         self.right = subject.with_penalty(penalty).plugin
 
     def pair(self, interface: Any, z: Any) -> Any:

@@ -120,7 +120,7 @@ def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
         assert text != source
         install_mine(tmp_path / "site", text)
         answer = run_program(
-            "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "40"
+            "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "15"
         )
         assert answer.returncode == 1
         assert rows(answer.stdout) == [(property_id, "passes", "BROKEN PROMISE")]

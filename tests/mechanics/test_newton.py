@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import sparse
+from subjects import load_subject
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError, PluginError
@@ -27,19 +28,12 @@ from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
-from contactverif.run.registry import load_formulation
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 
 
-def subject(name: str) -> Subject:
-    formulation = load_formulation(name)
-    assert isinstance(formulation, Subject)
-    return formulation
-
-
 def on(name: str, scene: Scene) -> CheckedFormulation:
-    return subject(name).for_case(scene.case())
+    return load_subject(name).for_case(scene.case())
 
 
 def solve_named(name: str, scene: Scene, **options: Any) -> Trace:
@@ -359,7 +353,7 @@ class Wrapped:
 
 
 def wrap_formulation(name: str, scene: Scene, **parts: Callable[..., Any] | None) -> CheckedFormulation:
-    inner = subject(name)
+    inner = load_subject(name)
     return Subject(name, lambda *, penalty: Wrapped(inner._make(penalty=penalty), **parts)).for_case(scene.case())
 
 
@@ -420,7 +414,7 @@ def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
     scene = catalogue.make_scene("c", penalty=1e4, lowered=0.0)
     calls = 0
-    inner = getattr(subject("vts-ppt-basic")._make(penalty=1e4), verb)
+    inner = getattr(load_subject("vts-ppt-basic")._make(penalty=1e4), verb)
 
     def third_time(*arguments: Any) -> Any:
         nonlocal calls
@@ -437,7 +431,7 @@ def test_a_plugin_that_raises_in_the_middle(verb: str) -> None:
 @pytest.mark.parametrize("in_one_call", [True, False])
 def test_each_iterate_asks_once_for_the_residual_and_once_for_the_tangent(in_one_call: bool) -> None:
     scene, calls = catalogue.make_scene("c", penalty=1e4, lowered=0.0), []
-    plugin = subject("vts-ppt-basic")._make(penalty=1e4)
+    plugin = load_subject("vts-ppt-basic")._make(penalty=1e4)
 
     def count(*names: str) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
@@ -462,7 +456,7 @@ def test_each_iterate_asks_once_for_the_residual_and_once_for_the_tangent(in_one
 
 def test_no_tangent_where_forces_balance_already() -> None:
     scene, calls = catalogue.make_scene("c", penalty=1e4, lowered=0.0), []
-    plugin = subject("vts-ppt-basic")._make(penalty=1e4)
+    plugin = load_subject("vts-ppt-basic")._make(penalty=1e4)
 
     def tangent(*arguments: Any) -> Any:
         calls.append("tangent")

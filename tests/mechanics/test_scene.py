@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import skfem
+from subjects import load_subject
 
 from contactverif import oracle
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
@@ -29,7 +30,6 @@ from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
-from contactverif.run.registry import load_formulation
 from contactverif_nts import eq6, walk
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
@@ -358,8 +358,7 @@ class Counting:
 
 def count_calls(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
     calls: list[tuple[Any, ...]] = []
-    inner = load_formulation(name)
-    assert isinstance(inner, Subject)
+    inner = load_subject(name)
     return Subject(name, lambda *, penalty: Counting(inner._make(penalty=penalty), calls)), calls
 
 
@@ -439,8 +438,7 @@ def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
 @pytest.mark.parametrize("name", ALL)
 def test_a_far_chain_of_the_master_changes_no_bit(name: str) -> None:
     """Stronger than a far body: here the formulation itself gets the far segments."""
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
+    subject = load_subject(name)
     touching = 0
     for seed in range(24):
         interface, z = wavy_interface(seed, n_master=4 + seed % 9)
@@ -489,8 +487,7 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
             evaluated.append(x1[0] > 1e3)
             return distance(origin, p, x1, x2)
 
-        subject = load_formulation(name)
-        assert isinstance(subject, Subject)
+        subject = load_subject(name)
         with monkeypatch.context() as patched:
             for module in (projection, chain_search):
                 patched.setattr(module, "distance_to_segment", counting)

@@ -110,3 +110,8 @@ class Wrapped:
     def _answer(self, verb: str, *arguments: Any) -> Any:
         right = getattr(self._inner, verb)
         return self._verbs[verb](right, *arguments) if verb in self._verbs else right(*arguments)
+
+
+def replaces(verb: str, make: Callable[..., Any] = contactverif_nts.vts_ppt_balanced) -> Callable[..., Any]:
+    """Decorate `change(right, *arguments)`, which answers one verb; return the factory of the wrong formulation."""
+    return lambda change: lambda *, penalty: Wrapped(penalty, make, **{verb: change})

@@ -8,19 +8,14 @@ from collections.abc import Callable
 import pytest
 from killing import KEY, OTHERS_FOR_A_SURVIVOR, as_lines, cases, first_kill, kills, properties
 from mutate import Mutant, changed_line
+from subjects import load_property, load_subject
 from wrong import MUTANTS, SURVIVORS
 
-from contactverif.contract.property import Property, Verdict
+from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties, property_ids
 from contactverif.run.run import run
-
-
-def load_property(property_id: str) -> Property:
-    (question,) = load_properties([property_id])
-    assert isinstance(question, Property)
-    return question
 
 
 def mutant_named(name: str) -> Mutant:
@@ -80,8 +75,7 @@ WITH_OPTIONS = ("vts-me:n=3", "vts-ppt:free_end=extend", "vts-ppt-balanced:n=3,a
     ],
 )
 def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> None:
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
+    subject = load_subject(name)
     decided = planned = 0
     questions = [
         question

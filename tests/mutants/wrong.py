@@ -26,7 +26,7 @@ import wrong_stability
 import wrong_states
 import wrong_sweeps
 import wrong_tangent
-from mutate import Mutant, Wrapped, changed_line
+from mutate import Mutant, Wrapped, changed_line, replaces
 
 import contactverif_mortar
 import contactverif_nts
@@ -114,21 +114,17 @@ def _soft_multipliers(penalty: float) -> Any:
     return Wrapped(penalty, contactverif_nts.nts_lm, residual=residual, tangent=tangent)
 
 
-def _moves_mesh(penalty: float) -> Any:
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        interface.nodes.setflags(write=True)
-        interface.nodes[0, 0] += 1e-3
-        return right(interface, pairing, z)
-
-    return Wrapped(penalty, residual=residual)
+@replaces("residual")
+def _moves_mesh(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    interface.nodes.setflags(write=True)
+    interface.nodes[0, 0] += 1e-3
+    return right(interface, pairing, z)
 
 
-def _writes_on_input(penalty: float) -> Any:
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        z += 0.0
-        return right(interface, pairing, z)
-
-    return Wrapped(penalty, residual=residual)
+@replaces("residual")
+def _writes_on_input(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    z += 0.0
+    return right(interface, pairing, z)
 
 
 def _encodes_numbers(penalty: float) -> Any:
@@ -170,12 +166,10 @@ def _encodes_numbers(penalty: float) -> Any:
     return Encoded()
 
 
-def _single_precision(penalty: float) -> Any:
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        rounded = z.astype(np.complex64 if np.iscomplexobj(z) else np.float32).astype(z.dtype)
-        return right(interface, pairing, rounded)
-
-    return Wrapped(penalty, residual=residual)
+@replaces("residual")
+def _single_precision(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    rounded = z.astype(np.complex64 if np.iscomplexobj(z) else np.float32).astype(z.dtype)
+    return right(interface, pairing, rounded)
 
 
 def _changes_state_in_tangent(penalty: float) -> Any:
@@ -191,20 +185,16 @@ def _changes_state_in_tangent(penalty: float) -> Any:
     return Wrapped(penalty, tangent=tangent, residual=residual)
 
 
-def _drops_small_forces(penalty: float) -> Any:
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = right(interface, pairing, z)
-        return np.where(np.abs(forces) < 1e-12, 0, forces)
-
-    return Wrapped(penalty, residual=residual)
+@replaces("residual")
+def _drops_small_forces(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    forces = right(interface, pairing, z)
+    return np.where(np.abs(forces) < 1e-12, 0, forces)
 
 
-def _symmetrises(penalty: float) -> Any:
-    def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        k = right(interface, pairing, z)
-        return (k + k.T) / 2
-
-    return Wrapped(penalty, tangent=tangent)
+@replaces("tangent")
+def _symmetrises(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    k = right(interface, pairing, z)
+    return (k + k.T) / 2
 
 
 def _reports_pressure(penalty: float, pressure: Any) -> Any:
@@ -310,7 +300,7 @@ MUTANTS = (
          "        last = following", "        last = following; break"),
     line("pushes the wrong way", PATCH, "box3",
          "f_v = pressure * l_ab * (v.c_p - v.c_q) / 2", "f_v = -pressure * l_ab * (v.c_p - v.c_q) / 2"),
-    Mutant("positions in single precision", PATCH, lambda *, penalty: _single_precision(penalty)),
+    Mutant("positions in single precision", PATCH, _single_precision),
     line("sign of ω in Eq. 6", TANGENT, "eq6_tangent",
          "omega = times(-1 / v.l_12, v.normal)", "omega = times(1 / v.l_12, v.normal)", factory="vts_me"),
     line("Δn missing", TANGENT, "box3_tangent",
@@ -345,7 +335,7 @@ MUTANTS = (
          "plus(times(shape, v.t), times(v.g, omega))", "times(shape, v.t)", factory="vts_me"),
     line("rows and columns exchanged", TANGENT, "turned_force",
          "row, column, xx, xy, yx, yy)", "row, column, xx, yx, xy, yy)", factory="nts_ar"),
-    Mutant("tangent symmetrised", TANGENT, lambda *, penalty: _symmetrises(penalty)),
+    Mutant("tangent symmetrised", TANGENT, _symmetrises),
     line("length without its imaginary part", TANGENT, "box3",
          "l_ab, _, _ = frame(x_a, x_b)\n    if", "l_ab = frame(x_a, x_b)[0].real\n    if"),
     line("absolute value of a complex gap", TANGENT, "box3",
@@ -367,7 +357,7 @@ MUTANTS = (
     line("shortest length allowed, absolute", SCALING, "eq6",
          "xi = dot(d, t) / l_12", "xi = dot(d, t) / max(l_12.real, 1e-9)",
          factory="vts_me"),
-    Mutant("small forces dropped", SCALING, lambda *, penalty: _drops_small_forces(penalty)),
+    Mutant("small forces dropped", SCALING, _drops_small_forces),
     line("NaN on a segment seen edge-on", PURITY, "walk",
          "_projected_length(x, master, following, t) <= 0", "_projected_length(x, master, following, t) < 0",
          nth=0, factory="vts_ppt", free_end="extend"),
@@ -386,8 +376,8 @@ MUTANTS = (
     Mutant("pairing kept from the first call", PURITY, lambda *, penalty: _keeps_first_pairing(penalty)),
     Mutant("pairing that changes at every call", PURITY, lambda *, penalty: _changes_pairing(penalty)),
     Mutant("tangent that leaves a trace", PURITY, lambda *, penalty: _changes_state_in_tangent(penalty)),
-    Mutant("interface modified", PURITY, lambda *, penalty: _moves_mesh(penalty)),
-    Mutant("positions modified", PURITY, lambda *, penalty: _writes_on_input(penalty)),
+    Mutant("interface modified", PURITY, _moves_mesh),
+    Mutant("positions modified", PURITY, _writes_on_input),
     line("area measured elsewhere than the trait says", RESULTANT, "patch_test_passing",
          "current_area=current,", "current_area=False,"),
     line("last node of the last chain forgotten", RESULTANT, "point_contact",

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, replaces
 from wrong_invariants import Look, make_factored
 
 import contactverif_mortar
@@ -36,17 +36,14 @@ def _less_by_depth_over_radius(look: Look) -> Any:
     return 1 - 30 * (depth * curvature) ** 2
 
 
-def _reports_a_fifth_less(*, penalty: float) -> Any:
+@replaces("contact_points", contactverif_nts.vts_g)
+def _reports_a_fifth_less(right: Any, interface: Any, pairing: Any, z: Any) -> ContactPoints:
     """Make VTS-G, whose reported pressures are 20 % too small unless both segments are parallel."""
-
-    def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> ContactPoints:
-        points = right(interface, pairing, z)
-        look = Look(interface, z.reshape(-1, 2), points.slave_segment, points.master_segment)
-        slave, master = look.tangents("slave", look.slave), look.tangents("master", look.master)
-        sine = slave[:, 0] * master[:, 1] - slave[:, 1] * master[:, 0]
-        return replace(points, pressure=np.where(abs(sine) > LEAST_TURN, 0.8, 1.0) * points.pressure)
-
-    return Wrapped(penalty, contactverif_nts.vts_g, contact_points=contact_points)
+    points = right(interface, pairing, z)
+    look = Look(interface, z.reshape(-1, 2), points.slave_segment, points.master_segment)
+    slave, master = look.tangents("slave", look.slave), look.tangents("master", look.master)
+    sine = slave[:, 0] * master[:, 1] - slave[:, 1] * master[:, 0]
+    return replace(points, pressure=np.where(abs(sine) > LEAST_TURN, 0.8, 1.0) * points.pressure)
 
 
 def _says_that_kinks_pass(*, penalty: float) -> Any:
@@ -55,16 +52,13 @@ def _says_that_kinks_pass(*, penalty: float) -> Any:
     return replace(inner, traits=inner.traits.revise(kinked=True, witnesses={}))
 
 
-def _whole_segments(*, penalty: float) -> Any:
+@replaces("pair", contactverif_nts.vts_g)
+def _whole_segments(right: Any, interface: Any, z: Any) -> Any:
     """Make VTS-G, in which all points of a slave segment press as soon as one of them penetrates."""
-
-    def pair(right: Any, interface: Any, z: Any) -> Any:
-        pairing = dict(right(interface, z))
-        segments, on_master = pairing["segment"], pairing["master"] >= 0
-        closed = np.bincount(segments[pairing["active"]], minlength=len(interface.slave)) > 0
-        return {**pairing, "active": closed[segments] & on_master}
-
-    return Wrapped(penalty, contactverif_nts.vts_g, pair=pair)
+    pairing = dict(right(interface, z))
+    segments, on_master = pairing["segment"], pairing["master"] >= 0
+    closed = np.bincount(segments[pairing["active"]], minlength=len(interface.slave)) > 0
+    return {**pairing, "active": closed[segments] & on_master}
 
 
 MUTANTS = (

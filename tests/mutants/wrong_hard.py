@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, Wrapped, replaces
 
 import contactverif_nts
 from contactverif import Pairing
@@ -135,23 +135,18 @@ def _divides_by_the_distance(*, penalty: float) -> Any:
     return Wrapped(penalty, contactverif_nts.vts_me, residual=residual)
 
 
-def _divides_by_the_cosine(*, penalty: float) -> Any:
+@replaces("residual", contactverif_nts.nts_ar)
+def _divides_by_the_cosine(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Divide forces by the cosine of the angle between the first segments of slave and master."""
-
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        x = np.real(z).reshape(*z.shape[:-1], -1, 2)
-        slave, master = (
-            x[..., segments[0, 1], :] - x[..., segments[0, 0], :]
-            for segments in (interface.slave.segments, interface.master.segments)
-        )
-        cosine = (
-            -(slave * master).sum(axis=-1)
-            / np.hypot(*np.moveaxis(slave, -1, 0))
-            / np.hypot(*np.moveaxis(master, -1, 0))
-        )
-        return right(interface, pairing, z) / cosine[..., None]
-
-    return Wrapped(penalty, contactverif_nts.nts_ar, residual=residual)
+    x = np.real(z).reshape(*z.shape[:-1], -1, 2)
+    slave, master = (
+        x[..., segments[0, 1], :] - x[..., segments[0, 0], :]
+        for segments in (interface.slave.segments, interface.master.segments)
+    )
+    cosine = (
+        -(slave * master).sum(axis=-1) / np.hypot(*np.moveaxis(slave, -1, 0)) / np.hypot(*np.moveaxis(master, -1, 0))
+    )
+    return right(interface, pairing, z) / cosine[..., None]
 
 
 def _counts_twice(make: Any, double: Keep) -> Any:

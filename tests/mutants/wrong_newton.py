@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, Wrapped, replaces
 
 import contactverif_nts
 from contactverif import Pairing
@@ -13,13 +13,10 @@ from contactverif import Pairing
 UNITS, ATTAINABLE = "newton.units", "newton.attainable"
 
 
-def _safe_tangent(*, penalty: float) -> Any:
+@replaces("tangent")
+def _safe_tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Add a small stiffness to the diagonal, so that no matrix is singular."""
-
-    def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        return right(interface, pairing, z).toarray() + 1e-9 * np.eye(z.size)
-
-    return Wrapped(penalty, tangent=tangent)
+    return right(interface, pairing, z).toarray() + 1e-9 * np.eye(z.size)
 
 
 def _least_pressure(*, penalty: float) -> Any:
@@ -34,14 +31,11 @@ def _least_pressure(*, penalty: float) -> Any:
     return Wrapped(penalty, contactverif_nts.vts_me, pair=pair)
 
 
-def _drops_entries(*, penalty: float) -> Any:
+@replaces("tangent")
+def _drops_entries(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Drop entries that are small in newtons and millimetres, to save places in the matrix."""
-
-    def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        matrix = right(interface, pairing, z).toarray()
-        return np.where(np.abs(matrix) < 1e-3, 0.0, matrix)
-
-    return Wrapped(penalty, tangent=tangent)
+    matrix = right(interface, pairing, z).toarray()
+    return np.where(np.abs(matrix) < 1e-3, 0.0, matrix)
 
 
 class PointsFirst:

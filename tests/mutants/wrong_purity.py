@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from handles import ReusesItsHandle
-from mutate import Mutant, Wrapped
+from mutate import Mutant, Wrapped, replaces
 
 from contactverif.contract.arrays import dense
 
@@ -83,17 +83,14 @@ def _shares_its_penalty(*, penalty: float) -> Any:
 _SHARED_ANSWERS: dict[Any, Any] = {}
 
 
-def _shares_its_answers(*, penalty: float) -> Any:
+@replaces("residual")
+def _shares_its_answers(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Keep the last residual of any instance, by its positions and pairing, whatever the penalty is."""
-
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        key = z.tobytes(), interface.nodes.tobytes(), *(values.tobytes() for values in pairing.values())
-        if key not in _SHARED_ANSWERS:
-            _SHARED_ANSWERS.clear()
-            _SHARED_ANSWERS[key] = right(interface, pairing, z)
-        return _SHARED_ANSWERS[key]
-
-    return Wrapped(penalty, residual=residual)
+    key = z.tobytes(), interface.nodes.tobytes(), *(values.tobytes() for values in pairing.values())
+    if key not in _SHARED_ANSWERS:
+        _SHARED_ANSWERS.clear()
+        _SHARED_ANSWERS[key] = right(interface, pairing, z)
+    return _SHARED_ANSWERS[key]
 
 
 class _InOneCall(Wrapped):

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, Wrapped, replaces
 
 import contactverif_mortar
 import contactverif_nts
@@ -47,29 +47,23 @@ def _report_no_tension(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     return replace(points, pressure=np.maximum(points.pressure, 0.0))
 
 
-def _outward_shares(*, penalty: float) -> Any:
+@replaces("residual", contactverif_nts.vts_me)
+def _outward_shares(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Double the distance of each point from the middle of its segment in the shares of its nodes: force is kept."""
-
-    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = np.array(right(interface, pairing, z)).reshape(*z.shape[:-1], -1, 2)
-        for first, second in interface.slave.segments:
-            between = (forces[..., first, :] - forces[..., second, :]) / 2
-            forces[..., first, :] += between
-            forces[..., second, :] -= between
-        return forces.reshape(z.shape)
-
-    return Wrapped(penalty, contactverif_nts.vts_me, residual=residual)
+    forces = np.array(right(interface, pairing, z)).reshape(*z.shape[:-1], -1, 2)
+    for first, second in interface.slave.segments:
+        between = (forces[..., first, :] - forces[..., second, :]) / 2
+        forces[..., first, :] += between
+        forces[..., second, :] -= between
+    return forces.reshape(z.shape)
 
 
-def _noisy_tangent(*, penalty: float) -> Any:
+@replaces("tangent")
+def _noisy_tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Change each tangent by up to 1e-6 of it, by other numbers for each state: it jumps wherever it is asked."""
-
-    def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        matrix = np.array(right(interface, pairing, z).toarray())
-        random = np.random.default_rng(zlib.crc32(z.tobytes()))
-        return matrix * (1 + 1e-6 * random.uniform(-1, 1, matrix.shape))
-
-    return Wrapped(penalty, tangent=tangent)
+    matrix = np.array(right(interface, pairing, z).toarray())
+    random = np.random.default_rng(zlib.crc32(z.tobytes()))
+    return matrix * (1 + 1e-6 * random.uniform(-1, 1, matrix.shape))
 
 
 MUTANTS = (

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from subjects import load_property, load_subject
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
+from contactverif.contract.property import Verdict
 from contactverif.mechanics import newton
 from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation, load_properties
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")
@@ -56,8 +55,7 @@ def tolerance_of(name: str) -> float:
 def error_of(formulation: str, name: str) -> float:
     """Return the largest error of a stress at a Gauss point, over the pressure."""
     scene = catalogue.make_scene(name)
-    subject = load_formulation(formulation)
-    assert isinstance(subject, Subject)
+    subject = load_subject(formulation)
     trace = newton.solve(scene, subject.for_case(scene.case()))
     assert trace.converged
     return stress_error(scene, scene.stresses(trace.solution))
@@ -82,8 +80,7 @@ def test_who_passes_the_patch_test(formulation: str, name: str) -> None:
 def multipliers(formulation: str, name: str) -> FloatArray:
     """Return the multipliers (n_multipliers,) of the solved scene, over the pressure."""
     scene = catalogue.make_scene(name)
-    subject = load_formulation(formulation)
-    assert isinstance(subject, Subject)
+    subject = load_subject(formulation)
     pressures: FloatArray = newton.solve(scene, subject.for_case(scene.case())).multipliers / scene.facts["pressure"]
     return pressures
 
@@ -103,10 +100,8 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
     pressures = multipliers("vts-me-lm", name)
     assert pressures.min() == pytest.approx(least, abs=1e-10)
     assert pressures.max() == pytest.approx(most, abs=1e-10)
-    (question,) = load_properties(["patch.flat.solve"])
-    assert isinstance(question, Property)
-    subject = load_formulation("vts-me-lm")
-    assert isinstance(subject, Subject)
+    question = load_property("patch.flat.solve")
+    subject = load_subject("vts-me-lm")
     outcome = judge_case(question, catalogue.make_scene(name).case(), subject)
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None
@@ -117,10 +112,8 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
 def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_too_many() -> None:
     grid = np.linspace(0, 8, 9)
     scene = two_blocks(Rectangle(grid, [4, 8]), Rectangle([0, 4, 8], [0, 4]), penalty=10.0, pressure=1.0)
-    subject = load_formulation("vts-ppt-lm")
-    (question,) = load_properties(["multipliers.rank"])
-    assert isinstance(subject, Subject)
-    assert isinstance(question, Property)
+    subject = load_subject("vts-ppt-lm")
+    question = load_property("multipliers.rank")
     outcome = judge_case(question, scene.case(), subject)
     assert outcome.verdict is Verdict.FAIL
     assert outcome.measurement is not None

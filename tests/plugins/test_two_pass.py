@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from test_forces import PENALTY
 
@@ -21,7 +22,6 @@ from contactverif.mechanics.trace import Trace
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.uniform_stress import stress_error
-from contactverif.run.registry import load_formulation
 from contactverif_nts import two_pass
 
 INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]
@@ -207,8 +207,7 @@ def test_what_it_promises() -> None:
 def test_by_name_with_options_and_nested() -> None:
     interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
     for name in ("two-pass/nts-ar:area=reference", "two-pass/two-pass/nts-ar:area=reference"):
-        subject = load_formulation(name)
-        assert isinstance(subject, Subject)
+        subject = load_subject(name)
         assert subject.name == name
         formulation = subject.with_penalty(PENALTY)
         tangent = formulation.tangent(interface, formulation.pair(interface, z), z).toarray()
@@ -231,8 +230,7 @@ FAILS = 1e-2
 
 
 def solve_scene(name: str, scenes: Scene) -> Trace:
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
+    subject = load_subject(name)
     trace = solve(scenes, subject.for_case(scenes.case()))
     assert trace.converged
     return trace

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
-from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
@@ -19,7 +19,6 @@ from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
 from contactverif.problems.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
 from contactverif.problems.disk import disk_on_foundation
-from contactverif.run.registry import load_formulation
 
 every_name = pytest.mark.parametrize("name", BLOCKS)
 every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])
@@ -50,8 +49,7 @@ def printed_nodes(name: str) -> tuple[list[float], list[float]]:
 def test_every_scene_solves(name: str, text: str) -> None:
     """With a formulation that passes: the pressure is the one on top, in every body."""
     scene = load_scene(name + text)
-    subject = load_formulation("vts-ppt-balanced")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-ppt-balanced")
     formulation = subject.for_case(scene.case())
     trace = newton.solve(scene, formulation)
     assert trace.converged

@@ -7,17 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from subjects import load_subject
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.subject import Subject
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
-from contactverif.run.registry import load_formulation
 from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, PaperFormulation
 
@@ -169,8 +168,7 @@ def test_the_other_half_is_symmetrical(name: str, solutions: dict[str, DiskSolut
 
 def test_nodal_forces_carry_the_load() -> None:
     scene = make_scene("example-2")
-    subject = load_formulation("vts-me")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-me")
     trace = newton.solve(scene, subject.for_case(scene.case()))
     forces = scene.nodal_forces(trace.solution)
     n_slave = scene.interface.n_slave_nodes
@@ -193,8 +191,7 @@ def test_what_is_left_of_the_difference_falls_with_the_mesh_and_is_the_current_l
 
 def test_how_it_begins() -> None:
     """Lowered, or nothing holds the disk."""
-    subject = load_formulation("vts-me")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-me")
 
     def find_end(scene: Scene) -> End:
         return newton.solve(scene, subject.for_case(scene.case())).end

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.subject import Subject
 from contactverif.mechanics.newton import solve
 from contactverif.problems.hertz_box import (
     COARSEST,
@@ -16,7 +16,6 @@ from contactverif.problems.hertz_box import (
     hertz_box,
     mesh_lines,
 )
-from contactverif.run.registry import load_formulation
 
 BOX = HertzBox()
 MESHES = (16, 23, 24, 33, 48, 54)
@@ -83,8 +82,7 @@ def test_nodal_forces_are_consistent() -> None:
 def test_a_solution_is_near_the_exact_displacements(parabola_is_slave: bool) -> None:
     penalty = 16.0
     scene = hertz_box(BOX, penalty=penalty, parabola_is_slave=parabola_is_slave)
-    subject = load_formulation("sts")
-    assert isinstance(subject, Subject)
+    subject = load_subject("sts")
     trace = solve(scene, subject.for_case(scene.case()))
     assert trace.converged
     moves = (scene.positions(trace.solution) - scene.interface.nodes.reshape(-1)).reshape(-1, 2)

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from strangers import STRANGERS, PointsFirst, TurnedFrame
-from subjects import load_property, load_subject, reporting
+from subjects import load_property, load_subject, measure_case, reporting
 
 import contactverif_mortar
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
@@ -32,12 +31,6 @@ def cases(property_id: str, count: int = 60) -> tuple[Case, ...]:
 
 def outcome_of(property_id: str, case: Case, subject: Subject) -> Outcome:
     return judge_case(load_property(property_id), case, subject)
-
-
-def measurement_of(property_id: str, case: Case, subject: Subject) -> Measurement:
-    measurement = outcome_of(property_id, case, subject).measurement
-    assert measurement is not None
-    return measurement
 
 
 @pytest.mark.parametrize("property_id", IDS)
@@ -107,7 +100,7 @@ def test_at_a_tie_either_segment_is_right() -> None:
 def test_beside_a_tie_the_farther_segment_is_wrong_by_how_much_farther_it_is() -> None:
     case = over_a_vertex(-0.25, place=0.125)
     subject = with_arrays(lambda points: {"master_segment": np.ones_like(points.master_segment)})
-    (value,) = measurement_of("projection.segment", case, subject).values.values()
+    (value,) = measure_case(load_property("projection.segment"), case, subject).values.values()
     # The second node is 2.125 beyond the vertex; the lengths are 2 and 4, and X is 4.
     farther, lengths = np.hypot(2.125, 0.25) - 0.25, 2 + 4 + np.hypot(2.125, 0.25) + 4
     assert value == pytest.approx(farther / lengths, rel=1e-12)
@@ -118,7 +111,7 @@ def test_a_gap_of_roundoff_may_have_either_sign_and_either_decision() -> None:
     case = over_a_vertex(0.0, place=0.5)
     for active in (True, False):
         subject = with_arrays(lambda points, active=active: {"active": np.full_like(points.active, active)})  # type: ignore[misc]
-        assert measurement_of("projection.activity", case, subject).details["decided points"] == 0
+        assert measure_case(load_property("projection.activity"), case, subject).details["decided points"] == 0
     for gap in (1e-17, -1e-17):
         subject = with_arrays(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})  # type: ignore[misc]
         assert outcome_of("projection.place", case, subject).verdict is Verdict.PASS
@@ -128,7 +121,7 @@ def test_a_gap_of_roundoff_may_have_either_sign_and_either_decision() -> None:
 def test_past_a_free_end_a_formulation_decides_up_to_one_segment_for_itself(place: float, wrong: int) -> None:
     case = over_a_vertex(-0.25, place=place)
     subject = with_arrays(lambda points: {"active": np.ones_like(points.active)})
-    (value,) = measurement_of("projection.activity", case, subject).values.values()
+    (value,) = measure_case(load_property("projection.activity"), case, subject).values.values()
     assert value == 2 * wrong  # The state is asked about in two units.
 
 

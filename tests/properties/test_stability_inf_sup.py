@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from subjects import load_property, load_subject
+from subjects import load_property, load_subject, measure_case
 from textbook_springs import NodalMultipliers
 
 from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
@@ -17,12 +16,6 @@ from contactverif_properties.stability_solutions import CONSTANT, SEGMENT, SLOPE
 
 QUESTION = load_property("stability.inf-sup")
 COARSER, FINER, MATCHING = refinement_cases()
-
-
-def measure(case: Case, subject: Subject) -> Measurement:
-    outcome = judge_case(QUESTION, case, subject)
-    assert outcome.measurement is not None, outcome.reason
-    return outcome.measurement
 
 
 def test_the_families_have_the_ratios_of_their_names_and_halve_their_segments() -> None:
@@ -35,18 +28,18 @@ def test_the_families_have_the_ratios_of_their_names_and_halve_their_segments() 
 @pytest.mark.parametrize("name", ["nts-lm", "mortar-lm", "mortar-dual-lm", "mortar-lm:normals=averaged"])
 @pytest.mark.parametrize("case", refinement_cases(), ids=lambda case: case.name)
 def test_the_constants_of_stable_methods_do_not_fall(name: str, case: Case) -> None:
-    measurement = measure(case, load_subject(name))
+    measurement = measure_case(QUESTION, case, load_subject(name))
     assert measurement.values[ZEROS.name] == 0
     assert abs(measurement.values[SLOPE.name]) < 0.005  # A twentieth of the tolerance.
 
 
 def test_with_two_points_a_segment_the_constant_falls_like_h_or_pressures_move_nothing() -> None:
     subject = load_subject("vts-ppt-lm")
-    measurement = measure(COARSER, subject)
+    measurement = measure_case(QUESTION, COARSER, subject)
     assert measurement.values[ZEROS.name] == 0
     assert measurement.values[SLOPE.name] == pytest.approx(1.0, abs=0.02)
     for case, share in ((FINER, 1 / 3), (MATCHING, 1 / 2)):
-        series = measure(case, subject).series
+        series = measure_case(QUESTION, case, subject).series
         assert series["zero eigenvalues"][-1] / series["multipliers"][-1] == pytest.approx(share, abs=0.01)
 
 
@@ -54,12 +47,13 @@ def test_with_one_point_a_segment_the_constant_falls_where_meshes_match() -> Non
     subject = load_subject("vts-ppt-lm:n=1")
     verdicts = {case.name: judge_case(QUESTION, case, subject).verdict for case in (COARSER, MATCHING)}
     assert verdicts == {COARSER.name: Verdict.PASS, MATCHING.name: Verdict.FAIL}
-    assert measure(MATCHING, subject).values[SLOPE.name] == pytest.approx(1.0, abs=0.02)
+    assert measure_case(QUESTION, MATCHING, subject).values[SLOPE.name] == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_stranger_with_nodal_multipliers_has_the_constants_of_nts() -> None:
     stranger, ours = (
-        measure(COARSER, subject) for subject in (Subject("it", NodalMultipliers), load_subject("nts-lm"))
+        measure_case(QUESTION, COARSER, subject)
+        for subject in (Subject("it", NodalMultipliers), load_subject("nts-lm"))
     )
     np.testing.assert_allclose(stranger.series[CONSTANT], ours.series[CONSTANT], rtol=1e-8)
     np.testing.assert_allclose(ours.series[SEGMENT], 1 / 2.0 ** np.arange(N_MESHES))

@@ -13,14 +13,13 @@ import pytest
 from expected_verdicts import FAILS
 from fresh_process import PYTHON
 from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, single_precision_at_first_node, springs_of
-from subjects import load_subject
+from subjects import load_subject, measure_case
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps
@@ -41,9 +40,7 @@ def cases(count: int = 100, kind: str = "uniform penetration") -> tuple[Case, ..
 
 
 def worst_number(case: Case, subject: Subject) -> float:
-    measurement = judge_case(stability_local, case, subject).measurement
-    assert measurement is not None
-    return max(measurement.values.values())
+    return max(measure_case(stability_local, case, subject).values.values())
 
 
 def bits(value: float) -> int:

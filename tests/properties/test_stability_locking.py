@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, load_property, load_subject
+from subjects import Changed, load_property, load_subject, measure_case
 from textbook_cells import WeightedGaps
 
-from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Verdict
 from contactverif.contract.subject import Subject
 from contactverif.problems.wave_blocks import (
@@ -33,23 +31,17 @@ CASES = {case.name: case for case in wave_cases()}
 STIFFEST = [CASES[case_name(columns, PENALTIES[-1])] for columns in COLUMNS]
 
 
-def measure(case: Case, subject: Subject) -> Measurement:
-    outcome = judge_case(QUESTION, case, subject)
-    assert outcome.measurement is not None, outcome.reason
-    return outcome.measurement
-
-
 @pytest.mark.parametrize("name", ["nts", "nts-ar", "mortar", "mortar-dual", "mortar:normals=averaged", "chen-hisada"])
 def test_what_does_not_lock_stays_far_below_both_bounds(name: str) -> None:
     for case in STIFFEST:
-        values = measure(case, load_subject(name)).values
+        values = measure_case(QUESTION, case, load_subject(name)).values
         assert values[DRIFT.name] < 0.001
         assert values[ROUGHNESS.name] < 1.2
 
 
 @pytest.mark.parametrize("name", ["sts", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced", "two-pass/nts-ar"])
 def test_what_locks_is_far_above_both_bounds(name: str) -> None:
-    values = measure(CASES["12 on 8, ε̂ = 1e8 E/h"], load_subject(name)).values
+    values = measure_case(QUESTION, CASES["12 on 8, ε̂ = 1e8 E/h"], load_subject(name)).values
     assert values[DRIFT.name] > 0.3
     assert values[ROUGHNESS.name] > 50
 
@@ -63,7 +55,7 @@ def test_nothing_locks_at_the_softest_penalty() -> None:
 
 @pytest.mark.parametrize("name", ["mortar-lm", "mortar-dual-lm", "nts-lm"])
 def test_multipliers_have_a_roughness_and_no_drift(name: str) -> None:
-    values = measure(STIFFEST[0], load_subject(name)).values
+    values = measure_case(QUESTION, STIFFEST[0], load_subject(name)).values
     assert set(values) == {ROUGHNESS.name}
     assert values[ROUGHNESS.name] < 1.2
 
@@ -75,7 +67,7 @@ def scale_springs(name: str, factor: float) -> Subject:
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_springs_that_are_softer_or_stiffer_than_they_say_do_not_lock(factor: float) -> None:
     for case in STIFFEST:
-        measurement = measure(case, scale_springs("mortar", factor))
+        measurement = measure_case(QUESTION, case, scale_springs("mortar", factor))
         assert abs(measurement.values[DRIFT.name]) < 0.005
         assert measurement.details["stiffness of the springs over the penalty"] == pytest.approx(factor, rel=1e-6)
 
@@ -92,7 +84,9 @@ def test_without_contact_points_the_drift_alone_finds_what_locks() -> None:
 
 def test_mortar_from_a_textbook_does_not_lock() -> None:
     case = CASES[case_name((8, 12), 1e4)]
-    stranger, ours = (measure(case, subject) for subject in (Subject("stranger", WeightedGaps), load_subject("mortar")))
+    stranger, ours = (
+        measure_case(QUESTION, case, subject) for subject in (Subject("stranger", WeightedGaps), load_subject("mortar"))
+    )
     assert stranger.values[DRIFT.name] == pytest.approx(ours.values[DRIFT.name], abs=1e-6)
     assert stranger.values[ROUGHNESS.name] == pytest.approx(ours.values[ROUGHNESS.name], rel=1e-6)
 

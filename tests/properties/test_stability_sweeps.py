@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, WRONG, springs_of
+from subjects import load_subject, measure_case
 
 from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Promises, Rules, Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation
 from contactverif.run.run import run
 from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR
 from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, ExactMotion, move_swept, stability_sweep
@@ -27,12 +25,6 @@ from contactverif_properties.stability_solutions import stability_stiffness
 
 def state_named(name: str) -> Case:
     return next(case for case in (*stability_states(), *stability_scenes()) if case.name == name)
-
-
-def measure(question: Property, case: Case, subject: Subject) -> Measurement:
-    measurement = judge_case(question, case, subject).measurement
-    assert measurement is not None
-    return measurement
 
 
 def without_pair(make: Any, *, penalty: float) -> Any:
@@ -45,12 +37,6 @@ def without_pair(make: Any, *, penalty: float) -> Any:
             return inner.residual(interface, inner.pair(interface, z), z)
 
     return ResidualOnly()
-
-
-def load(name: str) -> Subject:
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
-    return subject
 
 
 def test_names_are_distinct_and_every_sweep_has_states() -> None:
@@ -79,7 +65,7 @@ def test_the_motion_of_a_state_rounds_nothing(case: Case) -> None:
 def test_the_flat_state_at_the_origin_is_a_reference() -> None:
     """There the forces are the exact ones, however small the gap is."""
     for case in stability_states():
-        formulation = load("sts").for_case(case)
+        formulation = load_subject("sts").for_case(case)
         forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
         weights = uniform_pressure_weights(case.interface, case.interface.nodes[:, 0])
         exact = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, weights, -weights)
@@ -114,7 +100,7 @@ def test_only_the_offset_accuses_points_that_are_rounded_first() -> None:
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-ppt", "mortar"])
 def test_a_formulation_that_is_a_residual_alone_is_judged(name: str) -> None:
-    subject = Subject(name, partial(without_pair, load(name)._make))
+    subject = Subject(name, partial(without_pair, load_subject(name)._make))
     sweep, stiffness = run([subject], [stability_sweep, stability_stiffness], examples=1).rows
     assert sweep.verdict is Verdict.PASS, sweep.reason
     assert stiffness.verdict is Verdict.NOT_APPLICABLE
@@ -122,7 +108,7 @@ def test_a_formulation_that_is_a_residual_alone_is_judged(name: str) -> None:
 
 
 def test_the_numbers_of_a_state_belong_together() -> None:
-    measurement = measure(stability_sweep, state_named("gap-1e-9-a"), load("nts-ar"))
+    measurement = measure_case(stability_sweep, state_named("gap-1e-9-a"), load_subject("nts-ar"))
     details = measurement.details
     assert details[ERROR] == pytest.approx(measurement.values[SWEPT_ROUNDINGS.name] * 2.0**-53 * details[CONDITION])
     assert 1e8 < details[CONDITION] < 1e10
@@ -131,7 +117,8 @@ def test_the_numbers_of_a_state_belong_together() -> None:
 
 def test_a_penalty_costs_its_digits_and_no_more() -> None:
     soft, stiff = (
-        measure(stability_stiffness, state_named(f"stiffness-1e{n}"), load("vts-ppt")).details for n in (2, 10)
+        measure_case(stability_stiffness, state_named(f"stiffness-1e{n}"), load_subject("vts-ppt")).details
+        for n in (2, 10)
     )
     assert 1e7 < stiff[CONDITION] / soft[CONDITION] < 1e9
     assert stiff[ERROR] > 1e6 * soft[ERROR] > 0
@@ -146,6 +133,6 @@ def test_a_scene_rests_at_the_pressure_that_it_is_loaded_by() -> None:
 
 
 def test_multipliers_have_no_stiffness_to_sweep() -> None:
-    (row,) = run([load("mortar-lm")], [stability_stiffness], examples=1).rows
+    (row,) = run([load_subject("mortar-lm")], [stability_stiffness], examples=1).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert row.reason == "the enforcement is by a multiplier, not by springs of a stated stiffness"

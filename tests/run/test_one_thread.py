@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from fresh_process import PYTHON
 from hypothesis import strategies as st
+from subjects import load_property
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from contactverif import load_properties, named_case
+from contactverif import named_case
 from contactverif.contract.case import Case
-from contactverif.contract.property import Property
 from contactverif.run.draw import Sampling, draw_cases, shrink
 
 # A run that judged something before scipy's own BLAS was there.
@@ -37,8 +37,7 @@ def test_cases_are_made_on_one_thread() -> None:
         counts.append(count_threads())
         return replace(named_case("c"), seed=number)
 
-    (question,) = load_properties(["balance.force"])
-    assert isinstance(question, Property)
+    question = load_property("balance.force")
     with threadpool_limits(limits=2, user_api="blas"):
         source = Sampling(3, 1).source(replace(question, cases=lambda _: (make(1), make(2))))
         strategy = st.integers(1, 9).map(make)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.cli.report_comparison import regressions_text
 from contactverif.contract.case import Case
@@ -298,8 +299,7 @@ def test_the_shared_state_is_in_contact_everywhere() -> None:
     case = make_state(16)
     assert (len(case.interface.slave), len(case.interface.master)) == (16, 12)
     assert (case.positions[: case.interface.n_slave_nodes, 1] < 0).all()
-    subject = load_formulation("vts-ppt")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-ppt")
     formulation = subject.for_case(case)
     pairing = formulation.pair(case.interface, case.z)
     assert formulation.contact_points(case.interface, pairing, case.z).active.all()
@@ -615,8 +615,7 @@ def test_reports_call_what_newton_tells_by_the_names_that_properties_give_it() -
     """They share no code, so they must share words: else columns would be empty, and nobody would notice."""
     assert newton_order.quantities[0].name == ORDER == SLOPE.name
     scene = load_scene("c")
-    subject = load_formulation("vts-ppt")
-    assert isinstance(subject, Subject)
+    subject = load_subject("vts-ppt")
     details = solution_details(solve(scene, subject.for_case(scene.case())))
     assert {ITERATIONS, END} <= set(details)
     assert details[END] == CONVERGED == End.CONVERGED

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -20,17 +21,10 @@ from contactverif.problems.catalogue import load_scene
 from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import forces_on
-from contactverif.run.registry import load_formulation
 from contactverif.strategies.solids import block_cases
 from contactverif.studies.solved_scenes import solve_scene
 
 FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
-
-
-def load(name: str) -> Subject:
-    subject = load_formulation(name)
-    assert isinstance(subject, Subject)
-    return subject
 
 
 class Springs:
@@ -72,7 +66,7 @@ def to_infinity(*, penalty: float) -> Any:
 @pytest.mark.parametrize("text", ["c", "b:degrees=30", "a2-graded", "example-1", "example-1bis:degrees=90,refine=2"])
 def test_a_formulation_that_is_right_shows_the_exact_pressure_everywhere(text: str) -> None:
     scene = load_scene(text)
-    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    solved = solve_scene(scene.case(), [load_subject("vts-ppt")])
     (solution,) = solved.solutions
     assert not solved.failures
     assert solution.pressure == scene.case().parameter("pressure")
@@ -92,7 +86,7 @@ def test_under_an_imposed_approach_multipliers_carry_more_than_a_penalty() -> No
     """Each is held against its own exact pressure: a penalty gives way."""
     names = ["sts", "mortar", "mortar-lm", "two-pass/nts-lm"]
     (case, *_) = draw_cases(block_cases(), seed="pictures", examples=3).cases[1:]
-    solved = solve_scene(case, [load(name) for name in names])
+    solved = solve_scene(case, [load_subject(name) for name in names])
     assert [solution.formulation for solution in solved.solutions] == names
     assert max(solution.stress_error for solution in solved.solutions) < 1e-9
     soft, rigid = solved.pressures
@@ -102,12 +96,12 @@ def test_under_an_imposed_approach_multipliers_carry_more_than_a_penalty() -> No
 
 @pytest.mark.parametrize("name", ["nts-lm", "vts-ppt-lm", "mortar-lm", "two-pass/nts-lm"])
 def test_forces_of_multipliers_that_no_case_holds_are_not_drawn(name: str) -> None:
-    assert forces_on(named_case("c"), load(name)) is None
-    assert forces_on(named_case("c"), load("nts")) is not None
+    assert forces_on(named_case("c"), load_subject(name)) is None
+    assert forces_on(named_case("c"), load_subject("nts")) is not None
 
 
 def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
-    solved = solve_scene(load_scene("c").case(), [load("nts"), load("vts-ppt")])
+    solved = solve_scene(load_scene("c").case(), [load_subject("nts"), load_subject("vts-ppt")])
     wrong, right = solved.solutions
     assert wrong.points is None  # a nodal method has forces, not pressures
     assert np.ptp(solved.node_pressures(wrong)) > 1
@@ -117,11 +111,11 @@ def test_a_formulation_that_is_wrong_shows_it_in_numbers() -> None:
 def test_it_is_the_trace_that_is_drawn() -> None:
     scene = load_scene(FIG_30)
     names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
-    solved = solve_scene(scene.case(), [load(name) for name in names])
+    solved = solve_scene(scene.case(), [load_subject(name) for name in names])
     assert [solution.formulation for solution in solved.solutions] == names
     assert np.isnan(solved.solutions[0].pressure)
     for solution in solved.solutions:
-        trace = solve(scene, load(solution.formulation).for_case(scene.case()))
+        trace = solve(scene, load_subject(solution.formulation).for_case(scene.case()))
         assert (solution.end, solution.n_iterations, solution.converged) == ("converged", trace.n_iterations, True)
         np.testing.assert_array_equal(solution.residuals, trace.residuals)
         np.testing.assert_array_equal(solution.energies, trace.energies)
@@ -135,7 +129,7 @@ def test_it_is_the_trace_that_is_drawn() -> None:
 
 def test_the_interface_knows_whose_its_nodes_are() -> None:
     scene = load_scene("c:refine=2,degrees=20")
-    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    solved = solve_scene(scene.case(), [load_subject("vts-ppt")])
     for body, on, moved in zip(solved.bodies, solved.on_interface, solved.solutions[0].displacements, strict=True):
         np.testing.assert_array_equal(solved.case.interface.nodes[on], body.nodes[body.contact_nodes])
         at = solved.solutions[0].z.reshape(-1, 2)[on]
@@ -148,7 +142,7 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
         Rectangle([100, 101], [0, 1], young=1e4), Rectangle([100, 101], [-1, 0], young=1e4), approach=0.0, penalty=1e4
     ).bodies[1]
     scene = Scene((*near.bodies, far), (0,), (1, 2), near.penalty, near.facts, "c and another")
-    solved = solve_scene(scene.case(), [load("vts-ppt")])
+    solved = solve_scene(scene.case(), [load_subject("vts-ppt")])
     assert solved.sides == ["slave", "master", ""]
     assert solved.solutions[0].stress_error < 1e-9
 
@@ -172,7 +166,8 @@ def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., 
 
 def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
     bad = Subject("raising", raising)
-    solved = solve_scene(load_scene("c").case(), [bad, NotLoaded("absent", "ModuleNotFoundError"), load("vts-ppt")])
+    absent = NotLoaded("absent", "ModuleNotFoundError")
+    solved = solve_scene(load_scene("c").case(), [bad, absent, load_subject("vts-ppt")])
     assert [solution.formulation for solution in solved.solutions] == ["vts-ppt"]
     assert solved.failures == {
         "raising": "residual: RuntimeError: no licence left",
@@ -183,4 +178,4 @@ def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
 def test_an_interface_alone_cannot_be_solved() -> None:
     case = load_scene("c").case()
     with pytest.raises(MisuseError, match="an interface without bodies"):
-        solve_scene(Case(case.interface, case.z), [load("vts-ppt")])
+        solve_scene(Case(case.interface, case.z), [load_subject("vts-ppt")])

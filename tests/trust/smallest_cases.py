@@ -16,13 +16,12 @@ import sys
 from math import frexp
 
 import numpy as np
+from subjects import load_property
 from tables import fill
 from wrong import MUTANTS
 
 from contactverif.contract.case import Case
-from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
-from contactverif.run.registry import load_properties
 from contactverif.run.run import run
 
 FILE, BEFORE = "smallest_cases.csv", "smallest_cases_before.csv"
@@ -44,17 +43,10 @@ def size(case: Case) -> str:
     return f"{len(interface.slave)} {len(interface.master)} {max(map(bits, coordinates.tolist()))}"
 
 
-def question_of(property_id: str) -> Property:
-    """Return the property of that id."""
-    (question,) = load_properties([property_id])
-    assert isinstance(question, Property)
-    return question
-
-
 def cells(name: str) -> list[str]:
     """Return the property that is meant to catch a mutant, and the size of its smallest case with each seed."""
     (mutant,) = (mutant for mutant in MUTANTS if mutant.name == name)
-    subject, question = Subject(mutant.name, mutant.make), question_of(mutant.caught_by)
+    subject, question = Subject(mutant.name, mutant.make), load_property(mutant.caught_by)
     sizes = []
     for seed in SEEDS:
         (row,) = run([subject], [question], examples=EXAMPLES, seed=seed, shrink="all").rows
@@ -64,7 +56,7 @@ def cells(name: str) -> list[str]:
 
 def names() -> list[str]:
     """Return the mutants of properties with random cases, those that solve bodies last."""
-    questions = {name: question_of(name) for name in {mutant.caught_by for mutant in MUTANTS}}
+    questions = {name: load_property(name) for name in {mutant.caught_by for mutant in MUTANTS}}
     mutants = [mutant for mutant in MUTANTS if not isinstance(questions[mutant.caught_by].cases(None), tuple)]
     return [mutant.name for mutant in sorted(mutants, key=lambda mutant: questions[mutant.caught_by].bodies)]
 
