@@ -144,16 +144,10 @@ def test_options_are_those_of_the_springs() -> None:
         contactverif_nts.nts_lm(penalty=0)
 
 
-# Solved: on which scenes the stress is right, to roundoff or not at all, and what the multipliers are there.
+# Solved. `tests/paper/test_paper_table.py` asks who passes on the paper's scenes, and what the multipliers are there.
 
 PRESSURE = 100.0
 ROUNDOFF = 1e-11  # The largest error of a stress or a multiplier over the pressure, on even meshes.
-RIGHT = {
-    "nts_lm": {"a1", "a2-uniform", "a2-graded"},
-    "vts_me_lm": {"a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1"},
-    "vts_ppt_lm": {"a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"},
-}
-SCENES = sorted(RIGHT["vts_ppt_lm"])
 
 
 def solve_scene(name: str, scene: Scene, *, penalty: float | None = None, **options: Any) -> Trace:
@@ -166,34 +160,14 @@ def error_of(trace: Trace) -> float:
     return stress_error(trace.scene, trace.scene.stresses(trace.solution))
 
 
-@pytest.mark.parametrize("scene_name", SCENES)
-@pytest.mark.parametrize("name", RIGHT)
-def test_who_finds_the_uniform_stress(name: str, scene_name: str) -> None:
-    trace = solve_scene(name, make_scene(scene_name, pressure=PRESSURE))
+@pytest.mark.parametrize(
+    "scene_name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"]
+)
+def test_vts_me_finds_the_uniform_stress_but_in_one_scene(scene_name: str) -> None:
+    trace = solve_scene("vts_me_lm", make_scene(scene_name, pressure=PRESSURE))
     assert trace.converged
-    if scene_name in RIGHT[name]:
-        assert error_of(trace) < ROUNDOFF
-    else:
-        assert error_of(trace) > 1e-2
-
-
-def spread_of(trace: Trace) -> tuple[float, float]:
-    """Least and largest multiplier over the pressure."""
-    return trace.multipliers.min() / PRESSURE, trace.multipliers.max() / PRESSURE
-
-
-def test_multipliers_of_vts_me_are_not_uniform_where_its_stress_is() -> None:
-    on_c, on_c_prime = (solve_scene("vts_me_lm", make_scene(name, pressure=PRESSURE)) for name in ("c", "c-prime"))
-    assert spread_of(on_c) == pytest.approx((0, 2), abs=ROUNDOFF)
-    assert spread_of(on_c_prime) == pytest.approx((13 / 45, 77 / 45), abs=ROUNDOFF)
-    assert on_c.deficiency == on_c_prime.deficiency == 0  # so that there are no others
-
-
-@pytest.mark.parametrize("scene_name", ["b", "c", "c-prime", "example-1", "example-1bis"])
-def test_multipliers_of_vts_ppt_are_uniform_and_found_in_one_step(scene_name: str) -> None:
-    trace = solve_scene("vts_ppt_lm", make_scene(scene_name, pressure=PRESSURE))
-    assert spread_of(trace) == pytest.approx((1, 1), abs=ROUNDOFF)
-    assert trace.n_iterations == 1
+    error = error_of(trace)
+    assert error > 1e-2 if scene_name == "example-1bis" else error < ROUNDOFF
 
 
 @pytest.mark.parametrize(
@@ -214,7 +188,7 @@ def test_a_fine_slave_on_a_coarse_master_is_short_of_rank(name: str, options: di
     assert error_of(trace) < ROUNDOFF
 
 
-@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.parametrize("name", SPRINGS)
 def test_the_scale_of_the_decision_changes_no_solution(name: str) -> None:
     scenes = make_scene("b", pressure=PRESSURE)
     soft, hard = (solve_scene(name, scenes, penalty=scale) for scale in (1e2, 1e7))

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import load_subject, reporting, with_promises
+from subjects import load_subject, reporting
 
 import contactverif_mortar
-import contactverif_nts
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.property import Verdict, judge
@@ -110,40 +109,6 @@ def test_the_numbers_of_the_design() -> None:
     assert errors["nts-ar"] == pytest.approx(0.22, rel=0.1)
     assert errors["vts-me"] == pytest.approx(8e-2, rel=0.05)
     assert errors["vts-ppt"] >= 2e-2
-
-
-@pytest.mark.parametrize("name", ["vts-ppt-balanced", "sts"])
-def test_who_is_right_is_not_accused(name: str) -> None:
-    (row,) = run([load_subject(name)], [patch_dead_zone], examples=200, seed=5).rows
-    assert (row.verdict, row.judged, row.unexpected) == (Verdict.PASS, 200, ""), row.reason
-
-
-# --- promises ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("make", "promises", "unexpected"),
-    [
-        (contactverif_nts.vts_me, {}, ""),
-        (contactverif_nts.vts_ppt, {}, ""),
-        (contactverif_nts.vts_ppt, {"overhang": None}, ""),
-        (contactverif_nts.vts_ppt, {"overhang": True}, "promised to pass, but fails"),
-        (contactverif_nts.vts_ppt_balanced, {}, ""),
-        (contactverif_mortar.sts, {"overhang": False}, "crashed"),  # and names no witness
-        (
-            contactverif_mortar.sts,
-            {"overhang": False, "witnesses": {"patch.dead-zone": "dead-zone"}},
-            "stated to fail, but passes",
-        ),
-    ],
-)
-def test_promises_are_checked(make: Any, promises: dict[str, Any], unexpected: str) -> None:
-    subject = with_promises(make, **promises)
-    (row,) = run([subject], [patch_dead_zone], examples=20, seed=2).rows
-    assert row.unexpected == unexpected
-    if subject.traits.promises.patch.overhang is False and not unexpected:
-        assert row.witness is not None
-        assert (row.witness.verdict, row.witness.case.name) == (Verdict.FAIL, "dead-zone")
 
 
 def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> None:
