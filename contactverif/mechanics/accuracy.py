@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
@@ -229,11 +230,18 @@ def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | Floa
 
 def _quadrature(surface: Surface, positions: FloatArray, parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return shares of a segment (n_points,), places (n_segments, n_points, 2) and weights (n_segments, n_points)."""
-    abscissas, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    share = ((np.arange(parts)[:, None] + (abscissas + 1) / 2) / parts).reshape(-1)
+    share, weights = _rule(parts)
     first, second = positions[surface.segments[:, 0]], positions[surface.segments[:, 1]]
     places = first[:, None] + share[:, None] * (second - first)[:, None]
-    return share, places, surface.lengths(positions)[:, None] * np.tile(weights / (2 * parts), parts)
+    return share, places, surface.lengths(positions)[:, None] * weights
+
+
+@cache
+def _rule(parts: int) -> tuple[FloatArray, FloatArray]:
+    """Return shares of a segment that is divided into equal parts, and their weights."""
+    abscissas, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    share = ((np.arange(parts)[:, None] + (abscissas + 1) / 2) / parts).reshape(-1)
+    return freeze(share, np.float64), freeze(np.tile(weights / (2 * parts), parts), np.float64)
 
 
 def _pressures_of_nodal_forces(solution: Solution, points: ContactPoints) -> tuple[FloatArray, FloatArray, FloatArray]:

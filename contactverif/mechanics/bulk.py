@@ -30,7 +30,7 @@ DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is fact
 # A pivot below this share of its diagonal entry is zero: a loose part leaves less than 1e2 u, a long thin bar 1e6 u.
 _PIVOT_FLOOR = 2.0**-40
 _RESISTANCE_FLOOR = 1e-9  # A rigid motion of the body's size that meets less resistance than this is free.
-# A smallest resistance of supports, squared, above this share of the largest is far from the floor and from roundoff.
+# A smallest resistance, squared, above this share of the largest is far from the floor and from roundoff.
 _SAFE_RESISTANCE = 1e-6
 _MOTION_FLOOR = 1e-6  # A smaller part of a free motion is not mentioned.
 _MOTIONS = ("move along its first axis", "move along its second axis", "turn")
@@ -254,14 +254,14 @@ def loose_modes(body: Body) -> list[str]:
     modes = np.zeros((*nodes.shape, 3))
     modes[:, 0, 0] = modes[:, 1, 1] = 1
     modes[:, 0, 2], modes[:, 1, 2] = -offset[:, 1], offset[:, 0]
-    supported = modes[body.fixed]
-    sizes = np.linalg.eigvalsh(supported.T @ supported)
-    if sizes[0] > _SAFE_RESISTANCE * sizes[-1]:  # The supports alone hold the body.
+    first, second = body.contact.T
+    x, y = (nodes[second] - nodes[first]).T
+    pressed = (modes[body.contact, 0] * y[:, None, None] - modes[body.contact, 1] * x[:, None, None]).reshape(-1, 3)
+    pressed /= np.repeat(np.hypot(x, y), 2)[:, None]
+    resisted = np.concatenate([modes[body.fixed], pressed])
+    sizes = np.linalg.eigvalsh(resisted.T @ resisted)
+    if sizes[0] > _SAFE_RESISTANCE * max(sizes[-1], 1.0):
         return []
-    along = nodes[body.contact[:, 1]] - nodes[body.contact[:, 0]]
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    pressed = [np.einsum("ec,ecm->em", normals, modes[body.contact[:, end]]) for end in (0, 1)]
-    resisted = np.concatenate([supported, *pressed])
     # The triangle of QR has the same singular values, and at most three rows however many supports there are.
     _, sizes, motions = np.linalg.svd(np.linalg.qr(resisted, mode="r"), full_matrices=True)
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])

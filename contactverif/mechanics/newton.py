@@ -215,6 +215,8 @@ def _count_changes(pairing: Pairing | None, before: Pairing | None) -> int:
     if pairing is None or before is None:
         return -1
     return sum(
-        int((values != before[name]).sum()) if name in before and before[name].shape == values.shape else values.size
+        int(np.count_nonzero(values != before[name]))
+        if name in before and before[name].shape == values.shape
+        else values.size
         for name, values in pairing.items()
     )

@@ -20,7 +20,7 @@ from math import pi
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.problems.line_pressure import LinePressure
+from contactverif.problems.line_pressure import LinePressure, gauss_rule
 
 _POINTS = 8  # Number of Gauss points on each edge of a loaded side.
 _CHUNK = 512  # Number of points that are superposed at once, so that tables stay in the cache.
@@ -108,7 +108,7 @@ def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> Flo
 
 def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return ∫ N_i t ds (n, 2) along a side with nodes at `lines` (n,)."""
-    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+    points, weights = gauss_rule(_POINTS)
     share, lengths = (points + 1) / 2, np.diff(lines)
     places = lines[:-1, None] + share * lengths[:, None]
     values = traction(places.reshape(-1)).reshape(*places.shape, 2) * (weights / 2 * lengths[:, None])[..., None]

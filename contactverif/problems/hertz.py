@@ -19,6 +19,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.problems.line_pressure import gauss_rule, near_integrals
 
 TERMS = 24  # Number of even Legendre polynomials: 12 more change the peak by 2e-8 at E*/(ε̂ a) = 0.24, by 2e-6 at 0.01.
 _WIDEST = 64.0  # No contact is wider than this factor times the larger half-width, of Hertz or of the layer alone.
@@ -94,29 +95,15 @@ def solve_winkler_contact(
 def _solve_width(a: float, radius: float, stiffness: float, penalty: float, terms: int) -> WinklerContact:
     """Return the solution of half-width a, whatever its force."""
     orders = 2 * np.arange(terms)
-    points = legendre.leggauss(2 * terms)[0][terms:]  # (terms,), in (0, 1), since all is even.
+    points = gauss_rule(2 * terms)[0][terms:]  # (terms,), in (0, 1), since all is even.
     polynomials = legendre.legvander(points, orders[-1])[:, orders]
     compliance = 1 / penalty + a / stiffness  # A length per pressure: it and a²/2R make the matrix dimensionless.
     local, distant = 1 / (penalty * compliance), 2 * a / (pi * stiffness * compliance)
     matrix = np.zeros((terms + 1, terms + 1))
-    matrix[:-1, :-1] = local * polynomials - distant * _logarithms(points, orders[-1])[:, orders]
+    matrix[:-1, :-1] = local * polynomials - distant * near_integrals(points, orders[-1] + 1)[:, orders]
     matrix[:-1, -1] = -1.0  # The approach δ, which includes what ln a adds.
     matrix[-1, :-1] = 1.0  # The pressure is 0 at the edge, where all polynomials are 1.
     solution = np.linalg.solve(matrix, np.append(-(points**2), 0.0)) * a**2 / (2 * radius * compliance)
     coefficients = np.zeros(orders[-1] + 1)
     coefficients[orders] = solution[:-1]
     return WinklerContact(a, coefficients)
-
-
-def _logarithms(points: FloatArray, highest: int) -> FloatArray:
-    """Return ∫ P_n(s) ln|t − s| ds over [−1, 1] for n = 0 … highest, (n_points, highest + 1).
-
-    For n ≥ 1 it is 2 (Q_{n+1} − Q_{n−1}) / (2n + 1), since its derivative is 2 Q_n; Q by its recurrence, which is
-    stable within (−1, 1).
-    """
-    q = [np.arctanh(points), points * np.arctanh(points) - 1]
-    for n in range(1, highest + 1):
-        q.append(((2 * n + 1) * points * q[n] - n * q[n - 1]) / (n + 1))
-    first = (1 - points) * np.log(1 - points) + (1 + points) * np.log(1 + points) - 2
-    rest = [2 * (q[n + 1] - q[n - 1]) / (2 * n + 1) for n in range(1, highest + 1)]
-    return np.column_stack([first, *rest])

@@ -17,13 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import ceil, log2, pi
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
 
 TERMS = 16  # Number of Legendre polynomials on a panel: a root or a logarithm one panel away leaves 5.8^-16 = 6e-13.
@@ -36,6 +36,13 @@ _LAST_PANEL = 2.0**-18
 _EDGE_STRIP = 2.0**-10
 _NEAR = 3.0  # Points at least this many half-lengths from the middle of a panel take Gauss' rule: 5.8^-32 is left.
 _RECURRENCE = 400  # The first ratio of Legendre functions is 1/t here: a point 1e-3 outside a panel has e^-36 left.
+
+
+@cache
+def gauss_rule(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return Gauss' points and weights on [−1, 1], read-only."""
+    points, weights = legendre.leggauss(count)
+    return freeze(points, np.float64), freeze(weights, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +97,7 @@ class LinePressure:
 
         They lie at Gauss' points of the panels. Next to each edge one load stands for all of the shortest panels.
         """
-        points, weights = legendre.leggauss(self._n_terms)
+        points, weights = gauss_rule(self._n_terms)
         long = np.maximum(np.abs(self.edges[1:]), np.abs(self.edges[:-1])) <= 1 - _EDGE_STRIP
         halves = self.half_width * self._halves[long, None]
         places = self.half_width * self._middles[long, None] + halves * points
@@ -181,7 +188,7 @@ def layer_contact(
     layer = min(1.0, stiffness / (penalty * half_width))
     edges = _edges(max(2, ceil(-log2(layer * _LAST_PANEL))) + more_levels)
     right = np.flatnonzero(edges[:-1] >= 0)
-    points = legendre.leggauss(terms)[0]
+    points, _ = gauss_rule(terms)
     middles, halves = (edges[right] + edges[right + 1]) / 2, (edges[right + 1] - edges[right]) / 2
     places = (middles[:, None] + halves[:, None] * points).ravel()  # Those with x > 0, since all is even.
     integrals = logarithm_integrals(places, edges, terms)
@@ -216,18 +223,21 @@ def logarithm_integrals(x: FloatArray, edges: FloatArray, terms: int) -> FloatAr
     t = np.where(np.abs(t) == 1, np.nextafter(t, 0), t)
     integrals = np.empty((*t.shape, terms))
     near = np.abs(t) < _NEAR
-    points, weights = legendre.leggauss(2 * terms)
+    points, weights = gauss_rule(2 * terms)
     rule = weights[:, None] * legendre.legvander(points, terms - 1)
     integrals[~near] = np.log(np.abs(t[~near][:, None] - points)) @ rule
-    integrals[near] = _near_integrals(t[near], terms)
+    integrals[near] = near_integrals(t[near], terms)
     integrals[..., 0] += 2 * np.log(halves)
     integrals *= halves[:, None]
     return integrals
 
 
-def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
-    """Return ∫ P_n(τ) ln|t − τ| dτ over [−1, 1], shape (n_points, terms)."""
-    q = np.where(np.abs(t)[:, None] < 1, _functions_inside(t, terms + 1), _functions_outside(t, terms + 1))
+def near_integrals(t: FloatArray, terms: int) -> FloatArray:
+    """Return ∫ P_n(τ) ln|t − τ| dτ over [−1, 1] for n = 0 … terms − 1, shape (n_points, terms)."""
+    q, inside = np.empty((len(t), terms + 1)), np.abs(t) < 1
+    q[inside] = _functions_inside(t[inside], terms + 1)
+    if not inside.all():
+        q[~inside] = _functions_outside(t[~inside], terms + 1)
     n = np.arange(1, terms)
     rest = 2 * (q[:, 2:] - q[:, :-2]) / (2 * n + 1)
     first = (t + 1) * np.log(np.abs(t + 1)) - (t - 1) * np.log(np.abs(t - 1)) - 2
@@ -236,24 +246,22 @@ def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
 
 def _functions_inside(t: FloatArray, count: int) -> FloatArray:
     """Return Q_n (n_points, count) for n = 0 … count − 1 and |t| < 1, by the recurrence upwards, stable there."""
-    inside = np.where(np.abs(t) < 1, t, 0.0)
-    q = [np.arctanh(inside), inside * np.arctanh(inside) - 1]
+    q = [np.arctanh(t), t * np.arctanh(t) - 1]
     for n in range(1, count - 1):
-        q.append(((2 * n + 1) * inside * q[n] - n * q[n - 1]) / (n + 1))
+        q.append(((2 * n + 1) * t * q[n] - n * q[n - 1]) / (n + 1))
     return np.column_stack(q)
 
 
 def _functions_outside(t: FloatArray, count: int) -> FloatArray:
     """Return Q_n (n_points, count) for |t| > 1, by ratios Q_n/Q_{n−1} from the recurrence downwards, stable there."""
-    outside = np.where(np.abs(t) > 1, t, 2.0)
-    ratio = 1 / outside
+    ratio = 1 / t
     ratios = []
     for n in range(_RECURRENCE, 0, -1):
-        ratio = n / ((2 * n + 1) * outside - (n + 1) * ratio)
+        ratio = n / ((2 * n + 1) * t - (n + 1) * ratio)
         if n < count:
             ratios.append(ratio)
-    first = np.log((outside + 1) / (outside - 1)) / 2
-    return np.cumprod(np.column_stack([first, *ratios[::-1]]), axis=1)
+    first = np.log((t + 1) / (t - 1)) / 2
+    return np.multiply.accumulate(np.column_stack([first, *ratios[::-1]]), axis=1)
 
 
 def _edges(levels: int) -> FloatArray:
@@ -266,7 +274,7 @@ def _edges(levels: int) -> FloatArray:
 def _fit(half_width: float, pressure: Callable[[FloatArray], FloatArray], levels: int) -> LinePressure:
     """Return the pressure that is given as a function of 1 − |x|/a, whose digits are kept next to the edge."""
     edges = _edges(levels)
-    points, weights = legendre.leggauss(TERMS)
+    points, weights = gauss_rule(TERMS)
     begin, end = 2.0 ** -np.arange(levels + 1.0), np.append(2.0 ** -np.arange(1.0, levels + 1), 0.0)
     gaps = (begin + end)[:, None] / 2 - (begin - end)[:, None] / 2 * points
     factors = (np.arange(TERMS) + 0.5) * weights[:, None] * legendre.legvander(points, TERMS - 1)

@@ -367,4 +367,5 @@ def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:
     """Return the distance of a force from the sums of non-negative multiples of the normals."""
     from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
 
-    return float(nnls(np.unique(np.array(normals), axis=0).T, force)[1]) if normals else float(np.hypot(*force))
+    different = sorted({(x, y) for x, y in np.array(normals).tolist()})
+    return float(nnls(np.array(different).T, force)[1]) if normals else float(np.hypot(*force))
