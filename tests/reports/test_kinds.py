@@ -89,9 +89,9 @@ def test_the_page_shows_the_counts() -> None:
 
 def test_a_counterexample_says_its_kind() -> None:
     (example,) = failing_examples(run_with_kinds())
-    found = "the smallest case found (inside a segment)"
-    assert found in str(counterexample_text(example, None))
-    assert f"projection.place, {found}</h4>" in report_page(run_with_kinds(), "report.nc")
+    words = "the smallest case found (inside a segment)"
+    assert words in str(counterexample_text(example, None))
+    assert f"projection.place, {words}</h4>" in report_page(run_with_kinds(), "report.nc")
 
 
 def test_a_report_without_kinds_is_read(tmp_path: Path) -> None:
