@@ -81,18 +81,7 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
 
 def check_facing(interface: Interface) -> None:
-    """Check that the two surfaces face each other.
-
-    Parameters
-    ----------
-    interface : Interface
-        The interface of a mesh file.
-
-    Raises
-    ------
-    MisuseError
-        If the mean normals, weighted by length, do not oppose each other.
-    """
+    """Refuse two surfaces whose mean normals, weighted by length, do not oppose each other."""
     slave, master = (_mean_normal(surface, interface.nodes) for surface in (interface.slave, interface.master))
     # The normals of a closed chain sum to zero whichever way it runs, so a surface without an open chain shows nothing.
     if slave is None or master is None or slave @ master < 0:
@@ -123,9 +112,8 @@ def _planar(mesh: PlainMesh) -> FloatArray:
     """Return the positions (n_points, 2) of a mesh in a plane of constant z."""
     points = mesh.points
     numbers = [block.data.reshape(-1) for block in mesh.cells if block.dim > 0]
-    used = (
-        points[np.unique(np.concatenate(numbers))] if numbers else points[:0]
-    )  # Points without cells may lie outside the plane.
+    # Points without cells may lie outside the plane.
+    used = points[np.unique(np.concatenate(numbers))] if numbers else points[:0]
     if not np.isfinite(used).all():
         raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
     if len(used) and points.shape[1] == 3:
@@ -149,10 +137,9 @@ def _groups(mesh: PlainMesh) -> dict[str, Group]:
 
 def _cell_sets(mesh: PlainMesh) -> dict[str, Group]:
     """Return the sets of cells by name."""
+    numbers = [np.arange(len(block)) for block in mesh.cells]
     return {
-        name: [
-            np.isin(np.arange(len(block)), part).astype(np.int64) for block, part in zip(mesh.cells, sets, strict=True)
-        ]
+        name: [np.isin(every, part).astype(np.int64) for every, part in zip(numbers, sets, strict=True)]
         for name, sets in mesh.cell_sets.items()
     }
 
@@ -224,9 +211,8 @@ def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
         if block.dim != 2:
             continue
         kind = block.type.lower()
-        n_corners = (
-            3 if "triangle" in kind else 4 if "quad" in kind else None
-        )  # Corners come first, nodes on edges last.
+        # Corners come first, nodes on edges last.
+        n_corners = 3 if "triangle" in kind else 4 if "quad" in kind else None
         corners = block.data[:, :n_corners]
         x, y = np.moveaxis(points[corners] - points[corners[:, :1]], -1, 0)  # (n_cells, n_corners) each
         twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
@@ -236,25 +222,9 @@ def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
 
 
 def _orient(argument: str, lines: IntArray, inside: IntArray, points: FloatArray) -> tuple[IntArray, BoolArray]:
-    """Reverse lines so that each chain runs one way with its body on the left.
+    """Reverse lines (n_lines, 2) so that each chain runs one way with its body on the left.
 
-    Parameters
-    ----------
-    argument : str
-        The option that named the group.
-    lines : IntArray, shape (n_lines, 2)
-        The lines of the group.
-    inside : IntArray, shape (n_edges,)
-        The directed edges of the cells, as `_directed_edges` returns them.
-    points : FloatArray, shape (n_points, 2)
-        The positions of the mesh.
-
-    Returns
-    -------
-    lines : IntArray, shape (n_lines, 2)
-        The lines in the order of the file, some of them reversed.
-    by_cells : BoolArray, shape (n_lines,)
-        True for lines of chains whose side the cells show.
+    The cells inside show the side, by their directed edges. The second array (n_lines,) says for which lines they do.
     """
     touching = _lines_at_nodes(argument, lines, points)
     left, right = (np.isin(ends[:, 0] * len(points) + ends[:, 1], inside) for ends in (lines, lines[:, ::-1]))

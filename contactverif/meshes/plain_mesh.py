@@ -79,18 +79,7 @@ class PlainMesh:
 
 
 def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
-    """Read a mesh file.
-
-    Parameters
-    ----------
-    path : str | os.PathLike[str]
-        A file that meshio reads.
-
-    Raises
-    ------
-    MisuseError
-        If it cannot be read within the limits, or is no mesh.
-    """
+    """Read a mesh file; one that cannot be read within the limits, or is no mesh, is a `MisuseError`."""
     name = os.fspath(path)
     size = check_ordinary(path, "--mesh", "a mesh file").st_size
     try:
@@ -153,13 +142,7 @@ def _whole(name: str, parts: list[PackedArray]) -> list[IntArray]:
 
 
 def pack_mesh(path: str) -> bytes:
-    """Return a mesh file as bytes; this runs in a child process.
-
-    Raises
-    ------
-    ValueError
-        If meshio cannot read it.
-    """
+    """Return a mesh file as bytes, in a child process; one that meshio cannot read is a ValueError."""
     mesh, warnings = _read(Path(path))
     stored = _PackedMesh(
         points=PackedArray.pack(mesh.points, "points"),

@@ -155,33 +155,9 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
 
 
 def largest_work(case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float) -> float:
-    """Return the largest work in a loop over the sum of the works on its parts; the parameters of `work_in_loops`."""
-    work, throughput = work_in_loops(case, formulation, pairing, radius)
-    return max(ratio(float(w), float(t)) for w, t in zip(work, throughput, strict=True))
+    """Return the largest work in a closed loop around a state, over the sum of the works on its parts.
 
-
-def work_in_loops(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the work of the forces in closed loops around a state, on a frozen pairing.
-
-    Parameters
-    ----------
-    case : Case
-        The state, with its multipliers if any.
-    formulation : CheckedFormulation
-        The formulation.
-    pairing : Pairing | None
-        The pairing of the state.
-    radius : float
-        The radius of the circles, a length.
-
-    Returns
-    -------
-    work : FloatArray, shape (N_LOOPS,)
-        The absolute value of the work of each loop.
-    throughput : FloatArray, shape (N_LOOPS,)
-        The sum of the absolute works on the parts of the loop, without that of the mean force.
+    The loops are circles (`radius` is a length) on a frozen pairing.
     """
     planes = random_directions(case.seed, 2 * N_LOOPS, case.z.size).reshape(N_LOOPS, 2, 1, -1)
     angles = 2 * np.pi * np.arange(N_POINTS)[:, None] / N_POINTS
@@ -190,4 +166,5 @@ def work_in_loops(
     forces = formulation.residual(case.interface, pairing, case.z + moves)
     forces = forces - forces.mean(axis=1, keepdims=True)  # A constant force does no work in a loop.
     works = forces * steps
-    return np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))
+    work, throughput = np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))
+    return max(map(ratio, work.tolist(), throughput.tolist()))

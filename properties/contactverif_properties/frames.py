@@ -84,15 +84,7 @@ def scaling(case: Case, subject: Subject) -> Measurement:
 
 
 def turn_state(case: Case) -> tuple[Case, FloatArray]:
-    """Turn and shift a state by a random angle and a random way, always the same for the same seed.
-
-    Returns
-    -------
-    there : Case
-        The same case with the nodes at Qx + c.
-    rotation : FloatArray, shape (2, 2)
-        The rotation Q.
-    """
+    """Return a case with the nodes at Qx + c, and the rotation Q (2, 2); both are random by the seed of the case."""
     random = np.random.default_rng(case.seed)
     angle = random.uniform(-np.pi, np.pi)
     rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

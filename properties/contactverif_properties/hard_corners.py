@@ -45,20 +45,19 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
     slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     largest = case.penalty * case.diameter * case.slave_length
-    values, tolerances, broken = {SIZE: size / largest}, {SIZE: 4.0}, ""
+    numbers, broken = [SIZE.check(size / largest, 4.0)], ""
+    reach = min(case.parameter("penetration"), case.shortest_segment)
+    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments)
     if bounds[1] == 0:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
-        values[DIRECTION] = ratio(_outside(total, case.parameters["edges"]), size)
+        numbers.append(DIRECTION.check(ratio(_outside(total, case.parameters["edges"]), size), tolerance))
         if knows_total(subject.traits):
             along = float(total @ case.parameters["axis"])
-            values[TOTAL] = max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1])
-    reach = min(case.parameter("penetration"), case.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments)
-    tolerances |= {name: tolerance for name in values if name != SIZE}
+            numbers.append(TOTAL.check(max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1]), tolerance))
     details = {"share of the upper bound": ratio(float(total @ case.parameters["axis"]), float(bounds[1]))}
     # Where the lower bound is 0, no force is as good an answer as any.
-    return Measurement(check_all(values, tolerances), broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
+    return Measurement(numbers, broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
 
 
 def _outside(force: FloatArray, edges: FloatArray) -> float:

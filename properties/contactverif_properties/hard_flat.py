@@ -15,7 +15,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.measurement import Measurement, check_all
+from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -59,17 +59,15 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     exact = exact_forces(case)
     slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
     along, normal = case.parameters["direction"], normal_of(case)
-    values = {ALONG: ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum()))}
-    tolerances = {ALONG: tolerance}
+    numbers = [ALONG.check(ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     if knows_total(traits):
-        values[TOTAL], tolerances[TOTAL] = abs(push / whole - 1), tolerance
+        numbers.append(TOTAL.check(abs(push / whole - 1), tolerance))
     if traits.promises.patch.flat is not False:
         forces, largest = forces_of_gap(case, subject, exact)
-        values[NODAL] = float(np.linalg.norm(forces - exact, axis=1).max()) / whole
-        tolerances[NODAL] = tolerance * largest
-    return Measurement(check_all(values, tolerances), broken=broken)
+        numbers.append(NODAL.check(float(np.linalg.norm(forces - exact, axis=1).max()) / whole, tolerance * largest))
+    return Measurement(numbers, broken=broken)
 
 
 def exact_forces(case: Case) -> FloatArray:

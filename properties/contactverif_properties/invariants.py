@@ -32,20 +32,11 @@ BESIDE_OTHERS = same_answer_quantities("beside another body")
 def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
     """Return a case with other numbers.
 
-    Parameters
-    ----------
-    case : Case
-        The case.
-    nodes : IntArray, shape (n_nodes,)
-        The new number of each node; slave nodes stay before those of the master.
-    slave, master : IntArray, shape (n_segments,)
-        The old numbers of the segments in their new order.
+    The new number of each node is `nodes` (n_nodes,), slave nodes before those of the master. The segments (n_segments,
+    2) of both sides have the old numbers of nodes.
     """
     interface, old = case.interface, np.argsort(nodes)
-    sides = (
-        Surface(nodes[side.segments[order]]) for side, order in ((interface.slave, slave), (interface.master, master))
-    )
-    renumbered = Interface(interface.nodes[old], *sides)
+    renumbered = Interface(interface.nodes[old], Surface(nodes[slave]), Surface(nodes[master]))
     return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes)
 
 
@@ -64,10 +55,7 @@ def exchange_roles(case: Case) -> tuple[Case, Carry]:
     interface = case.interface
     n_slave, n_master = interface.n_slave_nodes, interface.n_nodes - interface.n_slave_nodes
     nodes = np.concatenate([n_master + np.arange(n_slave), np.arange(n_master)])
-    sides = (Surface(nodes[side.segments]) for side in (interface.master, interface.slave))
-    old = np.argsort(nodes)
-    exchanged = Interface(interface.nodes[old], *sides)
-    return replace(case, interface=exchanged, z=case.positions[old].reshape(-1)), Carry(nodes)
+    return renumber(case, nodes, interface.master.segments, interface.slave.segments)
 
 
 def reflect(points: FloatArray) -> FloatArray:
@@ -177,13 +165,13 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
 
     n_slave = interface.n_slave_nodes
     nodes = np.concatenate([order(n_slave), n_slave + order(interface.n_nodes - n_slave)])
-    slave, master = order(len(interface.slave)), order(len(interface.master))
-    other, carry = renumber(case, nodes, slave, master)
+    slave, master = interface.slave.segments, interface.master.segments
+    other, carry = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
     measurement = compare(IN_OTHER_NUMBERS, subject, *answer_alike(case, other, subject), carry)
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
-    other, carry = renumber(case, nodes, np.arange(len(slave)), np.arange(len(master)))
+    other, carry = renumber(case, nodes, slave, master)
     return compare(IN_OTHER_NUMBERS, subject, *answer_alike(case, other, subject), carry)
 
 
@@ -242,12 +230,7 @@ def make_far_pair(case: Case) -> tuple[FloatArray, FloatArray]:
 def add_chains(case: Case, slave: FloatArray, master: FloatArray) -> tuple[Case, Carry]:
     """Return a case with one more chain on each side, and the new numbers of its nodes.
 
-    Parameters
-    ----------
-    case : Case
-        The case; its own nodes stay where they are.
-    slave, master : FloatArray, shape (n, 2)
-        The nodes of the new chains as they are walked, in the state and in the reference; none for no chain.
+    The nodes (n, 2) of the new chains, as they are walked, are in the same places in the reference; there may be none.
     """
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     first = n_slave + len(slave)  # The new number of the first master node.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from math import inf, pi
@@ -47,15 +47,6 @@ BESIDE = Quantity(
     f"{BOUND:g}",
     "Both are of the same solution; normals of segments and of nodes differ by their half angle.",
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Means:
-    """The relative errors of the mean pressure on one mesh, by forces and by what is reported (NaN if nothing is)."""
-
-    slave: float
-    master: float
-    reported: float
 
 
 @cache
@@ -128,7 +119,7 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
     """
     study = RingStudy.from_case(case)
     fit = study.fit(subject.traits)
-    means: list[Means] = []
+    means: list[FloatArray] = []  # Of the slave, of the master, and as reported
     details: dict[str, float] = {}
     undecided = ""
     for refine in REFINEMENTS:
@@ -139,16 +130,13 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
         undecided = undecided or _lost_end(solution)
         means.append(_mean_errors(solution, fit, study.slave))
         forces = instance.errors(solution)[FORCES[0]]
-        details |= {f"e_{refine}": means[-1].slave, f"E_F at refine = {refine}": forces}
+        details |= {f"e_{refine}": float(means[-1][0]), f"E_F at refine = {refine}": forces}
     coarse, fine = means
-    details["rate"] = float(np.log2(abs(coarse.slave / fine.slave))) if coarse.slave * fine.slave else inf
-    values = {
-        SLAVE_MEAN: _extrapolate(coarse.slave, fine.slave),
-        MASTER_MEAN: _extrapolate(coarse.master, fine.master),
-    }
-    if not np.isnan(fine.reported):
-        values[REPORTED] = _extrapolate(coarse.reported, fine.reported)
-        values[BESIDE] = abs(fine.reported - fine.slave)
+    details["rate"] = float(np.log2(abs(coarse[0] / fine[0]))) if coarse[0] * fine[0] else inf
+    slave, master, reported = (np.abs(4 * fine - coarse) / 3).tolist()  # Without their parts of second order
+    values = {SLAVE_MEAN: slave, MASTER_MEAN: master}
+    if not np.isnan(fine[2]):
+        values |= {REPORTED: reported, BESIDE: float(abs(fine[2] - fine[0]))}
     return Measurement(check_all(values, BOUND), undecided, details=details)
 
 
@@ -161,8 +149,11 @@ def _lost_end(solution: Solution) -> str:
     return "an end of the slave faces that of the master, and roundoff decides whether it is in contact" if lost else ""
 
 
-def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role) -> Means:
-    """Return the relative errors of the mean pressure over a quarter turn."""
+def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role) -> FloatArray:
+    """Return the relative errors (3,) of the mean pressure over a quarter turn, by slave, master and reported points.
+
+    The last is NaN if nothing is reported.
+    """
     nodes, n_slave = solution.interface.nodes, solution.interface.n_slave_nodes
     outwards = nodes / np.linalg.norm(nodes, axis=1)[:, None]
     radial = (solution.forces * outwards).sum(axis=1) * (-1 if slave == "inner" else 1)
@@ -170,12 +161,7 @@ def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role) -> Means:
     reported = np.nan
     if points is not None:
         reported = nearest_sum(points, float(radial[:n_slave].sum())) / exact - 1
-    return Means(float(radial[:n_slave].sum() / exact - 1), float(-radial[n_slave:].sum() / exact - 1), reported)
-
-
-def _extrapolate(coarse: float, fine: float) -> float:
-    """Return the size of an error on two meshes, one twice as fine, without its part of second order."""
-    return abs(4 * fine - coarse) / 3
+    return np.array([radial[:n_slave].sum() / exact - 1, -radial[n_slave:].sum() / exact - 1, reported])
 
 
 LINES = {
@@ -185,10 +171,8 @@ LINES = {
 }
 MODERATE = 10.0  # ε̂ ℓ/E with two normals.
 STIFF = (3e3, 3e4, 3e5)  # ε̂ ℓ/E with three normals.
-STRAINS = (
-    1e-6,
-    1e-4,
-)  # p/E with two and three normals: roundoff is over the penetration, which stiff springs make small.
+# p/E with two and three normals: roundoff is over the penetration, which stiff springs make small.
+STRAINS = (1e-6, 1e-4)
 SHARE = 4.0  # Bound of the stress error with three normals over E/(ε̂ ℓ); 0.01 to 2.4 is measured.
 SLOPE = 0.95  # Decades by which the error falls over a decade of the penalty; 0.99 to 1.00 is measured.
 

@@ -75,8 +75,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
-    error, tolerance = transmission_error(case, subject)
-    return Measurement([FORCE.check(error, tolerance)])
+    return Measurement([FORCE.check(*transmission_error(case, subject))])
 
 
 def refuse_unknown_total(traits: Traits) -> str:
@@ -152,16 +151,15 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
 
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
-    error, tolerance = transmission_error(case, subject)
-    values, tolerances = {FORCE: error}, {FORCE: tolerance}
+    numbers = [FORCE.check(*transmission_error(case, subject))]
     formulation = subject.for_case(case)
     if "contact_points" in formulation.provides:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = _point_errors(case, formulation)
-        values[GAP], tolerances[GAP] = gap, tolerance
+        numbers.append(GAP.check(gap, tolerance))
         if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
-            values[PRESSURE], tolerances[PRESSURE] = pressure, tolerance
-    return Measurement(check_all(values, tolerances))
+            numbers.append(PRESSURE.check(pressure, tolerance))
+    return Measurement(numbers)
 
 
 def _is_within(measurement: Measurement, factor: float) -> bool:

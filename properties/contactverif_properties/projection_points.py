@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -200,13 +200,15 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     λ − c g ≥ 0, and pressures that are interpolated between nodes have the nodes' decision, which is not reported; both
     are not asked.
     """
-    here, small = (_count(Reported.from_case(state, subject)) for state in (case, _in_large_unit(case)))
-    excluded = here.points + small.points - here.decided - small.decided
+    both = [Reported.from_case(state, subject) for state in (case, _in_large_unit(case))]
+    wrong, decided = zip(*map(_count, both), strict=True)
+    homeless = any(_without_place(each.points).any() for each in both)
+    n_points = sum(len(each.points.c) for each in both)
     return Measurement(
-        [WRONG.check(float(here.wrong + small.wrong), 0.0)],
-        broken=here.broken or small.broken,
-        details={"decided points": here.decided + small.decided, "points left out": excluded},
-        idle=not here.decided,
+        [WRONG.check(float(sum(wrong)), 0.0)],
+        broken="an active point names no place or no master segment" if homeless else "",
+        details={"decided points": sum(decided), "points left out": n_points - sum(decided)},
+        idle=not decided[0],
     )
 
 
@@ -216,18 +218,8 @@ def _in_large_unit(case: Case) -> Case:
     return replace(case, interface=interface, z=case.z * LARGE_UNIT)
 
 
-@dataclass(frozen=True, slots=True)
-class _Count:
-    """The numbers of points, of decided points and of wrong decisions in a state, and what is broken there."""
-
-    points: int
-    decided: int
-    wrong: int
-    broken: str
-
-
-def _count(reported: Reported) -> _Count:
-    """Count the decisions in one state."""
+def _count(reported: Reported) -> tuple[int, int]:
+    """Return how many decisions are wrong in one state, and how many points are decided."""
     rule, wrong, decided = reported.traits.rules.gap, 0, 0
     for each in reported.passes:
         weighted = each.points.select(each.points.weighted)
@@ -238,8 +230,7 @@ def _count(reported: Reported) -> _Count:
         sure = np.abs(weighted.gap) > 4 * UNIT_ROUNDOFF * (reported.state.diameter + reported.distant)
         wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
         decided += int(sure.sum())
-    broken = "an active point names no place or no master segment" if _without_place(reported.points).any() else ""
-    return _Count(len(reported.points.c), decided, wrong, broken)
+    return wrong, decided
 
 
 def _without_place(points: ContactPoints) -> BoolArray:

@@ -114,30 +114,22 @@ class _Areas:
         within = np.abs(points.c) < 1  # A node may stand for parts of two segments, and its ends for one of them.
         given = np.isfinite(ends).all(axis=0) & name_places(points) & within
         whole = replace(points, area_from=ends.min(axis=0), area_to=ends.max(axis=0)).select(given)
-        size = self._size_of_segments()
+        current = self.each.interface.slave.lengths(self.each.positions)
+        size = float(np.hypot(*np.ptp(self.each.positions, axis=0))) + self.distant  # Rounding is a share of it.
+        scale = len(current) * float((size * self.length / current).max())
         low, high, on = whole.area_from, whole.area_to, whole.slave_segment
-        stretch = self.length[on] / self._current()[on]
+        stretch = self.length[on] / current[on]
         weights = np.where(whole.weight > 0, np.abs(whole.weight - (high - low) / 2 * self.length[on]), 0.0)
         outside = np.maximum.reduce([low - whole.c, whole.c - high, -1 - low, high - 1, _overlaps(whole)], initial=0.0)
         return {
-            WEIGHT: largest(weights / (size[on] * stretch)),
-            ENDS: largest(outside / 2 * self._current()[on] / size[on]),
-            SUM: largest(np.array(list(self._sum_errors(size)))),
+            WEIGHT: largest(weights / (size * stretch)),
+            ENDS: largest(outside / 2 * current[on] / size),
+            SUM: largest(np.array(list(self._sum_errors(scale)))),
         }
 
-    def _current(self) -> FloatArray:
-        return self.each.interface.slave.lengths(self.each.positions)
-
-    def _size_of_segments(self) -> FloatArray:
-        """Return for each slave segment the length of which rounding is a share: the diameter and `distant`."""
-        diameter = float(np.hypot(*np.ptp(self.each.positions, axis=0)))
-        return np.full(len(self.length), diameter + self.distant)
-
-    def _sum_errors(self, size: FloatArray) -> Iterator[float]:
-        """Yield the errors of sums of weights, over the lengths that they are formed from."""
-        points, slave = self.each.points, self.each.interface.slave
-        rule = self.traits.rules.gap
-        scale = len(slave) * float((size * self.length / self._current()).max())
+    def _sum_errors(self, scale: float) -> Iterator[float]:
+        """Yield the errors of sums of weights over the lengths that they are formed from, the scale."""
+        points, rule = self.each.points, self.traits.rules.gap
         total, whole = float(points.weight.sum()), float(self.length.sum())
         lattice = Lattice.from_state(self.each.interface, self.each.z)
         if rule in CELLS:

@@ -159,5 +159,4 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     the answer by a quarter of the error or more.
     """
     bent = replace(case, z=case.parameters["bent"])
-    before, after = answer_alike(case, bent, subject)
-    return compare(AFTER_A_BEND, subject, before, after, Carry(np.arange(case.interface.n_nodes)))
+    return compare(AFTER_A_BEND, subject, *answer_alike(case, bent, subject), Carry(np.arange(case.interface.n_nodes)))

@@ -133,17 +133,7 @@ def measure_blocks(case: Case, subject: Subject) -> Measurement:
 
 
 def worst_entry(judge: BlockJudge, comparison: Comparison, row: int, column: int) -> Finding:
-    """Return the worst entry of a block beside its derivative.
-
-    Parameters
-    ----------
-    judge : BlockJudge
-        The tangent.
-    comparison : Comparison
-        Its blocks.
-    row, column : int
-        The node or multiplier of the rows, and that of the columns.
-    """
+    """Return the worst entry of a block, by nodes or multipliers, beside its derivative."""
     of_unknowns, groups = judge.groups.of_unknowns, judge.groups
     rows, columns = np.flatnonzero(of_unknowns == row), np.flatnonzero(of_unknowns == column)
     part = np.ix_(rows, columns)

@@ -184,7 +184,8 @@ def test_half_of_the_renumbered_meshes_are_closed_rings_with_another_seam() -> N
 
 def test_a_relabelled_case_is_the_same_part() -> None:
     state = over_a_node(0.25)
-    other, carry = renumber(state, np.array([1, 0, 4, 2, 3]), np.array([0]), np.array([1, 0]))
+    slave, master = state.interface.slave.segments, state.interface.master.segments
+    other, carry = renumber(state, np.array([1, 0, 4, 2, 3]), slave, master[::-1])
     assert other.positions[carry.nodes].tolist() == state.positions.tolist()
     assert other.interface.master.segments.tolist() == [[2, 3], [4, 2]]
     image, carry = mirror_case(state)

@@ -55,15 +55,7 @@ def move_state(case: Case, shift: FloatArray) -> Case:
 
 
 def forces_of_any_state(case: Case, subject: Subject) -> tuple[Case, FloatArray]:
-    """Return the case as the formulation is asked about it, and the residual of its nodes.
-
-    Returns
-    -------
-    state : Case
-        The case, with random multipliers if the formulation has any (`prepare_state`).
-    forces : FloatArray, shape (n_nodes, 2)
-        The position rows of the residual there.
-    """
+    """Return the case as the formulation is asked about it (`prepare_state`), and the residual (n_nodes, 2) there."""
     formulation, state = prepare_state(case, subject)
     pairing = formulation.pair(state.interface, state.z)
     forces = formulation.residual(state.interface, pairing, state.z)
@@ -73,15 +65,7 @@ def forces_of_any_state(case: Case, subject: Subject) -> tuple[Case, FloatArray]
 def ask_forces_and_tangents(
     formulation: CheckedFormulation, *states: tuple[Interface, Pairing | None, FloatArray]
 ) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the residuals (n,) and the tangents (n, n) in some states.
-
-    Parameters
-    ----------
-    formulation : CheckedFormulation
-        The formulation.
-    *states : tuple[Interface, Pairing | None, FloatArray]
-        The meshes, the frozen pairing and the state z (n,), for n unknowns and multipliers.
-    """
+    """Return the residuals (n,) and the tangents (n, n) in states z (n,) with their meshes and frozen pairings."""
     methods = ["residual", *(["tangent"] if "tangent" in formulation.provides else [])]
     answers = formulation.answers([(method, *state) for method in methods for state in states])
     return answers[: len(states)], [dense(tangent) for tangent in answers[len(states) :]]
@@ -93,13 +77,7 @@ def random_moves(seed: int, count: int, size: int) -> FloatArray:
 
 
 def random_directions(seed: int, count: int, size: int) -> FloatArray:
-    """Draw directions (count, size): random moves, each divided by its largest entry in absolute value.
-
-    Returns
-    -------
-    FloatArray, shape (count, size)
-        Entries in [−1, 1]; the largest of each direction is ±1.
-    """
+    """Draw directions (count, size): random moves, each divided by its largest entry, which becomes ±1."""
     moves = random_moves(seed, count, size)
     directions: FloatArray = moves / np.abs(moves).max(axis=1, keepdims=True)
     return directions

@@ -71,18 +71,7 @@ class Conditioning:
     floor: FloatArray
 
     def worst_row(self, error: Array) -> WorstRow:
-        """Return the row whose error is the most roundings.
-
-        Parameters
-        ----------
-        error : Array, shape (n_unknowns + n_multipliers,)
-            The error of a residual.
-
-        Returns
-        -------
-        WorstRow
-            The row, as numbers without a unit.
-        """
+        """Return the row of an error of the residual (n_unknowns + n_multipliers,) that is the most roundings."""
         n_nodes = len(error) - len(self.reach)  # The error has two entries a node, the reach has one.
         sizes = _row_sizes(error, n_nodes)
         counts = np.array([ratio(size, UNIT_ROUNDOFF * reach) for size, reach in zip(sizes, self.reach, strict=True)])
@@ -112,52 +101,28 @@ class WorstRow:
 def measure_conditioning(
     case: Case, formulation: CheckedFormulation, pairing: Pairing | None, forces: Array
 ) -> Conditioning:
-    """Measure what roundings of the input may change in each row of a residual.
+    """Measure what roundings of the input may change in each row of a residual (n_unknowns + n_multipliers,).
 
-    Parameters
-    ----------
-    case : Case
-        The state near the origin, with its multipliers if any.
-    formulation : CheckedFormulation
-        The formulation. It is called once, with a batch of two states for each unknown.
-    pairing : Pairing | None
-        The pairing of that state, which stays frozen; None for a plugin without ``pair``.
-    forces : Array, shape (n_unknowns + n_multipliers,)
-        The residual of that state.
+    The state is one near the origin, with its multipliers if any. The formulation is called once, on a frozen pairing,
+    with a batch of two states for each unknown.
     """
     return conditioning_of(case, difference_quotient(case, formulation, pairing), forces)
 
 
 def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Conditioning:
-    """Return what `measure_conditioning` does, from the `difference_quotient` of the state.
-
-    Parameters
-    ----------
-    case : Case
-        The state near the origin, with its multipliers if any.
-    derivative : FloatArray, shape (n, n)
-        The difference quotient of the residual there, n = n_unknowns + n_multipliers.
-    forces : Array, shape (n_unknowns + n_multipliers,)
-        The residual of that state.
-    """
+    """Return what `measure_conditioning` does, from the `difference_quotient` (n, n) and the residual (n,)."""
     n_nodes = case.interface.n_nodes
     inputs = np.concatenate([_distances(case), np.abs(case.multipliers)])
     sizes = _row_sizes(forces, n_nodes)
-    floor = np.concatenate([np.full(n_nodes, sizes[:n_nodes].max()), np.full(case.n_multipliers, 0.0)])
-    floor[n_nodes:] = sizes[n_nodes:].max(initial=0.0)
+    floor = np.repeat([sizes[:n_nodes].max(), sizes[n_nodes:].max(initial=0.0)], [n_nodes, case.n_multipliers])
     return Conditioning(_block_norms(derivative, n_nodes) @ inputs + floor, floor)
 
 
 def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
-    """Return the central difference quotient of the residual at a state on a frozen pairing.
+    """Return the central difference quotient (n, n) of the residual at a state on a frozen pairing, rows by columns.
 
     The step of a position is ℓ (u X/ℓ)^(1/3), at which truncation and roundoff are equal, about (u X/ℓ)^(2/3) relative.
     That of a multiplier is the largest multiplier, since the residual is affine in them.
-
-    Returns
-    -------
-    FloatArray, shape (n, n)
-        The derivative of each entry of the residual (row) by each unknown (column), n = n_unknowns + n_multipliers.
     """
     n = case.interface.n_unknowns
     shortest = case.shortest_segment
@@ -174,15 +139,8 @@ def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pa
 def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray, slope: float = 0.0) -> float:
     """Return how much two tangents differ, in units of u D times what a motion by a unit of length changes in them.
 
-    Parameters
-    ----------
-    case : Case
-        The state near the origin.
-    tangent, other : FloatArray, shape (n, n)
-        The tangent there, and the one to compare.
-    slope : float
-        The change of an entry of the tangent over the way of the nodes, from `measure_tangent_slope`. At least
-        max|K|/ℓ counts, since a segment turns.
+    That is the slope of `measure_tangent_slope`, at the state near the origin. At least max|K|/ℓ counts, since a
+    segment turns.
     """
     slope = max(slope, float(np.abs(tangent).max()) / case.shortest_segment)
     return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * slope * case.diameter)
@@ -195,17 +153,6 @@ def measure_tangent_slope(
 
     The tangent of a law that is not linear is small at a small gap, and its change is not: that of a pressure ε̂ g² is
     2 ε̂ g, which a rounding of the gap changes by 2 ε̂ u D.
-
-    Parameters
-    ----------
-    case : Case
-        The state near the origin.
-    formulation : CheckedFormulation
-        The formulation, which has a tangent.
-    pairing : Pairing | None
-        The pairing of that state.
-    tangent : FloatArray, shape (n, n)
-        The tangent there.
     """
     step = TANGENT_STEP * case.shortest_segment
     moves = step * random_directions(case.seed, N_TANGENT_DIRECTIONS, case.z.size)
@@ -243,24 +190,10 @@ def _block_norms(matrix: FloatArray, n_nodes: int) -> FloatArray:
 
 
 def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool) -> Measurement:
-    """Return ω of an error of the residual, with the row that has it.
+    """Return ω of an error of the residual (n_unknowns + n_multipliers,), which is at most 16.
 
-    Parameters
-    ----------
-    quantity : Quantity
-        The quantity that ω is.
-    conditioning : Conditioning
-        The condition numbers of the rows.
-    error : Array, shape (n_unknowns + n_multipliers,)
-        The error of the residual.
-    idle : bool
-        The residual is 0 everywhere.
-
-    Returns
-    -------
-    Measurement
-        The number of roundings ω against 16. Details: error and condition number of the row with that ω, the largest
-        error of a force over the largest force.
+    Details are the error and the condition number of the row with that ω, and the largest error of a force over the
+    largest force.
     """
     worst = conditioning.worst_row(error)
     n = 2 * (len(error) - len(conditioning.reach))

@@ -62,7 +62,7 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     """Ask two instances the same questions in different orders, and count the entries of the answers that differ."""
     with_pairings = len(questions) > 3
     calls, others = (
-        [call for call in order + (of_pairings if with_pairings else ()) if _provides(first, call[0])]
+        [call for call in order + (of_pairings if with_pairings else ()) if call[0] in {"residual", *first.provides}]
         for order, of_pairings in zip(_ORDERS, _ORDERS_OF_PAIRINGS, strict=True)
     )
     answers: dict[tuple[str, int], Array] = {}
@@ -73,10 +73,6 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     for call, answer in _ask(second, others, questions):
         changed[call[0]] += _count_different(answer, answers[call])
     return Changes(repeated, **changed)
-
-
-def _provides(formulation: CheckedFormulation, method: str) -> bool:
-    return method == "residual" or method in formulation.provides
 
 
 def _ask(
@@ -111,13 +107,6 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
     """Return another interface with as many nodes, and the state of the case on it.
 
     The nodes of each side are numbered from the last to the first, and the reference is twice as large.
-
-    Returns
-    -------
-    interface : Interface
-        The other interface.
-    z : FloatArray, shape (n_unknowns + n_multipliers,)
-        The same positions at the nodes' other numbers.
     """
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     number = np.concatenate([np.arange(n_slave)[::-1], np.arange(n_slave, interface.n_nodes)[::-1]])
@@ -130,17 +119,7 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
 def compare_two_pairings(
     formulation: CheckedFormulation, interface: Interface, z: FloatArray, distant: FloatArray
 ) -> list[str]:
-    """Pair twice at a state, with another state in between, and return in words what differs.
-
-    Parameters
-    ----------
-    formulation : CheckedFormulation
-        The formulation.
-    interface : Interface
-        The meshes.
-    z, distant : FloatArray, shape (n_unknowns + n_multipliers,)
-        The state, and another one.
-    """
+    """Pair twice at a state, with a distant one in between, and return in words what differs."""
     first = formulation.own_pairing(interface, z)
     if first is None or not first.opaque:
         return []

@@ -26,9 +26,8 @@ from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
 N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.
-DIFFERENCE_ERROR = (
-    30.0  # Times (uX/ℓ)^(2/3): truncation and roundoff of the best central difference, as in `tangent.directional`.
-)
+# Truncation and roundoff of the best central difference, over (uX/ℓ)^(2/3), as in `tangent.directional`.
+DIFFERENCE_ERROR = 30.0
 N_RARE = 4  # Answers that are larger, or smaller, than all but so many of those around are no side of the kink.
 
 
@@ -37,18 +36,8 @@ def explain_by_kink(
 ) -> str:
     """Return why a failure may be the fault of a kink, or an empty string.
 
-    Parameters
-    ----------
-    case : Case
-        The state that failed.
-    formulation : CheckedFormulation
-        The formulation that is judged.
-    pairing : Pairing | None
-        The pairing of the state.
-    reach : float
-        By how much the coordinates are rounded, a length.
-    errors : dict[str, float]
-        The largest error of an entry, under "forces" or "tangent", for each of the two that failed.
+    The coordinates are rounded by `reach`, a length. `errors` are the largest of an entry of the "forces" or the
+    "tangent", for each of the two that failed.
     """
     directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
     reason = find_kink(case, formulation, pairing, reach, directions[0])
@@ -66,15 +55,6 @@ def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach:
     more stay on the side of the state. So the rarest answers are left out. A force counts as one of the others if it
     is between the least and the largest of them, or outside by no more than their difference: where several decisions
     meet in one node, not all of their combinations are drawn.
-
-    Parameters
-    ----------
-    case : Case
-        The state.
-    formulation : CheckedFormulation
-        The formulation that answers, with a new pairing in each state.
-    reach : float
-        The length of the moves.
     """
     here = _forces(case, formulation, case.z)
     moves = reach * random_directions(case.seed, N_AROUND, case.z.size)
@@ -88,26 +68,10 @@ def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach:
 def measure_jump(
     case: Case, formulation: CheckedFormulation, reach: float, directions: FloatArray
 ) -> tuple[float, float]:
-    """Return how much the forces and their derivative change when the nodes move by `reach`, forth or back.
+    """Return how much a force, and an entry of the derivative, change when the nodes move by `reach`, forth or back.
 
-    Parameters
-    ----------
-    case : Case
-        The state to move.
-    formulation : CheckedFormulation
-        The formulation that answers, with a new pairing in each state.
-    reach : float
-        The length of the move.
-    directions : FloatArray, shape (n, n_unknowns)
-        The directions of the moves; the largest entry of each is ±1.
-
-    Returns
-    -------
-    force_change : float
-        The largest change of a force.
-    slope_change : float
-        The largest change of an entry of the derivative of the residual on its pairing, less what differences may be
-        wrong by; or that of a smooth answer, if it is larger.
+    Each state has a new pairing. The directions (n, n_unknowns) have the largest entry ±1. The second change is less
+    what differences may be wrong by; or it is that of a smooth answer, if that is larger.
     """
     force, slope = _answers(case, formulation, case.z)
     others = [
@@ -178,20 +142,9 @@ def explain_by_rounded_decision(case: Case, formulation: CheckedFormulation, pai
 def find_kink(
     case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, direction: FloatArray
 ) -> str:
-    """Return why a decision may change if each coordinate moves by `reach` at most, or an empty string.
+    """Return why a decision may change if each coordinate moves by `reach` at most, a length, or an empty string.
 
-    Parameters
-    ----------
-    case : Case
-        The state to look at.
-    formulation : CheckedFormulation
-        The formulation; its contact points are used if it provides them.
-    pairing : Pairing | None
-        The pairing of the state.
-    reach : float
-        The largest move of a coordinate, a length.
-    direction : FloatArray, shape (n_unknowns,)
-        The direction of one-sided differences where there are no contact points; its largest entry is ±1.
+    Where the formulation has no contact points, one-sided differences along the direction (n_unknowns,) are looked at.
     """
     if "contact_points" in formulation.provides:
         points = formulation.contact_points(case.interface, pairing, case.z)

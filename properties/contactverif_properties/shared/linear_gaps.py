@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 from math import sqrt
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
@@ -18,7 +20,6 @@ from contactverif.contract.traits import Traits
 from contactverif_properties.shared.uniform_pressure import forces_of_multiplier
 
 ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.
-_Vector = tuple[Fraction, Fraction]
 
 
 def knows_linear_total(traits: Traits) -> bool:
@@ -41,22 +42,18 @@ def uniform_multiplier(case: Case) -> float:
 def node_gaps(case: Case) -> FloatArray:
     """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
     first, second = _longest_segment(case)
-    along = _difference(second, first)
-    length = sqrt(_dot(along, along))
-    gaps = []
-    for node in case.positions[: case.interface.n_slave_nodes]:
-        arm = _difference(_exact(node), first)
-        gaps.append(float(arm[0] * along[1] - arm[1] * along[0]) / length)
-    return np.array(gaps)
+    along, arms = second - first, _exact(case.positions[: case.interface.n_slave_nodes]) - first
+    areas = arms[:, 0] * along[1] - arms[:, 1] * along[0]
+    return np.array([float(area) for area in areas]) / sqrt(along @ along)
 
 
 def directions(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals (2,) along the master's and along the slave's, both out of the master."""
-    (master_1, master_2), segment = _longest_segment(case), case.positions[case.interface.slave.segments[0]]
-    master, slave = _difference(master_2, master_1), _difference(_exact(segment[1]), _exact(segment[0]))
+    ends = _longest_segment(case), _exact(case.positions[case.interface.slave.segments[0]])
+    (x, y), (x_slave, y_slave) = (second - first for first, second in ends)
     return (
-        np.array([float(master[1]), -float(master[0])]) / sqrt(_dot(master, master)),
-        np.array([-float(slave[1]), float(slave[0])]) / sqrt(_dot(slave, slave)),
+        np.array([float(y), -float(x)]) / sqrt(x * x + y * y),
+        np.array([-float(y_slave), float(x_slave)]) / sqrt(x_slave * x_slave + y_slave * y_slave),
     )
 
 
@@ -79,20 +76,12 @@ def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
     return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
 
 
-def _longest_segment(case: Case) -> tuple[_Vector, _Vector]:
-    """Return the exact ends of the longest master segment, on whose line all others lie."""
+def _longest_segment(case: Case) -> NDArray[Any]:
+    """Return the exact ends (2, 2) of the longest master segment, on whose line all others lie."""
     master = case.interface.master
-    ends = case.positions[master.segments[int(np.argmax(master.lengths(case.positions)))]]
-    return _exact(ends[0]), _exact(ends[1])
+    return _exact(case.positions[master.segments[int(np.argmax(master.lengths(case.positions)))]])
 
 
-def _exact(point: FloatArray) -> _Vector:
-    return Fraction(float(point[0])), Fraction(float(point[1]))
-
-
-def _difference(p: _Vector, q: _Vector) -> _Vector:
-    return p[0] - q[0], p[1] - q[1]
-
-
-def _dot(p: _Vector, q: _Vector) -> float:
-    return float(p[0] * q[0] + p[1] * q[1])
+def _exact(points: FloatArray) -> NDArray[Any]:
+    """Return points as an array of fractions."""
+    return np.array([Fraction(value) for value in points.reshape(-1).tolist()], dtype=object).reshape(points.shape)

@@ -31,28 +31,12 @@ COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a fe
 
 
 def sum_slave_forces(case: Case, forces: Array) -> float:
-    """Return Σ|R| over the entries of the slave nodes.
-
-    Parameters
-    ----------
-    case : Case
-        The case that the forces belong to.
-    forces : Array, shape (n_unknowns,) or (n_nodes, 2)
-        The residual; what stands behind the slave's entries is not read.
-    """
+    """Return Σ|R| over the entries of the slave nodes of a residual, (n_unknowns, …) or (n_nodes, 2)."""
     return float(np.abs(forces.reshape(-1)[: 2 * case.interface.n_slave_nodes]).sum())
 
 
 def sum_larger_forces(case: Case, forces: Array) -> float:
-    """Return Σ|R| over the entries of the slave or of the master, the larger: half passes may push one side alone.
-
-    Parameters
-    ----------
-    case : Case
-        The case that the forces belong to.
-    forces : Array, shape (n_unknowns,) or (n_nodes, 2)
-        The residual; what stands behind the entries of the nodes is not read.
-    """
+    """Return Σ|R| over the entries of the slave or of the master, the larger: half passes may push one side alone."""
     slave = sum_slave_forces(case, forces)
     return max(slave, float(np.abs(forces.reshape(-1)[: case.interface.n_unknowns]).sum()) - slave)
 
@@ -72,16 +56,9 @@ def rounding_distance(case: Case, traits: Traits) -> float:
 
 
 def gap_tolerance(case: Case, penetration: float, distance: float | None = None) -> float:
-    """Return GAP_TOLERANCE as a number, or STATED_GAP_TOLERANCE.
+    """Return GAP_TOLERANCE as a number, or STATED_GAP_TOLERANCE for a distance Z at which positions are rounded.
 
-    Parameters
-    ----------
-    case : Case
-        The state that is judged.
-    penetration : float
-        The penetration g, a length. Where it is 0 there is no gap to round, and a force of any size is wrong.
-    distance : float | None
-        The distance Z at which positions are rounded, a length; the largest coordinate X if None.
+    Where the penetration g, a length, is 0 there is no gap to round, and a force of any size is wrong.
     """
     largest = case.largest_coordinate if distance is None else distance
     gap_rounding = 8 * largest / penetration if penetration > 0 else 0.0
@@ -89,17 +66,10 @@ def gap_tolerance(case: Case, penetration: float, distance: float | None = None)
 
 
 def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
-    """Return SEGMENT_TOLERANCE as a number.
+    """Return SEGMENT_TOLERANCE as a number, from the largest coordinate X of all states that take part.
 
-    Parameters
-    ----------
-    case : Case
-        The state that is judged.
-    forces : Array, shape (n_unknowns,)
-        Its residual, for the mean penetration. Where nothing is in contact the value is 0 or infinite, and any
-        tolerance serves.
-    largest : float
-        The largest coordinate X of all states that take part.
+    The residual (n_unknowns,) tells the mean penetration. Where nothing is in contact the value is 0 or infinite, and
+    any tolerance serves.
     """
     penetration = mean_penetration(case, forces)
     reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment

@@ -125,13 +125,9 @@ def compare(
     *,
     explain: bool = True,
 ) -> Measurement:
-    """Compare the answers in two states.
+    """Compare the answers in two states: the largest change of a force over Σ|R| of a side, of an entry over max|K|.
 
-    Returns
-    -------
-    Measurement
-        The largest change of a force over Σ|R| of a side, and of an entry of the tangent over max|K|, each the largest
-        of both states; both dimensionless. The detail `BITS` counts entries that are not equal to the last bit.
+    The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
     """
     case, size = first.case, max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
     changes = [Change("forces", quantities[0], second.forces[carry.nodes] - first.forces @ carry.matrix.T, size)]

@@ -101,16 +101,14 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
         if subject.traits.rules.penalty != "nodal":
             values[PRESSURE] = reported
     roundoff = uniform_tolerances(state, scene, pressure)
-    tolerances = dict.fromkeys(values, roundoff.stress)
-    tolerances[GAP] *= _gap_factor(case, penalty)
-    if PRESSURE in values:
-        tolerances[PRESSURE] = roundoff.pressure
+    tolerances = _tolerances(case, penalty, roundoff.stress) | {PRESSURE: roundoff.pressure}
     return Measurement(check_all(values, tolerances), details=end_details(trace))
 
 
-def _gap_factor(case: Case, penalty: float) -> float:
-    """Return 1 + ε̂ ΣH/M."""
-    return 1 + penalty * float(case.parameters["compliance"].sum())
+def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, float]:
+    """Return one tolerance for stresses and forces; that of gaps is 1 + ε̂ ΣH/M times as large."""
+    factor = 1 + penalty * float(case.parameters["compliance"].sum())
+    return dict.fromkeys((STRESS, SLAVE_FORCES, MASTER_FORCES), tolerance) | {GAP: tolerance * factor}
 
 
 def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
@@ -124,17 +122,9 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
     scene, pressure = scene_of(case), pressure_of(case, np.inf)
     formulation = subject.for_interface(case.interface, penalty)
     exact = exact_unknowns(scene, pressure, np.inf)
-    exact_state = replace(case, z=scene.positions(exact))
-    saddle = _SaddlePoint(
-        case=case,
-        scene=scene,
-        subject=subject,
-        formulation=formulation,
-        penalty=penalty,
-        pressure=pressure,
-        multipliers=exact_multipliers(exact_state, subject, formulation, pressure),
-    )
-    exact_u = np.append(exact, saddle.multipliers)
+    multipliers = exact_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
+    saddle = _SaddlePoint(case, scene, subject, formulation, penalty, pressure, multipliers)
+    exact_u = np.append(exact, multipliers)
     trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
     measurement = saddle.errors(u)
     fails = any(number.value > number.tolerance for number in measurement.numbers)
@@ -143,7 +133,7 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
     return replace(measurement, details=end_details(trace))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class _SaddlePoint:
     """A scene that a formulation with multipliers solves, and its exact solution."""
 
@@ -172,8 +162,7 @@ class _SaddlePoint:
             GAP: gap_error(state, 0.0, pressure / self.penalty),
         }
         tolerance = uniform_tolerances(state, scene, pressure).stress
-        tolerances = dict.fromkeys(values, tolerance)
-        tolerances[GAP] *= _gap_factor(self.case, self.penalty)
+        tolerances = _tolerances(self.case, self.penalty, tolerance)
         if self.subject.traits.rules.penalty == "distributed":
             loaded = self.multipliers != 0  # The multiplier of a node that faces nothing is 0.
             errors = np.abs(multipliers[loaded] / pressure - 1)

@@ -104,19 +104,8 @@ def _point_range(
 def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
     """Solve a scene on one pairing, with the formulation's tangent or, where that does not converge, by differences.
 
-    Parameters
-    ----------
-    system : System
-        The scene with its formulation.
-    start : FloatArray, shape (n_free + n_multipliers,)
-        The first guess.
-    pairing : Pairing | None
-        The pairing; None if the formulation has none, which then decides anew at each iterate.
-
-    Returns
-    -------
-    FloatArray | None, shape (n_free + n_multipliers,)
-        The unknowns once the residual is down to its own roundoff; None if it does not get there.
+    Start and solution are (n_free + n_multipliers,). The solution is None unless the residual gets down to its own
+    roundoff. A formulation without a pairing decides anew at each iterate.
     """
     for use_tangent in (True, False):
         system.use_tangent = use_tangent
