@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
@@ -17,7 +18,7 @@ from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
 from contactverif.strategies.straight import cases_over_a_body
-from contactverif_properties.shared.same_answer import TIE, Carry, answer_alike, compare, same_answer_quantities
+from contactverif_properties.shared.same_answer import TIE, Carry, compare, same_answer_quantities
 
 MIRROR = np.diag([-1.0, 1.0])
 IN_MIRROR = same_answer_quantities("in the mirror image")
@@ -64,12 +65,13 @@ def reflect(points: FloatArray) -> FloatArray:
     return mirrored
 
 
-@Property.define(
+_define = partial(Property.define, family="invariants", promise=lambda traits: True)
+
+
+@_define(
     id="mirror",
-    family="invariants",
     quantities=IN_MIRROR,
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: True,
 )
 def mirror(case: Case, subject: Subject) -> Measurement:
     """The mirror image of a state has the mirror image of its forces and of its tangent.
@@ -88,13 +90,11 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
     vertex, a point is as near to one segment as to another, and the mirror image may choose the other.
     """
-    image, carry = mirror_case(case)
-    return compare(IN_MIRROR, subject, *answer_alike(case, image, subject), carry)
+    return compare(IN_MIRROR, subject, case, *mirror_case(case))
 
 
-@Property.define(
+@_define(
     id="swap",
-    family="invariants",
     quantities=WITH_ROLES_EXCHANGED,
     cases=Cases.random(smooth_cases),
     promise=lambda traits: traits.promises.unbiased,
@@ -116,9 +116,8 @@ def swap(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case of a formulation that promises `unbiased` is undecided where the state lies at a kink,
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
     """
-    exchanged, carry = exchange_roles(case)
-    answers, unbiased = answer_alike(case, exchanged, subject), bool(subject.traits.promises.unbiased)
-    return compare(WITH_ROLES_EXCHANGED, subject, *answers, carry, explain=unbiased)
+    unbiased = bool(subject.traits.promises.unbiased)
+    return compare(WITH_ROLES_EXCHANGED, subject, case, *exchange_roles(case), explain=unbiased)
 
 
 @random_source("contactverif_properties.renumbering.renumbering_cases")
@@ -129,12 +128,10 @@ def renumbering_cases(
     return {ANY: smooth_cases(), CLOSED: closed_cases()} if interface is None else smooth_cases(interface)
 
 
-@Property.define(
+@_define(
     id="renumbering",
-    family="invariants",
     quantities=IN_OTHER_NUMBERS,
     cases=Cases.by_kind(renumbering_cases),
-    promise=lambda traits: True,
     kinds=(ANY, CLOSED),
 )
 def renumbering(case: Case, subject: Subject) -> Measurement:
@@ -166,13 +163,12 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     n_slave = interface.n_slave_nodes
     nodes = np.concatenate([order(n_slave), n_slave + order(interface.n_nodes - n_slave)])
     slave, master = interface.slave.segments, interface.master.segments
-    other, carry = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
-    measurement = compare(IN_OTHER_NUMBERS, subject, *answer_alike(case, other, subject), carry)
+    renumbered = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
+    measurement = compare(IN_OTHER_NUMBERS, subject, case, *renumbered)
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
-    other, carry = renumber(case, nodes, slave, master)
-    return compare(IN_OTHER_NUMBERS, subject, *answer_alike(case, other, subject), carry)
+    return compare(IN_OTHER_NUMBERS, subject, case, *renumber(case, nodes, slave, master))
 
 
 @random_source("contactverif_properties.remote.remote_cases")
@@ -185,12 +181,10 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     return {FAR: smooth_cases(), BEHIND: behind}
 
 
-@Property.define(
+@_define(
     id="remote",
-    family="invariants",
     quantities=BESIDE_OTHERS,
     cases=Cases.by_kind(remote_cases),
-    promise=lambda traits: True,
     kinds=(FAR, BEHIND),
 )
 def remote(case: Case, subject: Subject) -> Measurement:
@@ -214,8 +208,7 @@ def remote(case: Case, subject: Subject) -> Measurement:
         slave, master = np.empty((0, 2)), case.parameters["behind"]
     else:
         slave, master = make_far_pair(case)
-    more, carry = add_chains(case, slave, master)
-    return compare(BESIDE_OTHERS, subject, *answer_alike(case, more, subject), carry)
+    return compare(BESIDE_OTHERS, subject, case, *add_chains(case, slave, master))
 
 
 def make_far_pair(case: Case) -> tuple[FloatArray, FloatArray]:

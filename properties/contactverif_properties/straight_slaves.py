@@ -28,7 +28,7 @@ from contactverif_properties.shared.roundoff import (
     rounding_distance,
     stated_gap_quantity,
 )
-from contactverif_properties.shared.same_answer import Carry, answer_alike, compare, same_answer_quantities
+from contactverif_properties.shared.same_answer import Carry, compare, same_answer_quantities
 
 OFF_NORMAL = stated_gap_quantity("part of the force off the normal")
 TOTAL = stated_gap_quantity("error of the total force")
@@ -159,4 +159,4 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     the answer by a quarter of the error or more.
     """
     bent = replace(case, z=case.parameters["bent"])
-    return compare(AFTER_A_BEND, subject, *answer_alike(case, bent, subject), Carry(np.arange(case.interface.n_nodes)))
+    return compare(AFTER_A_BEND, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))

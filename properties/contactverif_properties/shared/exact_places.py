@@ -34,6 +34,7 @@ from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projections import KINDS, projection_states, projections_by_kind
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.passes import Pass, split_passes
+from contactverif_properties.shared.roundoff import rounding_distance
 
 LARGER_MESHES = ("larger random mesh", "larger mesh, exact ties")
 PROJECTED_KINDS = (*KINDS, *LARGER_MESHES)
@@ -76,11 +77,8 @@ class Reported:
 
     @property
     def distant(self) -> float:
-        """The length at which a point may be rounded: X, or the diameter D where the traits promise no dependence on X.
-
-        A kernel that subtracts the centroid first keeps the promise, and rounds points at D.
-        """
-        return self.state.diameter if self.traits.promises.translation_stable else self.state.largest_coordinate
+        """The length Z at which a point may be rounded."""
+        return rounding_distance(self.state, self.traits)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

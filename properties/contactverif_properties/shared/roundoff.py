@@ -51,7 +51,10 @@ def mean_penetration(case: Case, forces: Array) -> float:
 
 
 def rounding_distance(case: Case, traits: Traits) -> float:
-    """Return the distance Z, a length, at which a formulation may round the position of a point."""
+    """Return the distance Z, a length, at which a formulation may round the position of a point.
+
+    A kernel that subtracts the centroid first is `translation_stable`, and rounds points at the diameter.
+    """
     return case.diameter if traits.promises.translation_stable else case.largest_coordinate
 
 

@@ -65,26 +65,21 @@ def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
     )
 
 
-def answer_alike(first: Case, second: Case, subject: Subject) -> tuple[Answer, Answer]:
-    """Return the answers in two states, with the numeric penalty and the uniform multiplier of the first state."""
-    penalty, multiplier = subject.penalty(first), SHARE * first.shortest_segment
+def _answers(states: Sequence[Case], subject: Subject) -> list[Answer]:
+    """Return the answers in some states, with the numeric penalty and the uniform multiplier of the first one."""
+    penalty, multiplier = subject.penalty(states[0]), SHARE * states[0].shortest_segment
     answers = []
-    for case in (first, second):
+    for case in states:
         formulation = subject.with_penalty(penalty)
-        count = formulation.n_multipliers(case.interface)
+        n, count = case.interface.n_unknowns, formulation.n_multipliers(case.interface)
         if count:
             formulation = subject.with_penalty(1.0)
         state = case.with_multipliers(np.full(count, multiplier)) if count else case
-        answers.append(_answer(state, formulation))
-    return answers[0], answers[1]
-
-
-def _answer(state: Case, formulation: CheckedFormulation) -> Answer:
-    n, pairing = state.interface.n_unknowns, formulation.pair(state.interface, state.z)
-    (forces,), tangents = ask_forces_and_tangents(formulation, (state.interface, pairing, state.z))
-    forces = forces[:n].reshape(-1, 2)
-    tangent = tangents[0][:n, :n] if tangents else None
-    return Answer(state, formulation, pairing, forces, tangent)
+        pairing = formulation.pair(state.interface, state.z)
+        (forces,), tangents = ask_forces_and_tangents(formulation, (state.interface, pairing, state.z))
+        tangent = tangents[0][:n, :n] if tangents else None
+        answers.append(Answer(state, formulation, pairing, forces[:n].reshape(-1, 2), tangent))
+    return answers
 
 
 class Change(NamedTuple):
@@ -119,8 +114,8 @@ def judge_changes(
 def compare(
     quantities: tuple[Quantity, Quantity],
     subject: Subject,
-    first: Answer,
-    second: Answer,
+    case: Case,
+    other: Case,
     carry: Carry,
     *,
     explain: bool = True,
@@ -129,7 +124,8 @@ def compare(
 
     The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
     """
-    case, size = first.case, max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
+    first, second = _answers((case, other), subject)
+    size = max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
     changes = [Change("forces", quantities[0], second.forces[carry.nodes] - first.forces @ carry.matrix.T, size)]
     if first.tangent is not None and second.tangent is not None:
         places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
@@ -138,7 +134,7 @@ def compare(
         size = float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
         changes.append(Change("tangent", quantities[1], change, size))
     distance = max(rounding_distance(answer.case, subject.traits) for answer in (first, second))
-    tolerance = segment_tolerance(case, first.forces, distance)
+    tolerance = segment_tolerance(first.case, first.forces, distance)
     states = [(each.case, each.formulation, each.pairing, each.case.largest_coordinate) for each in (first, second)]
     numbers, undecided = judge_changes(changes, tolerance, states if explain else [])
     if explain and not undecided and any(number.value > number.tolerance for number in numbers):
