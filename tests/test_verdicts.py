@@ -56,7 +56,7 @@ from contactverif.run.run import run
 
 SEED = 0  # The profile `ci` has the same, so these are the first cases of `contactverif verify --all --profile ci`.
 EXAMPLES, EXAMPLES_SLOW = 100, 40  # `tox -e trust` asks with further seeds.
-SLOW = ("continuity", "nodal-push", "purity")  # And all that solve bodies.
+SLOW = ("continuity", "nodal-push", "purity")  # Properties that solve bodies are slow, too.
 
 
 def examples_of(question: Property) -> int:
