@@ -22,7 +22,8 @@ from contactverif.run import registry
 from contactverif.contract.case import Case
 from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity
+from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Property
 
 ERROR = Quantity("error", "1e-6", "a number for a test")
 
