@@ -111,12 +111,7 @@ def single_moves(columns: IntArray, size: int) -> Moves:
 def plan_moves(case: Case, pattern: BoolArray) -> Moves:
     """Return moves that cover all unknowns: one by one on a short interface, many together on a long one.
 
-    Parameters
-    ----------
-    case : Case
-        The case, with its multipliers if any.
-    pattern : BoolArray, shape (size, size)
-        The entries that the tangent has.
+    The pattern (size, size) are the entries that the tangent has.
     """
     groups = groups_of(case)
     if groups.count <= MOST_SINGLE:
@@ -129,17 +124,14 @@ def plan_moves(case: Case, pattern: BoolArray) -> Moves:
         for group in colour:
             owner[contacts.indices[contacts.indptr[group] : contacts.indptr[group + 1]]] = group
         for axis in (0, 1):
-            columns = np.array([_unknown(groups, group, axis) for group in colour if _has(groups, group, axis)])
+            moved = colour if axis == 0 else [group for group in colour if group < groups.n_nodes]
+            columns = np.array([_unknown(groups, group, axis) for group in moved])
             if len(columns):
                 of_rows = owner[of_unknowns]
                 has = (of_rows >= 0) & ((axis == 0) | (of_rows < groups.n_nodes))
                 members.append(columns)
                 owners.append(np.where(has, _unknown(groups, of_rows, axis), -1))
     return Moves(members, np.array(owners))
-
-
-def _has(groups: Groups, group: int, axis: int) -> bool:
-    return axis == 0 or group < groups.n_nodes
 
 
 def _unknown(groups: Groups, group: IntArray | int, axis: int) -> IntArray:
@@ -152,11 +144,9 @@ def _find_contacts(interface: Interface, groups: Groups, pattern: BoolArray) -> 
     rows, columns = (groups.of_unknowns[index] for index in np.nonzero(pattern))
     ends = [surface.segments.T for surface in (interface.slave, interface.master)]
     first, second = np.concatenate(ends, axis=1)
-    self_contact = np.arange(groups.count)
-    i, j = (
-        np.concatenate([rows, columns, first, second, self_contact]),
-        np.concatenate([columns, rows, second, first, self_contact]),
-    )
+    itself = np.arange(groups.count)
+    i = np.concatenate([rows, columns, first, second, itself])
+    j = np.concatenate([columns, rows, second, first, itself])
     return sparse.csr_array((np.ones(len(i)), (i, j)), shape=(groups.count, groups.count))
 
 

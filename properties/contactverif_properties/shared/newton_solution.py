@@ -33,16 +33,8 @@ def find_solution(system: System) -> Trace:
 def solution_floor(scene: Scene, solution: FloatArray, units: FloatArray, condition: float) -> float:
     """Return the distance from a solution, a length, below which roundoff decides: max(1e3 u/cond, 30 u X).
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    solution : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns of the solution.
-    units : FloatArray, shape (n_free + n_multipliers,)
-        The unit of each unknown that corresponds to a unit of length, see `scale_factors`.
-    condition : float
-        The reciprocal condition of the matrix there, above 0.
+    The solution is (n_free + n_multipliers,), as are the units of its unknowns that correspond to a unit of length
+    (`scale_factors`). The reciprocal condition of the matrix there is above 0.
     """
     size = float(np.abs(solution / units).max() + np.abs(scene.imposed_displacements).max())
     solved_to = 1e3 * UNIT_ROUNDOFF / condition * size
