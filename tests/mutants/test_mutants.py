@@ -85,7 +85,7 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str, seed: int) -> 
         and (seed == 0 or not isinstance(question.cases(None), tuple))  # A finite list is the same for all seeds.
     ]
     for question in questions:
-        examples = 10 if question.bodies else 40  # Scenes are slow, and `test_verdicts.py` asks a hundred of each.
+        examples = 10 if question.bodies else 40  # Scenes are slow, and `test_verdicts.py` asks more of each.
         planned += len(cases(question.id, seed, examples))
         for case in cases(question.id, seed, examples):
             outcome = judge_case(question, case, subject)

@@ -8,6 +8,7 @@ whatever it starts ends by itself after `LONG`.
 
 from __future__ import annotations
 
+import itertools
 import os
 import struct
 from collections.abc import Callable, Mapping
@@ -138,6 +139,17 @@ def wrongly(act: Callable[[], Any], summary: str | None = None) -> Factory:
         return 1.5 * right()
 
     return instead("residual")(scale, summary or act.__doc__)
+
+
+def leaves(act: Callable[[], Any], summary: str | None = None) -> Factory:
+    """Decorate `act()`, which leaves something behind at the first question for forces; all answers are right."""
+    calls = itertools.count()
+
+    def leave() -> None:
+        if next(calls) == 0:
+            act()
+
+    return before("residual", ends=LIKE_NTS)(leave, summary or act.__doc__)
 
 
 def write_to_sockets(data: bytes, n_bytes: int | None = None) -> None:
