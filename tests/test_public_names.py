@@ -25,21 +25,8 @@ PUBLIC = {
     "contactverif": {
         # Meshes, states and the contract of a formulation.
         *("Interface", "Surface", "Case", "named_case", "read_interface"),
-        *(
-            "Formulation",
-            "ResidualOnly",
-            "Pairing",
-            "Handle",
-            "Traits",
-            "Promises",
-            "PatchPromises",
-            "Rules",
-            "Abilities",
-            "Evidence",
-            "ContactPoints",
-            "CheckedFormulation",
-            "Subject",
-        ),
+        *("Formulation", "ResidualOnly", "Pairing", "Handle", "ContactPoints", "CheckedFormulation", "Subject"),
+        *("Traits", "Promises", "PatchPromises", "Rules", "Abilities", "Evidence"),
         # Bodies, scenes and their solution.
         *("Body", "Rectangle", "Placing", "block", "rigid_surface", "body_from_mesh"),
         *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
