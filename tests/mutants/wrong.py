@@ -243,7 +243,8 @@ MUTANTS = (
     line("closed gap without a multiplier stays inactive", UNILATERAL, "eq6",
          "multipliers[i] - penalty * g >= 0", "multipliers[i] > 0", factory="nts_lm"),
     # Force and moment still balance, and nothing changes where nothing overhangs.
-    line("last master segment continued past its free end", DEAD_ZONE, "walk", '"cover": COVER', '"cover": EXTEND'),
+    line("last master segment continued past its free end", DEAD_ZONE, "patch_test_passing",
+         "search = self.n, self.free_end,", "search = self.n, walk.EXTEND,"),
     line("first multiplier counted twice", RANK, "point_contact",
          "return segment, other, slot", "return tuple(np.append(array, array[0]) for array in (segment, other, slot))",
          factory="nts_lm"),
