@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import signal
 import threading
-from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
+from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole, discard
 from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
@@ -68,8 +67,10 @@ class Bar:
         words = f"{row.formulation} {row.property_id}: ", row.result, f", {row.judged}/{row.planned} judged"
         reason = f": {row.reason}" if row.reason else ""
         line = Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason)
-        with suppress(OSError):  # Without a reader the run goes on.
+        try:
             self._progress.console.print(line, soft_wrap=True)
+        except OSError:  # Without a reader the run goes on.
+            discard("stderr")
 
     def update(self, description: str, n_finished: int, n_planned: int) -> None:
         """Show how many of the planned steps are finished, and what comes next.
