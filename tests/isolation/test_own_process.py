@@ -81,7 +81,8 @@ def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes(name: str) 
         pairing = formulation.pair(CASE.interface, CASE.z)
         try:
             tangent = formulation.tangent(CASE.interface, pairing, CASE.z)
-            answers.append([part.tolist() for part in (tangent.data, tangent.row, tangent.col)])
+            entries = tangent.tocoo()
+            answers.append([tangent.format, *(part.tolist() for part in (entries.data, entries.row, entries.col))])
         except ContractError as error:
             answers.append(f"{type(error).__name__}: {error}")
     assert answers[0] == answers[1]
