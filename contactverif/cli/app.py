@@ -19,7 +19,6 @@ import typer
 from contactverif.cli.bench_command import bench
 from contactverif.cli.campaign_command import campaign
 from contactverif.cli.compare_command import compare
-from contactverif.cli.console import discard
 from contactverif.cli.draw_command import draw
 from contactverif.cli.list_command import list_installed
 from contactverif.cli.merge_command import merge
@@ -126,7 +125,7 @@ def _exit_status(error: Exception) -> int:
     """Return the exit status for an error, after one line about it; raise again what is a mistake of the harness."""
     match error:
         case BrokenPipeError():  # The reader, such as `head`, has closed the pipe.
-            discard("stdout")
+            _discard_output()
             return _CLOSED_PIPE
         case MisuseError():
             argument = _OPTIONS.get(error.argument, error.argument)
@@ -149,7 +148,7 @@ def _words_of_machine(error: OSError | MemoryError | UnicodeEncodeError) -> str:
     if isinstance(error, MemoryError):
         return f"there is not enough memory for this command ({one_line(str(error)) or 'no number is known'})"
     if error.errno in (errno.ENOSPC, errno.EIO, errno.EDQUOT) and error.filename is None:
-        discard("stdout")
+        _discard_output()
         return f"the output cannot be written: {error.strerror}"
     if isinstance(error, FileNotFoundError) and error.filename is None:
         return "the working folder does not exist any more"
@@ -178,3 +177,8 @@ def _refuse(reason: str) -> int:
     if reason:
         typer.echo(f"contactverif: {one_line(' '.join(reason.split()))}", err=True)
     return _MISUSE
+
+
+def _discard_output() -> None:
+    """Replace standard output, so that Python does not fail to flush it at the end of the process."""
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115, since the process ends with it

@@ -11,7 +11,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
-from typing import Literal, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 import typer
 from rich import box
@@ -64,11 +64,6 @@ def show_as_it_is(text: Text) -> None:
 def say(words: str, *, to_stderr: bool = False) -> None:
     """Print words as they are, without folding a line."""
     typer.echo(printable(words), err=to_stderr)
-
-
-def discard(stream: Literal["stdout", "stderr"]) -> None:
-    """Replace a stream that cannot be written, so that Python does not fail to flush it at the end of the process."""
-    setattr(sys, stream, open(os.devnull, "w"))  # noqa: SIM115, since the process ends with it
 
 
 def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False) -> Segments:

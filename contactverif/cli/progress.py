@@ -6,7 +6,9 @@ callback of the garbage collector or of compiled code; without the bar such a ru
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from types import FrameType, TracebackType
 from typing import Any
@@ -14,7 +16,7 @@ from typing import Any
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole, discard
+from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
 from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
@@ -70,7 +72,7 @@ class Bar:
         try:
             self._progress.console.print(line, soft_wrap=True)
         except OSError:  # Without a reader the run goes on.
-            discard("stderr")
+            sys.stderr = open(os.devnull, "w")  # noqa: SIM115, or Python would fail to flush it at the end.
 
     def update(self, description: str, n_finished: int, n_planned: int) -> None:
         """Show how many of the planned steps are finished, and what comes next.
