@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -107,6 +108,7 @@ def run_job(job: VerifyJob) -> int:
     with watch_for_stops(job), job.journal() as journal:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             subjects, questions = job.load()
+            gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             result = run(
                 subjects,
                 questions,

@@ -1,5 +1,8 @@
 """A module whose import loads all installed properties: the server of worker processes imports it once for all."""
 
+import gc
+
 from contactverif.run.registry import load_properties
 
 load_properties()  # One that does not load is `NotLoaded` in each worker, too.
+gc.freeze()  # No worker's collection walks over what all of them share.
