@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,7 @@ from contactverif.contract.interface import Interface, Surface
 _PREFIX = "parameter_"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Case:
     """One interface in one state with one penalty, on which a property judges a formulation.
 
@@ -107,12 +108,12 @@ class Case:
         positions = self.z[: self.interface.n_unknowns]
         return replace(self, z=np.concatenate([positions, multipliers]), n_multipliers=len(multipliers))
 
-    @property
+    @cached_property
     def largest_coordinate(self) -> float:
         """The largest coordinate of the state and of the reference, a length; X in the tolerances."""
         return float(max(np.abs(self.positions).max(), np.abs(self.interface.nodes).max()))
 
-    @property
+    @cached_property
     def shortest_segment(self) -> float:
         """The length of the shortest current segment of both sides; ℓ in the tolerances."""
         interface, positions = self.interface, self.positions
