@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -105,9 +106,10 @@ def run_job(job: VerifyJob) -> int:
     from contactverif.run.run import run
     from contactverif.run.scheduler import worker_pool
 
-    with watch_for_stops(job), job.journal() as journal:
+    with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             subjects, questions = job.load()
+            journal = stack.enter_context(job.journal())  # A plugin that ends us while it is loaded leaves no file.
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             result = run(
                 subjects,

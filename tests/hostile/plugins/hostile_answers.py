@@ -270,17 +270,18 @@ def traits_of_another_kind(right: Any) -> Any:
 @answers("traits", ends=CAUGHT)
 def traits_changed_afterwards(answer: Any) -> Any:
     """State promises whose values were exchanged after they had been checked."""
-    for name in ("flat", "penalty", "enforcement", "symmetric"):
-        object.__setattr__(answer, name, "\x1b[2Jtrue")
-    object.__setattr__(answer, "witnesses", 7)
+    exchanged = ((answer.promises.patch, "flat"), (answer.promises, "symmetric"), (answer.rules, "penalty"))
+    for group, name in exchanged:
+        object.__setattr__(group, name, "\x1b[2Jtrue")
+    object.__setattr__(answer.evidence, "witnesses", 7)
     return answer
 
 
 @answers("traits", ends=EITHER)
 def traits_with_long_words(answer: Any) -> Any:
     """State a source of 20 MB, and witnesses whose names are escape sequences."""
-    object.__setattr__(answer, "source", "x" * 20_000_000)
-    object.__setattr__(answer, "witnesses", {"patch": "\x1b[2J", "balance": "../../etc/passwd"})
+    object.__setattr__(answer.evidence, "source", "x" * 20_000_000)
+    object.__setattr__(answer.evidence, "witnesses", {"patch": "\x1b[2J", "balance": "../../etc/passwd"})
     return answer
 
 
@@ -288,5 +289,5 @@ def traits_with_long_words(answer: Any) -> Any:
 def traits_that_change(right: Any) -> Any:
     """State other promises each time."""
     traits = right()
-    object.__setattr__(traits, "symmetric", bool(next(_calls) % 2))
+    object.__setattr__(traits.promises, "symmetric", bool(next(_calls) % 2))
     return traits
