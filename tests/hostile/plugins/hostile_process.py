@@ -117,7 +117,6 @@ def patched_builtins() -> None:
 def patched_writer() -> None:
     """Answer wrongly, and patch the functions that write a report."""
     _patch(_harness("write", "reports", "verify_command"), "write", lambda *_, **__: None)
-    _patch(_harness("verify_command"), "write_results", lambda *_, **__: None)
 
 
 @instead("residual", ends=EITHER)
@@ -149,7 +148,7 @@ def profile() -> None:
     """Set a profile function that ends the process when the harness writes its report."""
 
     def spy(frame: Any, event: str, argument: Any) -> None:
-        if frame.f_code.co_name == "write_results":
+        if frame.f_code.co_name == "end_run":
             os._exit(0)
 
     sys.setprofile(spy)
