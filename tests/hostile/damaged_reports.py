@@ -349,7 +349,7 @@ class Campaign:
 def import_everything() -> None:
     """Import what the commands import, once and not in each fork."""
     for name in (
-        "contactverif.cli.case_pictures",
+        "contactverif.cli.counterexample_output",
         "contactverif.cli.report_comparison",
         "contactverif.cli.scene_drawing",
         "contactverif_reports.html.report_page",

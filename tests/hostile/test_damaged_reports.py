@@ -11,7 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 from damage import BYTES
-from damaged_reports import TREES, Campaign, lie_about_sizes, write_report, write_tree
+from damaged_reports import TREES, Campaign, import_everything, lie_about_sizes, write_report, write_tree
 
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.errors import MisuseError
@@ -30,6 +30,7 @@ HARMLESS = ("one bit", "one byte", "another attribute", "an attribute is missing
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    import_everything()
     return Campaign(
         tmp_path_factory.mktemp("damaged"), lambda path: write_report(path, ["patch.flat.transmission", "unilateral"])
     )
