@@ -23,8 +23,6 @@ from contactverif.mechanics.scene import Scene
 
 ROUNDOFF_FACTOR = 8.0  # A residual is zero if it is at most this many units of roundoff of its largest terms.
 
-TIMED_PARTS = ("pair", "residual", "tangent", "solve")
-
 
 @dataclass(slots=True)
 class System:
@@ -41,13 +39,13 @@ class System:
     use_tangent: bool = True
     # The step of differences in positions, a length; None for the one that suits smooth residuals.
     difference_step: float | None = None
-    # The processor's time spent in "pair", "residual", "tangent" and "solve" so far.
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED_PARTS, 0.0))
+    solve_seconds: float = 0.0  # The processor's time spent in linear systems so far.
     n_multipliers: int = field(init=False)  # The number of multipliers of the formulation on the scene's interface.
     # (n_unknowns + n_multipliers, n) The scene's transformation from unknowns to positions, with the multipliers
     # behind both.
     transformation: Any = field(init=False)
     stiffness: Any = field(init=False)  # (n, n) The scene's stiffness, 0 for multipliers.
+    _sizes: tuple[Any, Any] = field(init=False)  # The absolute values of both, the transformation transposed.
 
     def __post_init__(self) -> None:
         scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
@@ -60,6 +58,7 @@ class System:
                 unit, nothing = sparse.eye_array(count), sparse.csr_array((count, count))
                 self.transformation = sparse.csr_array(sparse.block_diag([scene.transformation, unit]))
                 self.stiffness = sparse.csr_array(sparse.block_diag([scene.stiffness, nothing]))
+        self._sizes = abs(self.transformation).T, abs(scene.stiffness)
 
     @property
     def size(self) -> int:
@@ -73,35 +72,25 @@ class System:
 
     def pair(self, u: FloatArray) -> Pairing | None:
         """Return the pairing at the unknowns u (n,), None if the formulation has none."""
-        start = process_time()
-        pairing = self.formulation.pair(self.scene.interface, self.state(u))
-        self.seconds["pair"] += process_time() - start
-        return pairing
+        return self.formulation.pair(self.scene.interface, self.state(u))
 
     def forces(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
         """Return the residual of the formulation alone, (n_unknowns + n_multipliers,), at the unknowns u (n,)."""
-        start = process_time()
-        forces = self.formulation.residual(self.scene.interface, pairing, self.state(u))
-        self.seconds["residual"] += process_time() - start
-        return forces
+        return self.formulation.residual(self.scene.interface, pairing, self.state(u))
 
     def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
         """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
-        start, z = process_time(), self.state(u)
+        z = self.state(u)
         if self._asks_tangent:
-            tangent = self.formulation.tangent(self.scene.interface, pairing, z)
-        else:
-            tangent = self.differences(pairing, z)
-        self.seconds["tangent"] += process_time() - start
-        return tangent
+            return self.formulation.tangent(self.scene.interface, pairing, z)
+        return self.differences(pairing, z)
 
     def forces_and_tangent(
         self, u: FloatArray, pairing: Pairing | None, *, later: bool = False
     ) -> tuple[FloatArray, Any]:
         """Return `forces` and `tangent` at the unknowns u (n,), in one call where the formulation offers that.
 
-        The time of one call counts as that of the tangent, which is the larger part. With `later`, the tangent is None:
-        it may not be needed.
+        With `later`, the tangent is None: it may not be needed.
         """
         if later:
             return self.forces(u, pairing), None
@@ -113,10 +102,8 @@ class System:
         """Return `forces` and `tangent` at each of some unknowns u (n,), all asked for together."""
         if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
             return [(self.forces(u, pairing), self.tangent(u, pairing)) for u in states]
-        start, interface = process_time(), self.scene.interface
-        both = self.formulation.answers([("residual_and_tangent", interface, pairing, self.state(u)) for u in states])
-        self.seconds["tangent"] += process_time() - start
-        return both
+        interface = self.scene.interface
+        return self.formulation.answers([("residual_and_tangent", interface, pairing, self.state(u)) for u in states])
 
     @property
     def _asks_tangent(self) -> bool:
@@ -128,10 +115,9 @@ class System:
 
     def balance(self, u: FloatArray, forces: FloatArray) -> FloatArray:
         """Return the residual (n,) at the unknowns u (n,) where the formulation returns these forces."""
-        start, n_free = process_time(), self.scene.n_free
+        n_free = self.scene.n_free
         residual: FloatArray = self.transformation.T @ forces
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
-        self.seconds["residual"] += process_time() - start
         return residual
 
     def is_balanced(self, residual: FloatArray, forces: FloatArray, tolerance: float) -> bool:
@@ -161,30 +147,26 @@ class System:
     def contact_stiffness(self, u: FloatArray, pairing: Pairing | None, tangent: Any) -> Any:
         """Return the derivative (n, n) of the contact forces on the unknowns, of a `tangent`; None asks for that."""
         tangent = self.tangent(u, pairing) if tangent is None else tangent
-        start = process_time()
         tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
-        contact = self.transformation.T @ tangent @ self.transformation
-        self.seconds["tangent"] += process_time() - start
-        return contact
+        return self.transformation.T @ tangent @ self.transformation
 
     def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
         """Return the part of the residual (n,) that roundoff of positions and forces alone may cause.
 
         `contact` (n, n) is the derivative of the contact forces at u, or nearby.
         """
-        start = process_time()
         scene, n_free = self.scene, self.scene.n_free
         # A gap is rounded like the largest coordinate, even where the node that it is measured from moves no force.
         largest = np.abs(scene.positions(u[:n_free], self.factor)).max()
         sizes = np.full(self.size, largest)
         sizes[n_free:] = np.abs(u[n_free:]).max(initial=0.0)  # This includes multipliers that become inactive.
         # A force along an inclined normal is rounded in both of its components.
-        terms = abs(contact) @ sizes + abs(self.transformation).T @ np.abs(forces)
+        to_unknowns, stiffness = self._sizes
+        terms = abs(contact) @ sizes + to_unknowns @ np.abs(forces)
         # A displacement below uX moves no node. Displacements of a body that nothing presses shrink by 1e-16 in each
         # iteration, and so do its forces: counted over those displacements alone, they would never be small.
         displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
-        terms[:n_free] += abs(scene.stiffness) @ displacements + self.factor * np.abs(scene.load)
-        self.seconds["tangent"] += process_time() - start
+        terms[:n_free] += stiffness @ displacements + self.factor * np.abs(scene.load)
         floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
         return floor
 
@@ -196,7 +178,7 @@ class System:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
         start = process_time()
         step = linear.solve_step(matrix, right, self.scene.n_free, floor)
-        self.seconds["solve"] += process_time() - start
+        self.solve_seconds += process_time() - start
         return step
 
     def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:

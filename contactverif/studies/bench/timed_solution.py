@@ -41,7 +41,7 @@ def solve_with_clock(subject: Subject, instance: ProblemInstance) -> tuple[Timed
     with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
         tries = solve_in_tries(instance.scene, formulation, instance.start, instance.step)
     total, wall = process_time() - start - meter.excess, perf_counter() - wall - meter.wall_excess
-    seconds = meter.seconds | {"solve": sum(trace.seconds["solve"] for trace in tries), "total": total}
+    seconds = meter.seconds | {"solve": sum(trace.solve_seconds for trace in tries), "total": total}
     counts = (sum(trace.n_iterations for trace in tries), *(meter.states[name] for name in _COUNTED))
     return TimedSolution(seconds, wall, dict(zip(COUNTS, counts, strict=True))), tries
 
