@@ -6,6 +6,8 @@ What a plugin may keep or change must not be what others are judged on: arrays g
 from __future__ import annotations
 
 from collections.abc import Collection
+from copy import copy
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -60,6 +62,21 @@ def dense(matrix: Any) -> FloatArray:
     """Return a matrix, given as an array or as a sparse matrix or array of scipy, as an array of the same shape."""
     array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
     return array
+
+
+def compressed_matrix(kind: str, size: int, data: FloatArray, indices: Array, indptr: Array) -> Any:
+    """Return the csr or csc array (size, size) of these three arrays, which fit each other and are not copied.
+
+    scipy's own constructor checks and compares the arrays, which takes longer than the product with a small matrix.
+    """
+    matrix = copy(_empty_matrix(kind, size))
+    matrix.data, matrix.indices, matrix.indptr = data, indices, indptr
+    return matrix
+
+
+@lru_cache(maxsize=256)
+def _empty_matrix(kind: str, size: int) -> Any:
+    return sparse.csr_array((size, size)) if kind == "csr" else sparse.csc_array((size, size))
 
 
 def as_array(argument: str, values: ArrayLike) -> NDArray[Any]:

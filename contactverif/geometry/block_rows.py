@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray, compressed_matrix
 from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 
 NumberArray = NDArray[np.int32]
@@ -37,7 +36,7 @@ class Couplings(NamedTuple):
     first_row: IntArray  # (n_couplings,), where in `nodes` the rows of each coupling begin
 
 
-def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> sparse.csr_array:
+def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> Any:
     """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows."""
     size, n_numbers = 2 * n_nodes + n_multipliers, n_nodes + n_multipliers
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
@@ -48,7 +47,7 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> spars
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
     _write_pattern(indptr, indices, n_nodes, begins, ends, columns)
-    matrix = sparse.csr_array((np.zeros(n_entries), indices, indptr), shape=(size, size))
+    matrix = compressed_matrix("csr", size, np.zeros(n_entries), indices, indptr)
     matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
     return matrix
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import Array, FloatArray, compressed_matrix
 from contactverif.contract.errors import ContractError, MisuseError, PluginError
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -28,7 +28,7 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 
-_COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
+_COMPRESSED = ("csr", "csc")
 _MOST_SECONDS = 1e9
 
 
@@ -245,15 +245,15 @@ def _pick(arrays: dict[str, Array], verb: str, name: str) -> Array:
 
 
 def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
-    """Return the tangent (size, size), dense or in the format in which it came, with no entry checked."""
+    """Return the tangent (size, size), dense or in the format in which it came, with nothing checked but coo."""
     if "dense" in arrays:
         return arrays["dense"]
     kind = next((kind for kind in _COMPRESSED if f"{kind} data" in arrays), "coo")
+    if kind != "coo":
+        parts = (_pick(arrays, verb, f"{kind} {name}") for name in ("data", "indices", "indptr"))
+        return compressed_matrix(kind, size, *parts)
+    data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
     try:
-        if kind == "coo":
-            data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
-            return sparse.coo_array((data, (row, col)), shape=(size, size))
-        parts = tuple(_pick(arrays, verb, f"{kind} {name}") for name in ("data", "indices", "indptr"))
-        return _COMPRESSED[kind](parts, shape=(size, size))
+        return sparse.coo_array((data, (row, col)), shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:
-        raise ContractError(f"{verb}: returned a broken {kind} matrix: {error}") from None
+        raise ContractError(f"{verb}: returned a broken coo matrix: {error}") from None
