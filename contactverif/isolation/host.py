@@ -117,15 +117,15 @@ class Host:
         pairing: Pairing | None,
         z: Array | None,
         *,
-        warm: bool = False,
+        timed: bool = False,
     ) -> Question:
-        """Put a question into the queue and return it. `warm`: a short call is timed when it is repeated."""
+        """Put a question into the queue and return it. `timed`: its call is timed, a short one when it is repeated."""
         if len(self._questions) >= _QUEUE:
             self.flush()
         of_interface = self._share(interface)
         of_pairing = None if pairing is None else self._share(pairing)
         packed = None if z is None else PackedArray.pack(z)
-        return self._put(verb, Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, warm))
+        return self._put(verb, Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed))
 
     def keep(self, item: Interface | Pairing, number: int) -> None:
         """Note that the process keeps something under a number."""

@@ -64,7 +64,7 @@ class Ask(msgspec.Struct, array_like=True, tag="ask"):
     interface: int
     pairing: int | None
     z: PackedArray | None
-    warm: bool = False
+    timed: bool = False
 
 
 class Answer(msgspec.Struct, array_like=True, tag="answer"):

@@ -84,7 +84,7 @@ class RemoteFormulation(Prefetching):
         for part in (*OPTIONAL_PARTS, *FAST_PARTS, "n_multipliers"):
             if part not in make.provides or (part == "n_multipliers" and not counted):
                 setattr(self, part, None)
-        self.warm = False  # True: what short calls take is measured when they are repeated.
+        self.timed = False  # True: the process times each call, and a short one when it is repeated.
         self._number, self._started = 0, -1
         self._last: Question | None = None
         self._prefetched: deque[tuple[Call, Question]] = deque()
@@ -98,7 +98,7 @@ class RemoteFormulation(Prefetching):
         if not host.is_alive(self._started):
             self._number, self._started = host.make(self._penalty)
             weakref.finalize(self, host.forget, self._number, self._started)
-        self._last = host.ask(verb, self._number, interface, pairing, z, warm=self.warm)
+        self._last = host.ask(verb, self._number, interface, pairing, z, timed=self.timed)
         return self._last
 
     def _answer(
@@ -133,7 +133,7 @@ class RemoteFormulation(Prefetching):
         return self._prefetched.popleft()[1]
 
     def seconds(self) -> tuple[float, float]:
-        """Return the seconds that the last call took there, by the wall clock and of the processor.
+        """Return the seconds that the last call, which was `timed`, took there, by the wall clock and of the processor.
 
         They hold neither the round trip nor any check. A plugin may say what it likes, within reason.
         """
@@ -186,33 +186,25 @@ class RemotePairing(Pairing):
 
     def __init__(self, host: Host, question: Question, interface: Interface) -> None:
         self._host, self._question, self._interface = host, question, interface
-        self._content: Pairing | None = None
+        self._content: dict[str, Array] | None = None
 
     @property
-    def _whole(self) -> Pairing:
+    def _arrays(self) -> dict[str, Array]:  # type: ignore[override]
+        """Return the arrays, which come here when they are wanted for the first time."""
         if self._content is None:
             if self._question.answer is None:
                 self._host.flush()
             whole = Pairing(_unpack("pair", answer_of(self._question)))
             whole.check_bounds(self._interface)
             self.check()
-            self._content = whole
+            self._content = dict(whole)
         return self._content
-
-    def __getitem__(self, name: str) -> Array:
-        return self._whole[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._whole)
-
-    def __len__(self) -> int:
-        return len(self._whole)
 
     @property
     def opaque(self) -> bool:
         """Return whether pairings of the plugin have a handle, which stay in its process."""
         if self._host.opaque is None:
-            _ = self._whole
+            _ = self._arrays
         return bool(self._host.opaque)
 
     @property

@@ -214,9 +214,10 @@ def _count_changes(pairing: Pairing | None, before: Pairing | None) -> int:
     """Return how many entries of the pairing differ; an entry of another shape counts with its size."""
     if pairing is None or before is None:
         return -1
+    earlier = dict(before.items())
     return sum(
-        int(np.count_nonzero(values != before[name]))
-        if name in before and before[name].shape == values.shape
+        int(np.count_nonzero(values != earlier[name]))
+        if name in earlier and earlier[name].shape == values.shape
         else values.size
         for name, values in pairing.items()
     )

@@ -86,6 +86,8 @@ class _Timer:
         interface, provides = self._case.interface, self._subject.provides
         z = freeze(np.concatenate([self._case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
         pairing = formulation.own_pairing(interface, z)
+        if isinstance(plugin, RemoteFormulation):
+            plugin.timed = True
         times = {}
         if "pair" in provides:
             times["pair"] = _seconds(plugin, lambda: plugin.pair(interface, z))

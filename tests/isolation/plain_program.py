@@ -47,7 +47,7 @@ def tangent(penalty, interface, pairing, z):
 METHODS = {"pair": pair, "residual": residual, "tangent": tangent}
 
 
-def answer(question, method, formulation, interface, pairing, z, warm):
+def answer(question, method, formulation, interface, pairing, z, timed):
     arguments = items[formulation], items[interface], items.get(pairing), unpack(z)
     start, processor = time.perf_counter(), time.process_time()
     arrays = METHODS[method](*arguments)

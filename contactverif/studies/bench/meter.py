@@ -87,6 +87,6 @@ def add_meter(subject: Subject, case: Case, meter: Meter) -> Any:
     """Return the formulation with the penalty of a case, as Newton's method needs it, timed by the meter."""
     plugin = subject.for_case(case).plugin
     if isinstance(plugin, RemoteFormulation):
-        plugin.warm = True
+        plugin.timed = True
     metered = MeteredPlugin(plugin, meter)
     return MeteredFormulation(CheckedFormulation(metered, subject.traits, subject.provides), meter)
