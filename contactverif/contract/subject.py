@@ -234,16 +234,16 @@ class CheckedFormulation:
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
+        takes_batches = self._prefetching is not None or (
+            self._traits.abilities.batched and not self.decides_anew(pairing)
+        )
+        if z.ndim > 1 and not takes_batches:
+            forces = np.empty_like(z)
+            for index in np.ndindex(z.shape[:-1]):
+                forces[index] = self.residual(interface, pairing, z[index])
+            return forces
         if z.ndim == 1:
-            return self._residual(interface, self._pairing_at(interface, pairing, z), z)
-        if self._prefetching is not None or (self._traits.abilities.batched and not self.decides_anew(pairing)):
-            return self._residual(interface, pairing, z)
-        forces = np.empty_like(z)
-        for index in np.ndindex(z.shape[:-1]):
-            forces[index] = self._residual(interface, self._pairing_at(interface, pairing, z[index]), z[index])
-        return forces
-
-    def _residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
+            pairing = self._pairing_at(interface, pairing, z)
         forces = _call_plugin("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
         return _check_forces("residual", forces, z)
 
