@@ -122,28 +122,31 @@ class ContactPoints:
     on_master: BoolArray = field(default_factory=_false)
 
     def __post_init__(self) -> None:
-        dtypes: dict[str, type[np.generic]] = dict.fromkeys(("slave_segment", "master_segment"), np.int64)
-        dtypes |= dict.fromkeys(("active", "weighted", "on_master"), np.bool_)
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
-        for entry in fields(self):
-            raw, dtype = np.asarray(getattr(self, entry.name)), dtypes.get(entry.name, np.float64)
-            if raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):  # Otherwise 0.7 would become segment 0.
-                raise MisuseError(f"ContactPoints.{entry.name}", f"dtype {raw.dtype}", np.dtype(dtype).name)
-            if raw.ndim == 0 and entry.name in ("weighted", "on_master"):
+        for name, dtype, n_axes in _COLUMNS:
+            raw = np.asarray(getattr(self, name))
+            # Otherwise 0.7 would become segment 0.
+            if raw.dtype != dtype and raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):
+                raise MisuseError(f"ContactPoints.{name}", f"dtype {raw.dtype}", dtype.name)
+            if raw.ndim == 0 and name in ("weighted", "on_master"):
                 raw = np.full(n_points, raw)
-            values: NDArray[Any] = freeze(raw, dtype)
-            n_axes = 2 if entry.name in ("position", "normal") else 1
+            values: NDArray[Any] = freeze(raw, dtype.type)
             if values.ndim != n_axes or len(values) != n_points:
-                raise MisuseError(
-                    f"ContactPoints.{entry.name}",
-                    f"shape {values.shape}",
-                    f"({n_points}, dim)" if n_axes == 2 else f"({n_points},)",
-                )
-            object.__setattr__(self, entry.name, values)
+                needed = f"({n_points}, dim)" if n_axes == 2 else f"({n_points},)"
+                raise MisuseError(f"ContactPoints.{name}", f"shape {values.shape}", needed)
+            object.__setattr__(self, name, values)
 
     def select(self, selection: BoolArray | IntArray) -> ContactPoints:
         """Return some of the points, selected by mask (n_points,) or by number."""
-        return ContactPoints(**{entry.name: getattr(self, entry.name)[selection] for entry in fields(self)})
+        return ContactPoints(**{name: getattr(self, name)[selection] for name, *_ in _COLUMNS})
+
+
+_DTYPES = {"IntArray": np.dtype(np.int64), "BoolArray": np.dtype(np.bool_), "FloatArray": np.dtype(np.float64)}
+# The name of each field, its dtype and its number of axes.
+_COLUMNS = [
+    (entry.name, _DTYPES[str(entry.type)], 2 if entry.name in ("position", "normal") else 1)
+    for entry in fields(ContactPoints)
+]
 
 
 class ResidualOnly(Protocol):
