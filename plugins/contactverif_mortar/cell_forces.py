@@ -21,7 +21,7 @@ Source: Puso & Laursen (2004); dual shapes: Wohlmuth (2000), on the covered part
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -106,6 +106,10 @@ class Shapes:
             extent,
             variance,
         )
+
+    def fields_of_first_state(self) -> tuple[Array, ...]:
+        """Return all fields at the first state, in their order."""
+        return tuple([getattr(self, entry.name)[0] for entry in fields(self)])
 
     def at(self, node_values: Array, ends: IntArray) -> Array:
         """Interpolate values (n_states, n_nodes) of the nodes to the points, each between its nodes `ends`."""

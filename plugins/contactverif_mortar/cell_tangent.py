@@ -15,7 +15,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block, zero_matrix
+from contactverif.geometry.block_rows import Couplings, NumberArray, add_block, zero_matrix
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
@@ -80,17 +80,8 @@ def springs_at_points(
     starts = np.arange(0, len(nodes) + 1, 4)
     matrix = zero_matrix(interface.n_nodes, 0, Couplings(nodes, starts, starts[:-1]))
     forces: FloatArray = np.zeros(interface.n_unknowns)
-    _add_springs(
-        x,
-        segments_and_cells,
-        places_and_weights,
-        penalty,
-        active,
-        forces,
-        matrix.indptr,
-        matrix.indices,
-        matrix.data,
-    )
+    csr = matrix.indptr, matrix.indices, matrix.data
+    _add_springs(forces, csr, x, segments_and_cells, places_and_weights, penalty, active)
     return forces, matrix
 
 
@@ -122,15 +113,13 @@ def _any_active(active: BoolArray, begin: int, count: int) -> bool:
 
 @compile_maker
 def _add_springs(
+    forces: FloatArray,
+    csr: Fields,
     x: FloatArray,
     segments_and_cells: Fields,
     rule: Fields,
     penalty: float,
     active: BoolArray,
-    forces: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
 ) -> None:
     """Add the forces of the springs on all cells, and their derivative to compressed rows."""
     lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
@@ -151,7 +140,7 @@ def _add_springs(
                 push_point(rows, pushes, cell, point, -penalty * point.gap, 0.0, -penalty)
         local = (slave[s, A], slave[s, B], master[m, 0], master[m, 1])
         finish_rows(rows, 4, cell)
-        add_cell(forces, indptr, indices, data, local, rows, pushes, cell)
+        add_cell(forces, csr, local, rows, pushes, cell)
 
 
 @compile_inline
@@ -171,9 +160,7 @@ def push_point(
 @compile_inline
 def add_cell(
     forces: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
+    csr: Fields,
     local: tuple[int, int, int, int],
     rows: FloatArray,
     pushes: FloatArray,
@@ -188,9 +175,7 @@ def add_cell(
         for column, omega in enumerate((-turn, turn, 0.0, 0.0)):
             x, y = turn_row(rows, k, column, cell)
             add_block(
-                indptr,
-                indices,
-                data,
+                *csr,
                 local[k],
                 local[column],
                 n[0] * x - omega * tau[0] * n[0],

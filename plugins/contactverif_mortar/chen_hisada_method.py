@@ -20,7 +20,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, add_block
+from contactverif.geometry.block_rows import Couplings, NumberArray, add_block
 from contactverif.geometry.compiled import compile_maker
 from contactverif.geometry.projection import (
     PointOnSegment,
@@ -37,7 +37,7 @@ from contactverif.geometry.projection import (
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
 from contactverif_mortar.cell_traits import CELL_TRAITS
-from contactverif_mortar.integration_cells import AREAS, C, Cells, Quadrature
+from contactverif_mortar.integration_cells import AREAS, C, Cells, Fields, Quadrature
 from contactverif_mortar.node_groups import group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
@@ -92,16 +92,9 @@ class ChenHisada:
         state = NodeState(self._node_pressures(interface, pairing, x[None])[0], ones, zeros, ones)
         shapes = weigh(interface, cells, self.quadrature, x, dual=False).shapes
         rows = node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
-        _add_springs(
-            groups.nodes,
-            groups.starts,
-            rows.left,
-            facing,
-            -self.penalty * _node_gap_rows(x, interface.master.segments, nearest),
-            rows.rest.indptr,
-            rows.rest.indices,
-            rows.rest.data,
-        )
+        csr = rows.rest.indptr, rows.rest.indices, rows.rest.data
+        d_pressure = -self.penalty * _node_gap_rows(x, interface.master.segments, nearest)
+        _add_springs(csr, groups.nodes, groups.starts, rows.left, facing, d_pressure)
         return rows.forces, rows.rest
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -141,14 +134,7 @@ def _couple(interface: Interface, cells: Cells, facing: IntArray) -> Couplings:
 
 @compile_maker
 def _add_springs(
-    nodes: NumberArray,
-    starts: IntArray,
-    influence: FloatArray,
-    facing: IntArray,
-    d_pressure: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
+    csr: Fields, nodes: NumberArray, starts: IntArray, influence: FloatArray, facing: IntArray, d_pressure: FloatArray
 ) -> None:
     """Add B_i ⊗ Δp_i of all slave nodes; B_i are the entries of group i, and Δp_i (3, 2) belongs to V, 1, 2."""
     for i in range(len(facing)):
@@ -156,17 +142,12 @@ def _add_springs(
             b_x, b_y = influence[2 * row], influence[2 * row + 1]
             for k in range(3):
                 p_x, p_y = d_pressure[i, k, 0], d_pressure[i, k, 1]
-                add_block(indptr, indices, data, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
+                add_block(*csr, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
 
 
 @compile_maker
 def _pair_nodes(
-    x: FloatArray,
-    n_nodes: int,
-    master: IntArray,
-    neighbours: IntArray,
-    tree: Tree,
-    tau: float,
+    x: FloatArray, n_nodes: int, master: IntArray, neighbours: IntArray, tree: Tree, tau: float
 ) -> tuple[IntArray, BoolArray]:
     """Return the nearest master segment of each slave node, and whether the node is in contact."""
     order, boxes = tree

@@ -14,8 +14,9 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.block_rows import AnyIntArray, NumberArray
+from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_maker
+from contactverif_mortar.integration_cells import Fields
 from contactverif_mortar.node_groups import RowGroups
 
 
@@ -76,35 +77,18 @@ class NodeRows(NamedTuple):
         """Add the products of some rows to `rest`, whose pattern must hold their groups, and return it."""
         groups, rest = self.groups, self.rest
         all_weights = np.append(weights, np.ones(len(groups.starts) - 1 - len(weights)))
-        _add_products(
-            first_row,
-            end_row,
-            groups.nodes,
-            groups.starts,
-            self.left,
-            all_weights,
-            self.right,
-            rest.indptr,
-            rest.indices,
-            rest.data,
-        )
+        factors = self.left, all_weights, self.right
+        _add_products((rest.indptr, rest.indices, rest.data), first_row, end_row, groups.nodes, groups.starts, factors)
         return rest
 
 
 @compile_maker
 def _add_products(
-    first_row: int,
-    end_row: int,
-    nodes: NumberArray,
-    starts: IntArray,
-    left: FloatArray,
-    weights: FloatArray,
-    right: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
+    csr: Fields, first_row: int, end_row: int, nodes: NumberArray, starts: IntArray, factors: Fields
 ) -> None:
     """Add weight_j B_j ⊗ D_j to compressed rows. Groups and columns of rows ascend, so one walk finds all places."""
+    indptr, indices, data = csr
+    left, weights, right = factors
     for j in range(first_row, end_row):
         start, stop, weight = starts[j], starts[j + 1], weights[j]
         for row in range(start, stop):

@@ -22,7 +22,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, zero_matrix
+from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
@@ -157,36 +157,28 @@ def node_rows(
     """Compute forces and factors on cells with no averaged normals, with `shapes` of `weigh` at the same state."""
     matrix = zero_matrix(interface.n_nodes, 0, pattern)
     forces, left, right = np.zeros(interface.n_unknowns), *np.zeros((2, 2 * len(groups.nodes)))
-    _add_rows(
-        x,
-        *cell_arguments(interface, cells, rule),
-        (shapes, state.pressure, state.gaps, state.divisor),
-        (groups.nodes, groups.starts, left, right),
-        forces,
-        matrix.indptr,
-        matrix.indices,
-        matrix.data,
-    )
+    csr, at_nodes = (matrix.indptr, matrix.indices, matrix.data), (state.pressure, state.gaps, state.divisor)
+    factors = groups.nodes, groups.starts, left, right
+    _add_rows(forces, csr, factors, x, *cell_arguments(interface, cells, rule), shapes, at_nodes)
     return NodeRows(forces, matrix, groups, left, right)
 
 
 @compile_maker
 def _add_rows(
+    forces: FloatArray,
+    csr: Fields,
+    factors: Fields,
     x: FloatArray,
     segments_and_cells: Fields,
     rule: Fields,
+    shapes: FloatArray,
     at_nodes: Fields,
-    factors: Fields,
-    forces: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
 ) -> None:
     """Add what all cells give to the forces, to compressed rows, and to the rows of the factors."""
     lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
     places, weights = rule
-    shapes, pressure, gaps, divisor = at_nodes
-    nodes, starts, left, right = factors
+    pressure, gaps, divisor = at_nodes
+    nodes, starts, _, right = factors
     n_nodes, n_segments = len(pressure), len(slave)
     dual = len(starts) - 1 > n_nodes
     n_rows = 4 if dual else 2
@@ -213,10 +205,10 @@ def _add_rows(
                 _add_moments(rows, units, chain, cell, point, shapes, s, difference, (gaps[a], gaps[b]))
         finish_rows(rows, 4 + n_rows, cell)
         local = (a, b, master[m, 0], master[m, 1])
-        add_cell(forces, indptr, indices, data, local, rows, pushes, cell)
+        add_cell(forces, csr, local, rows, pushes, cell)
         share = (1 / divisor[a], 1 / divisor[b], 1.0, 1.0)
         numbers = (a, b, n_nodes + s, n_nodes + n_segments + s)
-        _write_rows(nodes, starts, left, right, numbers, share, local, rows, units, cell)
+        _write_rows(factors, numbers, share, local, rows, units, cell)
     if dual:
         add_chains(slave, chain, divisor, nodes, starts, right)
 
@@ -257,10 +249,7 @@ def _add_moments(
 
 @compile_inline
 def _write_rows(
-    nodes: NumberArray,
-    starts: IntArray,
-    left: FloatArray,
-    right: FloatArray,
+    factors: Fields,
     numbers: tuple[int, int, int, int],
     shares: tuple[float, float, float, float],
     local: tuple[int, int, int, int],
@@ -269,6 +258,7 @@ def _write_rows(
     cell: CellFrame,
 ) -> None:
     """Add what a cell gives to the rows of both factors that have a group; `shares` multiply those of `right`."""
+    nodes, starts, left, right = factors
     for row in range(len(units)):
         j, share = numbers[row], shares[row]
         if starts[j + 1] == starts[j]:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_block
+from contactverif.geometry.block_rows import NumberArray, add_block
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
@@ -57,32 +57,14 @@ def add_shaped_rows(
     dual = len(groups.starts) - 1 > len(state.pressure)
     chain = np.zeros((len(shaped.slave) if dual else 0, 2, 2))
     n_q = len(shaped.points) // max(n_cells, 1)
-    at_points = (
-        shapes.values[0],
-        shapes.slope[0],
-        shapes.by_mean[0],
-        shapes.by_variance[0],
-        shapes.centred[0],
-        shapes.extent[0],
-        shapes.variance[0],
-    )
+    places, at_points = (shaped.points, shaped.segment, shaped.slave, groups.local), shapes.fields_of_first_state()
+    at_nodes, factors = (state.pressure, state.gaps, state.divisor), (groups.nodes, groups.starts, left, right)
+    csr = matrix.indptr, matrix.indices, matrix.data
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
         end = min(begin + size, n_cells)
-        _add_points(
-            begin * n_q,
-            n_q,
-            n_pushed,
-            (shaped.points, shaped.segment, shaped.slave, groups.local),
-            at_points,
-            shaped.make_gains(begin, end),
-            (state.pressure, state.gaps, state.divisor),
-            (groups.nodes, groups.starts, left, right, chain),
-            forces,
-            matrix.indptr,
-            matrix.indices,
-            matrix.data,
-        )
+        gains = shaped.make_gains(begin, end)
+        _add_points(forces, csr, factors, chain, begin * n_q, n_q, n_pushed, places, at_points, gains, at_nodes)
     if dual:
         add_chains(shaped.slave, chain, state.divisor, groups.nodes, groups.starts, right)
     return left, right
@@ -90,6 +72,10 @@ def add_shaped_rows(
 
 @compile_maker
 def _add_points(
+    forces: FloatArray,
+    csr: Fields,
+    factors: Fields,
+    chain: FloatArray,
     first_point: int,
     n_q: int,
     n_pushed: int,
@@ -97,17 +83,12 @@ def _add_points(
     shapes: Fields,
     gains: FloatArray,
     at_nodes: Fields,
-    factors: Fields,
-    forces: FloatArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
 ) -> None:
     """Add what the points from `first_point` on give, one for each of their Δ."""
     points, segment, slave, local = places
     values, slope, by_mean, by_variance, centred, extent, variance = shapes
     pressure, gaps, divisor = at_nodes
-    nodes, starts, left, right, chain = factors
+    starts = factors[1]
     n_local = local.shape[1]
     block = np.zeros((4, 2, n_local, 2))
     row = np.empty((n_local, 2))
@@ -130,7 +111,7 @@ def _add_points(
                     for axis in range(2):
                         d_weighted = shape * d[D_WEIGHT, k, axis] + w * sign * slope[number] * d[D_C, k, axis]
                         row[k, axis] = (w * shape * d[D_GAP, k, axis] + above * d_weighted) / divisor[j]
-                _add_row(nodes, starts, left, right, j, cell, row, n_pushed, point, shape)
+                _add_row(factors, j, cell, row, n_pushed, point, shape)
             if len(chain):
                 chain[s, end, 0] += sign * above * w * by_mean[number]
                 chain[s, end, 1] += sign * above * w * by_variance[number]
@@ -138,9 +119,9 @@ def _add_points(
             numbers = (len(pressure) + s, len(pressure) + len(slave) + s)
             by_moment = (difference * by_mean[number], difference * by_variance[number])
             spread = (centred[number], extent[number], variance[number])
-            _add_moments(nodes, starts, left, right, numbers, by_moment, spread, d, row, cell, n_pushed, point)
+            _add_moments(factors, numbers, by_moment, spread, d, row, cell, n_pushed, point)
         if (number + 1) % n_q == 0:
-            _write_block(block, n_pushed, cell, indptr, indices, data)
+            _write_block(csr, block, n_pushed, cell)
 
 
 @compile_inline
@@ -164,29 +145,19 @@ def _add_block_of_point(
 
 
 @compile_inline
-def _write_block(
-    block: FloatArray,
-    n_pushed: int,
-    cell: NumberArray,
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-) -> None:
+def _write_block(csr: Fields, block: FloatArray, n_pushed: int, cell: NumberArray) -> None:
     """Add a block to compressed rows, and clear it."""
     for k in range(n_pushed):
         for column in range(len(cell)):
             xx, xy = block[k, 0, column, 0], block[k, 0, column, 1]
             yx, yy = block[k, 1, column, 0], block[k, 1, column, 1]
-            add_block(indptr, indices, data, cell[k], cell[column], xx, xy, yx, yy)
+            add_block(*csr, cell[k], cell[column], xx, xy, yx, yy)
     block[:] = 0.0
 
 
 @compile_inline
 def _add_moments(
-    nodes: NumberArray,
-    starts: IntArray,
-    left: FloatArray,
-    right: FloatArray,
+    factors: Fields,
     numbers: tuple[int, int],
     by_moment: tuple[float, float],
     spread: tuple[float, float, float],
@@ -203,23 +174,15 @@ def _add_moments(
             for axis in range(2):
                 change = by_weight * d[D_WEIGHT, k, axis] + point[WEIGHT] * by_c * d[D_C, k, axis]
                 row[k, axis] = change / extent
-        _add_row(nodes, starts, left, right, numbers[moment], cell, row, n_pushed, point, by_moment[moment])
+        _add_row(factors, numbers[moment], cell, row, n_pushed, point, by_moment[moment])
 
 
 @compile_inline
 def _add_row(
-    nodes: NumberArray,
-    starts: IntArray,
-    left: FloatArray,
-    right: FloatArray,
-    j: int,
-    cell: NumberArray,
-    row: FloatArray,
-    n_pushed: int,
-    point: FloatArray,
-    pressure: float,
+    factors: Fields, j: int, cell: NumberArray, row: FloatArray, n_pushed: int, point: FloatArray, pressure: float
 ) -> None:
     """Add Δ (n_local, 2) to row j of `right`, and the forces of a pressure at the point to that of `left`."""
+    nodes, starts, left, right = factors
     f = point[WEIGHT] * pressure
     transmit = ((1 - point[C]) / 2, (1 + point[C]) / 2, point[XI] - 1, -point[XI])
     for k in range(len(cell)):

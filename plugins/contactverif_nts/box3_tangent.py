@@ -57,7 +57,7 @@ from contactverif_nts.eq6 import Fields
 
 def add_forces_and_tangent(
     rows: FloatArray,
-    matrix: Fields,
+    csr: Fields,
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
@@ -68,17 +68,17 @@ def add_forces_and_tangent(
 ) -> None:
     """Add the residual (n_unknowns,) at one state, and its derivative, to the rows of one share of the work.
 
-    `matrix` has indptr, indices and data of a matrix with the pattern of the couplings.
+    `csr` has indptr, indices and data of a matrix with the pattern of the couplings.
     """
     slots, runs = np.empty(len(x), dtype=np.int64), np.empty(MOST_NODES, dtype=np.int32)
     room = slots, runs, np.empty((WIDTH, WIDTH)), np.empty(WIDTH)
-    _sweep(rows, matrix, x, multipliers, surfaces, areas, options, couplings, share, room)
+    _sweep(rows, csr, x, multipliers, surfaces, areas, options, couplings, share, room)
 
 
 @compile_kernel
 def _sweep(
     rows: FloatArray,
-    matrix: Fields,
+    csr: Fields,
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
@@ -94,7 +94,6 @@ def _sweep(
     n, transmission, current_area, penalty = options
     nodes, starts, first_point, end_point, only = couplings
     owner, part, begin, end, others = share
-    indptr, indices, data = matrix
     has_multipliers = len(multipliers) > 0
     slots, runs, local, push = room
     for number in range(end - begin + len(others)):
@@ -139,10 +138,10 @@ def _sweep(
                     _add_part_forces(local, push, at, v, force, p_cut, q_cut, pressure, part_j, slots[f], slots[m])
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
-        add_local_matrix(indptr, indices, data, nodes, start, n_coupled, runs, local, owner, part)
+        add_local_matrix(*csr, nodes, start, n_coupled, runs, local, owner, part)
         _add_push(rows, nodes, start, n_coupled, push, owner, part)
         if has_multipliers:
-            _add_multiplier(rows, matrix, nodes, start, n_coupled, len(x), local, push, owner, part)
+            _add_multiplier(rows, csr, nodes, start, n_coupled, len(x), local, push, owner, part)
 
 
 @compile_inline
@@ -169,7 +168,7 @@ def _add_push(
 @compile_inline
 def _add_multiplier(
     rows: FloatArray,
-    matrix: Fields,
+    csr: Fields,
     nodes: NumberArray,
     start: int,
     n_coupled: int,
@@ -180,18 +179,17 @@ def _add_multiplier(
     part: int,
 ) -> None:
     """Add row and column of the multiplier of a coupling, and its constraint."""
-    indptr, indices, data = matrix
     number, width = nodes[start + n_coupled], 2 * n_coupled
     unknown, is_mine = n_nodes + number, owner[number] == part
     for q in range(n_coupled):
         row = nodes[start + q]
         if owner[row] == part:
-            add_column(indptr, indices, data, row, unknown, local[2 * q, width], local[2 * q + 1, width])
+            add_column(*csr, row, unknown, local[2 * q, width], local[2 * q + 1, width])
         if is_mine:
-            add_row(indptr, indices, data, unknown, row, local[width, 2 * q], local[width, 2 * q + 1])
+            add_row(*csr, unknown, row, local[width, 2 * q], local[width, 2 * q + 1])
     if is_mine:
         rows[unknown] += push[width]
-        add_entry(indptr, indices, data, unknown, unknown, local[width, width])
+        add_entry(*csr, unknown, unknown, local[width, width])
 
 
 @compile_inline

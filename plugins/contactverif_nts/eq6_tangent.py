@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.block_rows import AnyIntArray, NumberArray, add_column, add_entry, add_row
+from contactverif.geometry.block_rows import NumberArray, add_column, add_entry, add_row
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import Vector, frame, node
 from contactverif_nts.eq6 import CURRENT, NODAL, REFERENCE, Contact, Fields, area_length, contact_at
@@ -47,16 +47,12 @@ class Force(NamedTuple):
 
 @compile_maker
 def add_tangent(
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-    x: FloatArray,
-    multipliers: FloatArray,
-    surfaces: Fields,
-    points: Fields,
-    options: Fields,
+    csr: Fields, x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
 ) -> None:
-    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`."""
+    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`.
+
+    `csr` has its indptr, indices and data.
+    """
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
     places, weights, area_from, penalty = options
@@ -67,7 +63,7 @@ def add_tangent(
         if not active[i]:
             if has_multipliers:
                 area = 1.0 if area_from == NODAL else weight * area_length(reference, slave, s, other[i])
-                add_entry(indptr, indices, data, unknown, unknown, area)
+                add_entry(*csr, unknown, unknown, area)
             continue
         begin, first_row = _fill_nodes(nodes, slave, master, s, other[i], partner[i], places[slot[i]], area_from)
         v = contact_at(x, nodes[A], nodes[B], nodes[NODE_1], nodes[NODE_2], places[slot[i]])
@@ -82,21 +78,13 @@ def add_tangent(
         force = Force(penalty * v.g * area, penalty, v.g, area, t_ab, t_other)
         if has_multipliers:
             force = Force(-multipliers[i] * area, 1.0, -multipliers[i], area, t_ab, t_other)
-            _add_constraint(indptr, indices, data, nodes, begin, first_row, unknown, v, force)
-        _add_forces(indptr, indices, data, nodes, begin, first_row, v, force, not has_multipliers)
+            _add_constraint(csr, nodes, begin, first_row, unknown, v, force)
+        _add_forces(csr, nodes, begin, first_row, v, force, not has_multipliers)
 
 
 @compile_inline
 def _add_forces(
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-    nodes: NumberArray,
-    begin: int,
-    first_row: int,
-    v: Contact,
-    force: Force,
-    is_spring: bool,
+    csr: Fields, nodes: NumberArray, begin: int, first_row: int, v: Contact, force: Force, is_spring: bool
 ) -> None:
     """Add Δ of the forces on A, B, 1 and 2, share × F n."""
     f = force.f
@@ -111,29 +99,21 @@ def _add_forces(
                 d_size = plus(d_size, times(f, d.xi))
             elif row == NODE_2:
                 d_size = plus(d_size, times(-f, d.xi))
-            add_turned_force(indptr, indices, data, nodes[row], nodes[k], v.normal, v.t, share * f, d_size, d.omega)
+            add_turned_force(csr, nodes[row], nodes[k], v, share * f, d_size, d.omega)
 
 
 @compile_inline
 def _add_constraint(
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-    nodes: NumberArray,
-    begin: int,
-    first_row: int,
-    unknown: int,
-    v: Contact,
-    force: Force,
+    csr: Fields, nodes: NumberArray, begin: int, first_row: int, unknown: int, v: Contact, force: Force
 ) -> None:
     """Add Δ of the constraint −area × g, and what a unit of the multiplier pushes with: −area n."""
     for k in range(begin, N_LOCAL):
         d = _gains(k, v, force)
         d_row = times(-1.0, plus(times(force.area, d.g), times(v.g, d.area)))
-        add_row(indptr, indices, data, unknown, nodes[k], d_row[0], d_row[1])
+        add_row(*csr, unknown, nodes[k], d_row[0], d_row[1])
     for row in range(first_row, N_LOCAL):
         size = -force.area * _share(row, v)
-        add_column(indptr, indices, data, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
+        add_column(*csr, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
 
 
 @compile_inline

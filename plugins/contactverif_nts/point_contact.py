@@ -87,8 +87,8 @@ class PointContact:
         first_multiplier = interface.n_nodes if len(multipliers) else -1
         couplings = eq6_tangent.list_couplings(surfaces, points, self.c, self.area_from, first_multiplier)
         matrix = zero_matrix(interface.n_nodes, len(multipliers), Couplings(*couplings))
-        rows = matrix.indptr, matrix.indices, matrix.data
-        eq6_tangent.add_tangent(*rows, x, multipliers, surfaces, points, options)
+        csr = matrix.indptr, matrix.indices, matrix.data
+        eq6_tangent.add_tangent(csr, x, multipliers, surfaces, points, options)
         return matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:

@@ -5,10 +5,10 @@ Source: Zavarise & De Lorenzis (2009), Eqs. A1–A6.
 
 from __future__ import annotations
 
-from contactverif.contract.arrays import FloatArray
-from contactverif.geometry.block_rows import AnyIntArray, add_block
+from contactverif.geometry.block_rows import add_block
 from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector
+from contactverif_nts.eq6 import Contact, Fields
 
 ZERO = (0.0, 0.0)
 
@@ -27,23 +27,15 @@ def plus(a: Vector, b: Vector) -> Vector:
 
 @compile_inline
 def add_turned_force(
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-    row: int,
-    column: int,
-    normal: Vector,
-    t: Vector,
-    force: float,
-    d_force: Vector,
-    omega: Vector,
+    csr: Fields, row: int, column: int, v: Contact, force: float, d_force: Vector, omega: Vector
 ) -> None:
     """Add Δ(force n) = n Δforce + force Δn, with Δn = −t ω, to the rows of one node and the columns of another.
 
     `d_force` and `omega` are gained for a displacement of the node `column`.
     """
+    normal, t = v.normal, v.t
     xx = normal[0] * d_force[0] - force * t[0] * omega[0]
     xy = normal[0] * d_force[1] - force * t[0] * omega[1]
     yx = normal[1] * d_force[0] - force * t[1] * omega[0]
     yy = normal[1] * d_force[1] - force * t[1] * omega[1]
-    add_block(indptr, indices, data, row, column, xx, xy, yx, yy)
+    add_block(*csr, row, column, xx, xy, yx, yy)
