@@ -24,18 +24,26 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.interface import Interface
 from contactverif.geometry.compiled import compile_inline
-from contactverif.geometry.projection import Vector, dot, frame, minus
-from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from
+from contactverif.geometry.projection import Vector, dot, frame, minus, node
+from contactverif_mortar.cell_geometry import NODE_1, NODE_2, A, B, SlaveView, facing_point, seen_from, slave_view
+from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
 
 # The twelve numbers of a row; the first two stand for four, one for each node A, B, 1, 2.
 ALONG_TAU, ALONG_N, BY_LOW, BY_HIGH, BY_OMEGA, BY_SIGMA, N_NUMBERS = 0, 4, 8, 9, 10, 11, 12
 
 
 class CellFrame(NamedTuple):
-    """The frame of a cell and the numbers that all its points share."""
+    """A cell, its frame, and the numbers that all its points share."""
 
+    nodes: tuple[int, int, int, int]  # A, B, 1, 2
+    slave: SlaveView
+    x_1: Vector
+    x_2: Vector
     length: float  # l
     measured: float  # l_w
     tau: Vector
@@ -62,40 +70,45 @@ class CellPoint(NamedTuple):
     weight: float  # w
 
 
+def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tuple[Fields, Fields]:
+    """Return the arrays of segments and cells and those of the rule, as kernels unpack them.
+
+    A length of −1 stands for the current length of a slave segment.
+    """
+    slave, master = interface.slave, interface.master
+    lengths = np.full(len(slave), -1.0) if rule.current else slave.lengths(interface.nodes)
+    pairs_and_cuts = cells.slave, cells.master, cells.cut_low, cells.cut_high
+    return (lengths, slave.segments, master.segments, *pairs_and_cuts), (rule.places, rule.weights)
+
+
 @compile_inline
-def begin_cell(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool, measured: float) -> CellFrame:
-    """Return the frame of a cell. A length `measured` of −1 stands for the current length."""
+def cell_at(x: FloatArray, segments_and_cells: Fields, i: int) -> CellFrame:
+    """Return cell i at the positions x (n_nodes, 2)."""
+    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
+    s, m = cell_slave[i], cell_master[i]
+    nodes = (slave[s, A], slave[s, B], master[m, 0], master[m, 1])
+    view, x_1, x_2 = slave_view(x, slave, s, -1, -1), node(x, nodes[NODE_1]), node(x, nodes[NODE_2])
     length, tau, n = frame(view.x_a, view.x_b)
     low, high, gap_low, gap_high = -1.0, 1.0, 0.0, 0.0
-    if cut_low:
+    if cut_low[i]:
         low = seen_from(x_2, view)
         gap_low = facing_point(view, x_1, x_2, low)[1]
-    if cut_high:
+    if cut_high[i]:
         high = seen_from(x_1, view)
         gap_high = facing_point(view, x_1, x_2, high)[1]
-    d, current = minus(x_2, x_1), measured < 0
-    return CellFrame(
-        length,
-        length if current else measured,
-        tau,
-        n,
-        dot(d, tau),
-        dot(d, n),
-        low,
-        high,
-        1.0 if cut_low else 0.0,
-        1.0 if cut_high else 0.0,
-        gap_low,
-        gap_high,
-        1.0 if current else 0.0,
-    )
+    d, is_current = minus(x_2, x_1), lengths[s] < 0
+    measured, current = (length, 1.0) if is_current else (lengths[s], 0.0)
+    along, lean = dot(d, tau), dot(d, n)
+    cuts = (1.0 if cut_low[i] else 0.0, 1.0 if cut_high[i] else 0.0)
+    numbers = (low, high, *cuts, gap_low, gap_high, current)
+    return CellFrame(nodes, view, x_1, x_2, length, measured, tau, n, along, lean, *numbers)
 
 
 @compile_inline
-def place_point(cell: CellFrame, view: SlaveView, x_1: Vector, x_2: Vector, place: float, share: float) -> CellPoint:
+def place_point(cell: CellFrame, place: float, share: float) -> CellPoint:
     """Return the point at a place of the rule, whose weight there is `share`."""
     c = (cell.low + cell.high) / 2 + (cell.high - cell.low) / 2 * place
-    xi, gap, _ = facing_point(view, x_1, x_2, c)
+    xi, gap, _ = facing_point(cell.slave, cell.x_1, cell.x_2, c)
     return CellPoint(place, share, c, xi, gap, share * (cell.high - cell.low) / 2 * cell.measured)
 
 

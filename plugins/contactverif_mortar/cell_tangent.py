@@ -17,34 +17,18 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Couplings, NumberArray, add_block, zero_matrix
 from contactverif.geometry.compiled import compile_inline, compile_maker
-from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,
     CellPoint,
     add_to_row,
-    begin_cell,
+    cell_arguments,
+    cell_at,
     finish_rows,
     place_point,
     turn_row,
 )
-from contactverif_mortar.cell_geometry import A, B, slave_view
 from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
-
-
-def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tuple[Fields, Fields]:
-    """Return the arrays of segments and cells and those of the rule, as the kernels here unpack them."""
-    lengths = np.full(len(interface.slave), -1.0) if rule.current else interface.slave.lengths(interface.nodes)
-    segments_and_cells = (
-        lengths,
-        interface.slave.segments,
-        interface.master.segments,
-        cells.slave,
-        cells.master,
-        cells.cut_low,
-        cells.cut_high,
-    )
-    return segments_and_cells, (rule.places, rule.weights)
 
 
 def touching_points(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray) -> BoolArray:
@@ -57,15 +41,12 @@ def touching_points(interface: Interface, cells: Cells, rule: Quadrature, x: Flo
 @compile_maker
 def _write_touching(x: FloatArray, segments_and_cells: Fields, rule: Fields, touching: BoolArray) -> None:
     """Write whether each point touches."""
-    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
     places, weights = rule
-    for i in range(len(cell_slave)):
-        s, m = cell_slave[i], cell_master[i]
-        view = slave_view(x, slave, s, -1, -1)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
-        for q in range(len(places)):
-            touching[i * len(places) + q] = place_point(cell, view, x_1, x_2, places[q], weights[q]).gap <= 0
+    n_q = len(places)
+    for i in range(len(touching) // n_q):
+        cell = cell_at(x, segments_and_cells, i)
+        for q in range(n_q):
+            touching[i * n_q + q] = place_point(cell, places[q], weights[q]).gap <= 0
 
 
 def springs_at_points(
@@ -122,25 +103,20 @@ def _add_springs(
     active: BoolArray,
 ) -> None:
     """Add the forces of the springs on all cells, and their derivative to compressed rows."""
-    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
     places, weights = rule
     n_q = len(places)
     rows, pushes = np.empty((4, N_NUMBERS)), np.empty(4)
-    for i in range(len(cell_slave)):
+    for i in range(len(active) // n_q):
         if not _any_active(active, i * n_q, n_q):
             continue
-        s, m = cell_slave[i], cell_master[i]
-        view = slave_view(x, slave, s, -1, -1)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
+        cell = cell_at(x, segments_and_cells, i)
         rows[:], pushes[:] = 0.0, 0.0
         for q in range(n_q):
             if active[i * n_q + q]:
-                point = place_point(cell, view, x_1, x_2, places[q], weights[q])
+                point = place_point(cell, places[q], weights[q])
                 push_point(rows, pushes, cell, point, -penalty * point.gap, 0.0, -penalty)
-        local = (slave[s, A], slave[s, B], master[m, 0], master[m, 1])
         finish_rows(rows, 4, cell)
-        add_cell(forces, csr, local, rows, pushes, cell)
+        add_cell(forces, csr, rows, pushes, cell)
 
 
 @compile_inline
@@ -158,16 +134,9 @@ def push_point(
 
 
 @compile_inline
-def add_cell(
-    forces: FloatArray,
-    csr: Fields,
-    local: tuple[int, int, int, int],
-    rows: FloatArray,
-    pushes: FloatArray,
-    cell: CellFrame,
-) -> None:
+def add_cell(forces: FloatArray, csr: Fields, rows: FloatArray, pushes: FloatArray, cell: CellFrame) -> None:
     """Add `pushes` n to forces, and n ⊗ `rows` − `pushes` τ ⊗ ω to compressed rows, in the global frame."""
-    tau, n = cell.tau, cell.n
+    local, tau, n = cell.nodes, cell.tau, cell.n
     for k in range(4):
         forces[2 * local[k]] += pushes[k] * n[0]
         forces[2 * local[k] + 1] += pushes[k] * n[1]

@@ -24,19 +24,19 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif.geometry.compiled import compile_inline, compile_maker
-from contactverif.geometry.projection import node
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,
     CellPoint,
     add_to_row,
-    begin_cell,
+    cell_arguments,
+    cell_at,
     finish_rows,
     place_point,
     turn_row,
 )
-from contactverif_mortar.cell_geometry import A, B, slave_view
-from contactverif_mortar.cell_tangent import add_cell, cell_arguments, push_point
+from contactverif_mortar.cell_geometry import A, B
+from contactverif_mortar.cell_tangent import add_cell, push_point
 from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
 from contactverif_mortar.node_factors import NodeRows
 from contactverif_mortar.node_groups import RowGroups, find_member
@@ -82,24 +82,21 @@ def _weigh(
     shapes: FloatArray,
 ) -> None:
     """Add ∫φ_j and ∫φ_j g of all slave segments, and write what is known of their shapes."""
-    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
+    slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
     places, weights = rule
     points = np.empty((16, 3))  # c, gap and weight of the points of a segment
     begin = 0
     while begin < len(cell_slave):
         s, end = cell_slave[begin], begin
-        view = slave_view(x, slave, s, -1, -1)
         while end < len(cell_slave) and cell_slave[end] == s:
             end += 1
         if (end - begin) * len(places) > len(points):
             points = np.empty((2 * (end - begin) * len(places), 3))
         count = 0
         for i in range(begin, end):
-            m = cell_master[i]
-            x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-            cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
+            cell = cell_at(x, segments_and_cells, i)
             for q in range(len(places)):
-                point = place_point(cell, view, x_1, x_2, places[q], weights[q])
+                point = place_point(cell, places[q], weights[q])
                 points[count, 0], points[count, 1], points[count, 2] = point.c, point.gap, point.weight
                 count += 1
         _write_shape(shapes, s, points, count, dual)
@@ -175,7 +172,7 @@ def _add_rows(
     at_nodes: Fields,
 ) -> None:
     """Add what all cells give to the forces, to compressed rows, and to the rows of the factors."""
-    lengths, slave, master, cell_slave, cell_master, cut_low, cut_high = segments_and_cells
+    slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
     places, weights = rule
     pressure, gaps, divisor = at_nodes
     nodes, starts, _, right = factors
@@ -185,14 +182,11 @@ def _add_rows(
     rows, pushes, units = np.empty((4 + n_rows, N_NUMBERS)), np.empty(4), np.empty((n_rows, 4))
     chain = np.zeros((n_segments if dual else 0, 2, 2))  # ∂∫φ_j (g − G_j) of both ends of a segment by c̄ and by v
     for i in range(len(cell_slave)):
-        s, m = cell_slave[i], cell_master[i]
-        a, b = slave[s, A], slave[s, B]
-        view = slave_view(x, slave, s, -1, -1)
-        x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        cell = begin_cell(view, x_1, x_2, cut_low[i], cut_high[i], lengths[s])
+        s, cell = cell_slave[i], cell_at(x, segments_and_cells, i)
+        a, b = cell.nodes[A], cell.nodes[B]
         rows[:], pushes[:], units[:] = 0.0, 0.0, 0.0
         for q in range(len(places)):
-            point = place_point(cell, view, x_1, x_2, places[q], weights[q])
+            point = place_point(cell, places[q], weights[q])
             first, second = shapes_at(shapes, s, point.c)
             kappa, difference = shapes[s, KAPPA], pressure[b] - pressure[a]
             p = pressure[a] * first + pressure[b] * second
@@ -204,11 +198,10 @@ def _add_rows(
             if dual:
                 _add_moments(rows, units, chain, cell, point, shapes, s, difference, (gaps[a], gaps[b]))
         finish_rows(rows, 4 + n_rows, cell)
-        local = (a, b, master[m, 0], master[m, 1])
-        add_cell(forces, csr, local, rows, pushes, cell)
+        add_cell(forces, csr, rows, pushes, cell)
         share = (1 / divisor[a], 1 / divisor[b], 1.0, 1.0)
         numbers = (a, b, n_nodes + s, n_nodes + n_segments + s)
-        _write_rows(factors, numbers, share, local, rows, units, cell)
+        _write_rows(factors, numbers, share, rows, units, cell)
     if dual:
         add_chains(slave, chain, divisor, nodes, starts, right)
 
@@ -252,7 +245,6 @@ def _write_rows(
     factors: Fields,
     numbers: tuple[int, int, int, int],
     shares: tuple[float, float, float, float],
-    local: tuple[int, int, int, int],
     rows: FloatArray,
     units: FloatArray,
     cell: CellFrame,
@@ -264,7 +256,7 @@ def _write_rows(
         if starts[j + 1] == starts[j]:
             continue
         for k in range(4):
-            place = 2 * find_member(nodes, starts[j], starts[j + 1], local[k])
+            place = 2 * find_member(nodes, starts[j], starts[j + 1], cell.nodes[k])
             x, y = turn_row(rows, 4 + row, k, cell)
             left[place] += units[row, k] * cell.n[0]
             left[place + 1] += units[row, k] * cell.n[1]
