@@ -123,12 +123,8 @@ def find_cells(
                 n_cells += 1
                 depth = max(depth, table[i, DEPTH])
             reached = max(reached, table[i, HIGH])
-    return (
-        cell_slave[:n_cells].copy(),
-        cell_master[:n_cells].copy(),
-        cut_low[:n_cells].copy(),
-        cut_high[:n_cells].copy(),
-    )
+    slaves, masters = cell_slave[:n_cells].copy(), cell_master[:n_cells].copy()
+    return slaves, masters, cut_low[:n_cells].copy(), cut_high[:n_cells].copy()
 
 
 @compile_maker

@@ -23,17 +23,17 @@ from contactverif.contract.pairing import Pairing
 from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_maker, match_precision
 from contactverif.geometry.projection import frame, node
-from contactverif_mortar.cell_geometry import (
-    D_WEIGHT,
-    A,
-    B,
-    cut_gains,
-    point_gains,
-    seen_from,
-    slave_view,
-    turn_of_ends,
+from contactverif_mortar.cell_geometry import cut_gains, seen_from, slave_view, turn_of_ends
+from contactverif_mortar.integration_cells import (
+    Cells,
+    Fields,
+    Quadrature,
+    Sides,
+    any_end,
+    ends_of_part,
+    write_gains,
+    write_point,
 )
-from contactverif_mortar.integration_cells import Cells, Fields, Quadrature, Sides, any_end, place_gains, write_point
 
 LOW, HIGH = 4, 5  # The local nodes that cut a range, behind A, B, 1 and 2.
 N_LOCAL = 6
@@ -89,7 +89,7 @@ class Ranges:
         return _gains(x, *self._arguments(sides, x, rule))
 
     def _arguments(self, sides: Interface | Sides, x: Array, rule: Quadrature) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of `Segments`, of these points, and of `Rule`."""
+        """Return the fields of `Segments`, of these points, and of `Quadrature`."""
         reference, places, weights = match_precision(x, sides.nodes, rule.places, rule.weights)
         return (
             (sides.slave.lengths(reference), sides.slave.segments, sides.master.segments),
@@ -115,8 +115,7 @@ def _find(
         low = master[cell_master[begin], 1] if cut_low[begin] else -1
         high = master[cell_master[end - 1], 0] if cut_high[end - 1] else -1
         view = slave_view(x, slave, s, -1, -1)
-        bottom = seen_from(node(x, low), view) if low >= 0 else -1.0
-        top = seen_from(node(x, high), view) if high >= 0 else 1.0
+        bottom, top = ends_of_part(view, node(x, low), node(x, high), low >= 0, high >= 0)
         cell = begin
         for q in range(len(places)):
             c = (bottom + top) / 2 + (top - bottom) / 2 * places[q]
@@ -144,12 +143,8 @@ def _points(x: Array, segments: Fields, ranges: Fields, rule: Fields) -> Array:
             s, q = carrier[number], slot[number]
             view = slave_view(now, slave, s, -1, -1)
             x_1, x_2 = node(now, master[partner[number], 0]), node(now, master[partner[number], 1])
-            zero = 0 * view.x_a[0]  # has the type of the positions
-            low, high = zero - 1, zero + 1
-            if low_node[number] >= 0:
-                low = seen_from(node(now, low_node[number]), view)
-            if high_node[number] >= 0:
-                high = seen_from(node(now, high_node[number]), view)
+            a, b = low_node[number], high_node[number]
+            low, high = ends_of_part(view, node(now, a), node(now, b), a >= 0, b >= 0)
             length, _, _ = frame(view.x_a, view.x_b)
             if not current:
                 length = 0 * length + reference_length[s]
@@ -166,29 +161,17 @@ def _gains(x: FloatArray, segments: Fields, ranges: Fields, rule: Fields) -> Flo
     gains = np.zeros((len(carrier), 5, N_LOCAL, 2))
     d_omega_a, d_omega_b, d_low, d_high = np.zeros((4, N_LOCAL, 2))
     for number in range(len(carrier)):
-        s, q, d = carrier[number], slot[number], gains[number]
+        s, q, a, b = carrier[number], slot[number], low_node[number], high_node[number]
         view = slave_view(x, slave, s, -1, -1)
         x_1, x_2 = node(x, master[partner[number], 0]), node(x, master[partner[number], 1])
         turn_of_ends(x, slave, s, -1, -1, d_omega_a, d_omega_b)
-        low, high = -1.0, 1.0
+        low, high = ends_of_part(view, node(x, a), node(x, b), a >= 0, b >= 0)
         d_low[:], d_high[:] = 0.0, 0.0
-        if low_node[number] >= 0:
-            x_e = node(x, low_node[number])
-            low = seen_from(x_e, view)
-            cut_gains(d_low, low, LOW, x_e, view, d_omega_a, d_omega_b)
-        if high_node[number] >= 0:
-            x_e = node(x, high_node[number])
-            high = seen_from(x_e, view)
-            cut_gains(d_high, high, HIGH, x_e, view, d_omega_a, d_omega_b)
-        length, t_s, _ = frame(view.x_a, view.x_b)
-        if not current:
-            length = reference_length[s]
-        place_gains(d, d_low, d_high, places[q], weights[q], length)
-        if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
-            share = weights[q] * (high - low) / 2
-            for i in range(2):
-                d[D_WEIGHT, A, i] -= share * t_s[i]
-                d[D_WEIGHT, B, i] += share * t_s[i]
-        c = (low + high) / 2 + (high - low) / 2 * places[q]
-        point_gains(d, c, view, x_1, x_2, d_omega_a, d_omega_b)
+        if a >= 0:
+            cut_gains(d_low, low, LOW, node(x, a), view, d_omega_a, d_omega_b)
+        if b >= 0:
+            cut_gains(d_high, high, HIGH, node(x, b), view, d_omega_a, d_omega_b)
+        length = -1.0 if current else reference_length[s]
+        ends, d_ends, d_omega = (low, high), (d_low, d_high), (d_omega_a, d_omega_b)
+        write_gains(gains[number], view, x_1, x_2, ends, d_ends, d_omega, places[q], weights[q], length)
     return gains

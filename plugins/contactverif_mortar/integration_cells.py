@@ -3,7 +3,7 @@
 `Cells` are decisions: they come from `cell_search` and are stored in a pairing. `Quadrature` puts points on them and
 computes every real number from the positions: `points` of many states, real or complex, `gains` of one real state.
 
-A kernel gets the fields of a named tuple of arrays as a plain tuple and unpacks them first: numba reads that in half
+A kernel gets the fields of a class of arrays as a plain tuple and unpacks them first: numba reads that in half
 the time.
 """
 
@@ -40,7 +40,7 @@ from contactverif_mortar.cell_search import averaging, find_cells, longest_of_ch
 C, XI, GAP, WEIGHT, NORMAL_X, NORMAL_Y = range(6)  # The numbers of a point, in this order.
 AREAS = {"current": True, "reference": False}  # The words of the option `area`.
 
-Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+Fields = tuple[Any, ...]  # The fields of a class, or the arrays of a matrix, as a plain tuple.
 
 
 class Sides(NamedTuple):
@@ -64,25 +64,6 @@ class Segments(NamedTuple):
     master: IntArray  # (n_master_segments, 2), nodes
 
 
-class CellArrays(NamedTuple):
-    """The arrays of `Cells`, in the same order."""
-
-    slave: IntArray
-    master: IntArray
-    cut_low: BoolArray
-    cut_high: BoolArray
-    before: IntArray
-    behind: IntArray
-
-
-class Rule(NamedTuple):
-    """The arrays of `Quadrature`, in the same order."""
-
-    places: FloatArray
-    weights: FloatArray
-    current: bool
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
     """Pairs of a slave and a master segment, in the order of the slave segments."""
@@ -102,37 +83,23 @@ class Cells:
         before = behind = np.full(len(slave), -1)
         if averaged:
             before, behind = averaging(x, slave.segments, slave.neighbours)
-        pairs_and_cuts = find_cells(
-            x,
-            slave.segments,
-            master.segments,
-            before,
-            behind,
-            longest_of_chain(slave, x),
-            longest_of_chain(master, x),
-            search_tree(master, x),
-        )
-        return cls(*pairs_and_cuts, before, behind)
+        longest = longest_of_chain(slave, x), longest_of_chain(master, x)
+        segments = slave.segments, master.segments
+        return cls(*find_cells(x, *segments, before, behind, *longest, search_tree(master, x)), before, behind)
 
     @classmethod
-    def from_pairing(cls, pairing: Pairing) -> Cells:
-        """Return the cells of a pairing."""
-        return cls(*(pairing[entry.name] for entry in fields(cls)))
+    def from_pairing(cls, pairing: Pairing, prefix: str = "") -> Cells:
+        """Return the cells of a pairing, whose names begin with a prefix."""
+        return cls(*(pairing[prefix + entry.name] for entry in fields(cls)))
 
-    def as_arrays(self) -> dict[str, IntArray | BoolArray]:
+    def as_arrays(self, prefix: str = "") -> dict[str, IntArray | BoolArray]:
         """Return the arrays by name, for a pairing."""
-        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {prefix + entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     def select(self, selection: BoolArray | IntArray | slice) -> Cells:
         """Return some of the cells, selected by mask, number or range."""
-        return Cells(
-            self.slave[selection],
-            self.master[selection],
-            self.cut_low[selection],
-            self.cut_high[selection],
-            self.before,
-            self.behind,
-        )
+        pairs_and_cuts = self.slave, self.master, self.cut_low, self.cut_high
+        return Cells(*(each[selection] for each in pairs_and_cuts), self.before, self.behind)
 
     def near(self, nodes: BoolArray, interface: Interface) -> Cells:
         """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
@@ -180,7 +147,7 @@ class Quadrature:
         return _gains(x, n_local, *self._arguments(interface, cells, x))
 
     def _arguments(self, interface: Interface | Sides, cells: Cells, x: Array) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of `Segments`, `CellArrays` and `Rule`."""
+        """Return the fields of `Segments`, `Cells` and `Quadrature`."""
         reference, places, weights = match_precision(x, interface.nodes, self.places, self.weights)
         return (
             (interface.slave.lengths(reference), interface.slave.segments, interface.master.segments),
@@ -222,14 +189,14 @@ def _local_nodes(
 
 
 @compile_part
-def _ends(view: SlaveView, x_1: Vector, x_2: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
-    """Return the lower and the upper end of a cell on the slave, as c, cut by the nodes 2 and 1 of the master."""
+def ends_of_part(view: SlaveView, x_low: Vector, x_high: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
+    """Return the lower and the upper end of a part of a slave segment, as c, cut by master nodes or not."""
     zero = 0 * view.x_a[0]  # has the type of the positions
     low, high = zero - 1, zero + 1
     if cut_low:
-        low = seen_from(x_2, view)
+        low = seen_from(x_low, view)
     if cut_high:
-        high = seen_from(x_1, view)
+        high = seen_from(x_high, view)
     return low, high
 
 
@@ -267,7 +234,7 @@ def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
             s, m = cell_slave[cell], cell_master[cell]
             view = slave_view(now, slave, s, before[s], behind[s])
             x_1, x_2 = node(now, master[m, 0]), node(now, master[m, 1])
-            low, high = _ends(view, x_1, x_2, cut_low[cell], cut_high[cell])
+            low, high = ends_of_part(view, x_2, x_1, cut_low[cell], cut_high[cell])
             length, _, _ = frame(view.x_a, view.x_b)
             if not current:
                 length = 0 * length + reference_length[s]
@@ -289,36 +256,48 @@ def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: F
         s, m = cell_slave[cell], cell_master[cell]
         view = slave_view(x, slave, s, before[s], behind[s])
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        low, high = _ends(view, x_1, x_2, cut_low[cell], cut_high[cell])
+        low, high = ends_of_part(view, x_2, x_1, cut_low[cell], cut_high[cell])
         turn_of_ends(x, slave, s, before[s], behind[s], d_omega_a, d_omega_b)
         d_low[:], d_high[:] = 0.0, 0.0
         if cut_low[cell]:
             cut_gains(d_low, low, NODE_2, x_2, view, d_omega_a, d_omega_b)
         if cut_high[cell]:
             cut_gains(d_high, high, NODE_1, x_1, view, d_omega_a, d_omega_b)
-        length, t_s, _ = frame(view.x_a, view.x_b)
-        if not current:
-            length = reference_length[s]
+        length = -1.0 if current else reference_length[s]
+        ends, d_ends, d_omega = (low, high), (d_low, d_high), (d_omega_a, d_omega_b)
         for q in range(n_q):
-            d = gains[cell * n_q + q]
-            place_gains(d, d_low, d_high, places[q], weights[q], length)
-            if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
-                share = weights[q] * (high - low) / 2
-                for i in range(2):
-                    d[D_WEIGHT, A, i] -= share * t_s[i]
-                    d[D_WEIGHT, B, i] += share * t_s[i]
-            c = (low + high) / 2 + (high - low) / 2 * places[q]
-            point_gains(d, c, view, x_1, x_2, d_omega_a, d_omega_b)
+            write_gains(gains[cell * n_q + q], view, x_1, x_2, ends, d_ends, d_omega, places[q], weights[q], length)
     return gains
 
 
 @compile_part
-def place_gains(
-    d: FloatArray, d_low: FloatArray, d_high: FloatArray, place: float, weight: float, length: float
+def write_gains(
+    d: FloatArray,
+    view: SlaveView,
+    x_1: Vector,
+    x_2: Vector,
+    ends: tuple[float, float],
+    d_ends: Fields,
+    d_omega: Fields,
+    place: float,
+    weight: float,
+    length: float,
 ) -> None:
-    """Write Δc and, at a fixed length of the slave segment, Δ of the weight of a point into `d` (5, n_local, 2)."""
+    """Write the Δ (5, n_local, 2) of the point at a place of the rule between two ends on a slave segment.
+
+    `d_ends` are Δ of the ends, `d_omega` those of the directions of A and B. A length of −1 stands for the current one.
+    """
+    (low, high), (d_low, d_high) = ends, d_ends
+    l_ab, t_ab, _ = frame(view.x_a, view.x_b)
+    measured = l_ab if length < 0 else length
     for k in range(d.shape[1]):
         for i in range(2):
             spread = d_high[k, i] - d_low[k, i]
             d[D_C, k, i] = (d_low[k, i] + d_high[k, i]) / 2 + spread / 2 * place
-            d[D_WEIGHT, k, i] = weight * spread / 2 * length
+            d[D_WEIGHT, k, i] = weight * spread / 2 * measured
+    if length < 0:  # Δl_AB = t_AB·(Δx_B − Δx_A)
+        share = weight * (high - low) / 2
+        for i in range(2):
+            d[D_WEIGHT, A, i] -= share * t_ab[i]
+            d[D_WEIGHT, B, i] += share * t_ab[i]
+    point_gains(d, (low + high) / 2 + (high - low) / 2 * place, view, x_1, x_2, *d_omega)

@@ -78,8 +78,7 @@ class TwoHalfPasses:
             ranges = Ranges.find(sides, x, cells, self.rule)
             _, gaps = self._gaps(sides, ranges, x)
             active |= gaps <= 0  # false where NaN
-            stored = {f"{prefix}cells.{name}": array for name, array in cells.as_arrays().items()}
-            arrays.update({**stored, **ranges.as_arrays(prefix)})
+            arrays.update({**cells.as_arrays(f"{prefix}cells."), **ranges.as_arrays(prefix)})
         return Pairing({**arrays, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -131,7 +130,7 @@ class TwoHalfPasses:
             areas, gaps = self._gaps(sides, Ranges.from_pairing(pairing, prefix), x)
             active, numbers = pairing["active"], sides.slave.nodes
             pressure = np.where(active, -self.penalty * gaps, 0.0)
-            cells = Cells(*(pairing[f"{prefix}cells.{entry.name}"] for entry in fields(Cells)))
+            cells = Cells.from_pairing(pairing, f"{prefix}cells.")
             points = at_nodes(sides, cells, x, areas, gaps, pressure, active)
             on_master = np.full(interface.n_nodes, prefix == PREFIXES[1])
             half_passes.append((replace(points, on_master=on_master), numbers))
