@@ -28,7 +28,9 @@ from contactverif_mortar.cell_frame import (
     place_point,
     turn_row,
 )
-from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
+from contactverif_mortar.integration_cells import Cells, Csr, Fields, Quadrature
+
+ForcesAndTangent = tuple[FloatArray, sparse.csr_array]  # (n_unknowns,) and (n_unknowns, n_unknowns)
 
 
 def touching_points(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray) -> BoolArray:
@@ -51,7 +53,7 @@ def _write_touching(x: FloatArray, segments_and_cells: Fields, rule: Fields, tou
 
 def springs_at_points(
     interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, penalty: float, active: BoolArray
-) -> tuple[FloatArray, sparse.csr_array]:
+) -> ForcesAndTangent:
     """Compute forces (n_unknowns,) and tangent of springs p = −ε̂ g at the `active` points (n_points,).
 
     The cells have no averaged normals. The pattern of the tangent holds the nodes of all cells that have a spring.
@@ -95,7 +97,7 @@ def _any_active(active: BoolArray, begin: int, count: int) -> bool:
 @compile_maker
 def _add_springs(
     forces: FloatArray,
-    csr: Fields,
+    csr: Csr,
     x: FloatArray,
     segments_and_cells: Fields,
     rule: Fields,
@@ -134,7 +136,7 @@ def push_point(
 
 
 @compile_inline
-def add_cell(forces: FloatArray, csr: Fields, rows: FloatArray, pushes: FloatArray, cell: CellFrame) -> None:
+def add_cell(forces: FloatArray, csr: Csr, rows: FloatArray, pushes: FloatArray, cell: CellFrame) -> None:
     """Add `pushes` n to forces, and n ⊗ `rows` − `pushes` τ ⊗ ω to compressed rows, in the global frame."""
     local, tau, n = cell.nodes, cell.tau, cell.n
     for k in range(4):

@@ -36,8 +36,9 @@ from contactverif.geometry.projection import (
 )
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
+from contactverif_mortar.cell_tangent import ForcesAndTangent
 from contactverif_mortar.cell_traits import CELL_TRAITS
-from contactverif_mortar.integration_cells import AREAS, C, Cells, Fields, Quadrature
+from contactverif_mortar.integration_cells import AREAS, C, Cells, Csr, Quadrature
 from contactverif_mortar.node_groups import group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
@@ -77,9 +78,7 @@ class ChenHisada:
         """Compute the derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
         return self.residual_and_tangent(interface, pairing, z)[1]
 
-    def residual_and_tangent(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, /
-    ) -> tuple[FloatArray, sparse.csr_array]:
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         x, active, nearest = np.array(z).reshape(-1, 2), pairing["active"], pairing["nearest"]
         cells = Cells.from_pairing(pairing).near(active, interface)
@@ -134,7 +133,7 @@ def _couple(interface: Interface, cells: Cells, facing: IntArray) -> Couplings:
 
 @compile_maker
 def _add_springs(
-    csr: Fields, nodes: NumberArray, starts: IntArray, influence: FloatArray, facing: IntArray, d_pressure: FloatArray
+    csr: Csr, nodes: NumberArray, starts: IntArray, influence: FloatArray, facing: IntArray, d_pressure: FloatArray
 ) -> None:
     """Add B_i ⊗ Δp_i of all slave nodes; B_i are the entries of group i, and Δp_i (3, 2) belongs to V, 1, 2."""
     for i in range(len(facing)):
@@ -209,16 +208,12 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     ----------
     Chen & Hisada, as Zavarise & De Lorenzis (2009), Section 1, describe their method; tangent: here.
     """
-    current = choose("area", area, AREAS)
-    return ChenHisada(
-        CELL_TRAITS.revise(
-            overhang=False,
-            area="current" if current else "reference",
-            gap="cells and nodes",
-            witnesses={"patch.dead-zone": "dead-zone", **CELL_TRAITS.evidence.witnesses},
-            source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
-        ),
-        check_penalty(penalty),
-        Quadrature.gauss(N_POINTS, current),
-        check_tau(tau),
+    quadrature = Quadrature.gauss(N_POINTS, choose("area", area, AREAS))
+    traits = CELL_TRAITS.revise(
+        overhang=False,
+        area=area,
+        gap="cells and nodes",
+        witnesses={"patch.dead-zone": "dead-zone", **CELL_TRAITS.evidence.witnesses},
+        source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
     )
+    return ChenHisada(traits, check_penalty(penalty), quadrature, check_tau(tau))

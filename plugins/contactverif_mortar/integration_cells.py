@@ -17,7 +17,7 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
-from contactverif.geometry.block_rows import NumberArray
+from contactverif.geometry.block_rows import AnyIntArray, NumberArray
 from contactverif.geometry.compiled import compile_inline, compile_maker, compile_part, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
@@ -40,7 +40,8 @@ from contactverif_mortar.cell_search import averaging, find_cells, longest_of_ch
 C, XI, GAP, WEIGHT, NORMAL_X, NORMAL_Y = range(6)  # The numbers of a point, in this order.
 AREAS = {"current": True, "reference": False}  # The words of the option `area`.
 
-Fields = tuple[Any, ...]  # The fields of a class, or the arrays of a matrix, as a plain tuple.
+Fields = tuple[Any, ...]  # The fields of a class of arrays, as a plain tuple.
+Csr = tuple[AnyIntArray, AnyIntArray, FloatArray]  # The indptr, indices and data of compressed rows.
 
 
 class Sides(NamedTuple):
@@ -98,8 +99,8 @@ class Cells:
 
     def select(self, selection: BoolArray | IntArray | slice) -> Cells:
         """Return some of the cells, selected by mask, number or range."""
-        pairs_and_cuts = self.slave, self.master, self.cut_low, self.cut_high
-        return Cells(*(each[selection] for each in pairs_and_cuts), self.before, self.behind)
+        slave, master = self.slave[selection], self.master[selection]
+        return Cells(slave, master, self.cut_low[selection], self.cut_high[selection], self.before, self.behind)
 
     def near(self, nodes: BoolArray, interface: Interface) -> Cells:
         """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""

@@ -25,6 +25,7 @@ from contactverif.contract.state_vector import join_rows, split_state, split_sta
 from contactverif.contract.traits import Traits
 from contactverif.geometry.compiled import match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
+from contactverif_mortar.cell_tangent import ForcesAndTangent
 from contactverif_mortar.cell_traits import CELL_TRAITS
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
 from contactverif_mortar.node_factors import Factors
@@ -63,9 +64,7 @@ class Mortar:
         """Compute the derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
         return self.residual_and_tangent(interface, pairing, z)[1]
 
-    def residual_and_tangent(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, /
-    ) -> tuple[FloatArray, sparse.csr_array]:
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         rows = self.weighting.tangent(interface, self._carry(interface, pairing, z))
         return rows.forces, rows.rest
@@ -167,7 +166,7 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
     ----------
     Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
-    return Mortar(_traits(area, normals, False), check_penalty(penalty), _weighting(area, normals, False))
+    return Mortar(*_make(penalty, area, normals, dual=False))
 
 
 def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:
@@ -179,7 +178,7 @@ def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segmen
     ----------
     Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
-    return Mortar(_traits(area, normals, True), check_penalty(penalty), _weighting(area, normals, True))
+    return Mortar(*_make(penalty, area, normals, dual=True))
 
 
 def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
@@ -199,8 +198,8 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
     ----------
     Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
-    traits = _with_multipliers(_traits(area, normals, False))
-    return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, False))
+    traits, scale, weighting = _make(penalty, area, normals, dual=False)
+    return MortarMultipliers(_with_multipliers(traits), scale, weighting)
 
 
 def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
@@ -212,15 +211,8 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
     ----------
     Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
-    traits = _with_multipliers(_traits(area, normals, True))
-    return MortarMultipliers(traits, check_penalty(penalty), _weighting(area, normals, True))
-
-
-def _weighting(area: str, normals: str, dual: bool) -> Weighting:
-    """Return the weighting for two options and a kind of shapes."""
-    averaged = choose("normals", normals, NORMALS)
-    # Two points are exact for linear shapes × linear gaps. Unit normals that turn are not polynomials and get a third.
-    return Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, choose("area", area, AREAS)))
+    traits, scale, weighting = _make(penalty, area, normals, dual=True)
+    return MortarMultipliers(_with_multipliers(traits), scale, weighting)
 
 
 def _with_multipliers(traits: Traits) -> Traits:
@@ -234,20 +226,22 @@ def _with_multipliers(traits: Traits) -> Traits:
     )
 
 
-def _traits(area: str, normals: str, dual: bool) -> Traits:
-    """Return the promises of a penalty method."""
-    averaged = bool(choose("normals", normals, NORMALS))
+def _make(penalty: float, area: str, normals: str, *, dual: bool) -> tuple[Traits, float, Weighting]:
+    """Return the promises of a penalty method, its penalty and its weighting, from checked options."""
+    averaged, current = choose("normals", normals, NORMALS), choose("area", area, AREAS)
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}
-    return CELL_TRAITS.revise(
+    traits = CELL_TRAITS.revise(
         kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
         # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
         continuity=None if averaged else "C0",
         integrates_linear_gap=None if averaged else False,
         nodes_push=not dual,  # Dual shapes are negative in places.
-        area="current" if choose("area", area, AREAS) else "reference",
+        area=area,
         gap=None if averaged else "cells",
         force_along=None if averaged else "slave normal",
         witnesses={**kinked, **pulls, "patch.tilted": "tilted", **CELL_TRAITS.evidence.witnesses},
         source=_SOURCES[dual],
     )
+    # Two points are exact for linear shapes × linear gaps. Unit normals that turn are not polynomials and get a third.
+    return traits, check_penalty(penalty), Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, current))

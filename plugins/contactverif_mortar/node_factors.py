@@ -16,7 +16,7 @@ from scipy import sparse
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import NumberArray
 from contactverif.geometry.compiled import compile_maker
-from contactverif_mortar.integration_cells import Fields
+from contactverif_mortar.integration_cells import Csr, Fields
 from contactverif_mortar.node_groups import RowGroups
 
 
@@ -84,7 +84,7 @@ class NodeRows(NamedTuple):
 
 @compile_maker
 def _add_products(
-    csr: Fields, first_row: int, end_row: int, nodes: NumberArray, starts: IntArray, factors: Fields
+    csr: Csr, first_row: int, end_row: int, nodes: NumberArray, starts: IntArray, factors: Fields
 ) -> None:
     """Add weight_j B_j ⊗ D_j to compressed rows. Groups and columns of rows ascend, so one walk finds all places."""
     indptr, indices, data = csr

@@ -37,7 +37,7 @@ from contactverif_mortar.cell_frame import (
 )
 from contactverif_mortar.cell_geometry import A, B
 from contactverif_mortar.cell_tangent import add_cell, push_point
-from contactverif_mortar.integration_cells import Cells, Fields, Quadrature
+from contactverif_mortar.integration_cells import Cells, Csr, Fields, Quadrature
 from contactverif_mortar.node_factors import NodeRows
 from contactverif_mortar.node_groups import RowGroups, find_member
 
@@ -163,7 +163,7 @@ def node_rows(
 @compile_maker
 def _add_rows(
     forces: FloatArray,
-    csr: Fields,
+    csr: Csr,
     factors: Fields,
     x: FloatArray,
     segments_and_cells: Fields,

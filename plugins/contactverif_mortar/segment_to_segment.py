@@ -21,8 +21,8 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import springs_at_points, touching_points
-from contactverif_mortar.cell_traits import CELL_TRAITS
+from contactverif_mortar.cell_tangent import ForcesAndTangent, springs_at_points, touching_points
+from contactverif_mortar.cell_traits import CELL_TRAITS, LOCKING_WITNESSES
 from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
@@ -54,18 +54,10 @@ class SegmentToSegment:
         """Compute the derivative of the residual, sparse."""
         return self.residual_and_tangent(interface, pairing, z)[1]
 
-    def residual_and_tangent(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, /
-    ) -> tuple[FloatArray, sparse.csr_array]:
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        return springs_at_points(
-            interface,
-            Cells.from_pairing(pairing),
-            self.quadrature,
-            np.array(z).reshape(-1, 2),
-            self.penalty,
-            pairing["active"],
-        )
+        cells, x = Cells.from_pairing(pairing), np.array(z).reshape(-1, 2)
+        return springs_at_points(interface, cells, self.quadrature, x, self.penalty, pairing["active"])
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the Gauss points of all cells, with their own gaps and pressures."""
@@ -102,17 +94,8 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
     ----------
     Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here.
     """
-    return SegmentToSegment(
-        CELL_TRAITS.revise(
-            locks=True,
-            area="current" if choose("area", area, AREAS) else "reference",
-            witnesses={
-                **CELL_TRAITS.evidence.witnesses,
-                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                "accuracy.wavy-curved": "upper slave, 100 E/h",
-            },
-            source="Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here",
-        ),
-        check_penalty(penalty),
-        Quadrature.gauss(N_POINTS, choose("area", area, AREAS)),
-    )
+    quadrature = Quadrature.gauss(N_POINTS, choose("area", area, AREAS))
+    source = "Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here"
+    witnesses = {**CELL_TRAITS.evidence.witnesses, **LOCKING_WITNESSES}
+    traits = CELL_TRAITS.revise(locks=True, area=area, witnesses=witnesses, source=source)
+    return SegmentToSegment(traits, check_penalty(penalty), quadrature)

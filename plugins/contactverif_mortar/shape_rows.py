@@ -21,7 +21,7 @@ from contactverif.geometry.block_rows import NumberArray, add_block
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
-from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Fields
+from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Csr, Fields
 from contactverif_mortar.node_groups import RowGroups, find_member
 from contactverif_mortar.node_rows import NodeState, add_chains
 
@@ -73,7 +73,7 @@ def add_shaped_rows(
 @compile_maker
 def _add_points(
     forces: FloatArray,
-    csr: Fields,
+    csr: Csr,
     factors: Fields,
     chain: FloatArray,
     first_point: int,
@@ -145,7 +145,7 @@ def _add_block_of_point(
 
 
 @compile_inline
-def _write_block(csr: Fields, block: FloatArray, n_pushed: int, cell: NumberArray) -> None:
+def _write_block(csr: Csr, block: FloatArray, n_pushed: int, cell: NumberArray) -> None:
     """Add a block to compressed rows, and clear it."""
     for k in range(n_pushed):
         for column in range(len(cell)):

@@ -35,7 +35,8 @@ from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.cell_forces import Shapes, integrals
-from contactverif_mortar.cell_traits import CELL_TRAITS
+from contactverif_mortar.cell_tangent import ForcesAndTangent
+from contactverif_mortar.cell_traits import CELL_TRAITS, LOCKING_WITNESSES
 from contactverif_mortar.covered_ranges import Ranges
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
 from contactverif_mortar.node_factors import NodeRows
@@ -100,9 +101,7 @@ class TwoHalfPasses:
         """Compute the derivative of the residual, sparse."""
         return self.residual_and_tangent(interface, pairing, z)[1]
 
-    def residual_and_tangent(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, /
-    ) -> tuple[FloatArray, sparse.csr_array]:
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative, Σ p_j ΔB_j + B Δp on the rows of the pushed surface."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         half_passes = self._carrying(interface, pairing, x[None])
@@ -244,26 +243,19 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
     ----------
     Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179.
     """
-    return TwoHalfPasses(
-        CELL_TRAITS.revise(
-            converges=None,
-            locks=True,
-            conserves_force=False,
-            conserves_moment=False,
-            continuity=None,
-            integrates_linear_gap=None,
-            unbiased=True,
-            area="current" if choose("area", area, AREAS) else "reference",
-            gap=None,
-            witnesses={
-                "balance.force": "tilted",
-                "balance.moment": "tilted",
-                "symmetric": "offset-c",
-                "stability.locking": "12 on 8, ε̂ = 1e8 E/h",
-                "accuracy.wavy-curved": "upper slave, 100 E/h",
-            },
-            source=_SOURCE,
-        ),
-        check_penalty(penalty),
-        Quadrature.gauss(max(2, check_count(n)), choose("area", area, AREAS)),
+    current = choose("area", area, AREAS)
+    witnesses = {"balance.force": "tilted", "balance.moment": "tilted", "symmetric": "offset-c", **LOCKING_WITNESSES}
+    traits = CELL_TRAITS.revise(
+        converges=None,
+        locks=True,
+        conserves_force=False,
+        conserves_moment=False,
+        continuity=None,
+        integrates_linear_gap=None,
+        unbiased=True,
+        area=area,
+        gap=None,
+        witnesses=witnesses,
+        source=_SOURCE,
     )
+    return TwoHalfPasses(traits, check_penalty(penalty), Quadrature.gauss(max(2, check_count(n)), current))

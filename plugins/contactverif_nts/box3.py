@@ -35,7 +35,6 @@ from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
 PRINTED, BALANCED = 0, 1  # How the master side gets its share.
-TRANSMISSIONS = {"printed": PRINTED, "balanced": BALANCED}
 
 
 class Options(NamedTuple):

@@ -52,12 +52,12 @@ from contactverif_nts.box3_gains import (
     part_under_area,
     pressure_on_master,
 )
-from contactverif_nts.eq6 import Fields
+from contactverif_nts.eq6 import Csr, Fields
 
 
 def add_forces_and_tangent(
     rows: FloatArray,
-    csr: Fields,
+    csr: Csr,
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
@@ -78,7 +78,7 @@ def add_forces_and_tangent(
 @compile_kernel
 def _sweep(
     rows: FloatArray,
-    csr: Fields,
+    csr: Csr,
     x: FloatArray,
     multipliers: FloatArray,
     surfaces: Fields,
@@ -168,7 +168,7 @@ def _add_push(
 @compile_inline
 def _add_multiplier(
     rows: FloatArray,
-    csr: Fields,
+    csr: Csr,
     nodes: NumberArray,
     start: int,
     n_coupled: int,

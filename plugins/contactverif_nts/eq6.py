@@ -23,12 +23,12 @@ Source: Zavarise & De Lorenzis (2009), Eq. 6.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.geometry.block_rows import AnyIntArray
 from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
 from contactverif.geometry.compiled import compile_kernel, compile_part
 from contactverif.geometry.projection import (
@@ -43,12 +43,12 @@ from contactverif.geometry.projection import (
     minus,
     node,
 )
-from contactverif.geometry.threads import run_in_threads, split_range
 
 NODAL, CURRENT, REFERENCE = 0, 1, 2  # The area of a point: 1, or lengths in one of two configurations.
 AREAS = {"current": CURRENT, "reference": REFERENCE}  # The words of the option `area`.
 
 Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+Csr = tuple[AnyIntArray, AnyIntArray, FloatArray]  # The indptr, indices and data of compressed rows.
 
 
 class Surfaces(NamedTuple):
@@ -95,13 +95,7 @@ class Contact(NamedTuple):
 
 
 def pair(
-    x: FloatArray,
-    multipliers: FloatArray,
-    surfaces: Fields,
-    tree: Tree,
-    points: Fields,
-    options: Fields,
-    threads: int = 1,
+    x: FloatArray, multipliers: FloatArray, surfaces: Fields, tree: Tree, points: Fields, options: Fields
 ) -> tuple[IntArray, BoolArray]:
     """Return the nearest master segment of each point at x (n_nodes, 2), and whether the point is active.
 
@@ -110,19 +104,12 @@ def pair(
     """
     n_points = len(points[0])
     answers = np.empty(n_points, dtype=np.int64), np.empty(n_points, dtype=np.bool_)
-    run_in_threads(
-        [
-            partial(_pair_points, begin, end, answers, x, multipliers, surfaces, tree, points, options)
-            for begin, end in split_range(n_points, threads)
-        ]
-    )
+    _pair_points(answers, x, multipliers, surfaces, tree, points, options)
     return answers
 
 
 @compile_kernel
 def _pair_points(
-    begin: int,
-    end: int,
     answers: Fields,
     x: FloatArray,
     multipliers: FloatArray,
@@ -131,7 +118,7 @@ def _pair_points(
     points: Fields,
     options: Fields,
 ) -> None:
-    """Write the answers for the points from begin to end.
+    """Write the answers for all points.
 
     A point is active where `is_pressed` says so and its foot is on the surface, past a free end by at most τ.
     """
@@ -141,8 +128,8 @@ def _pair_points(
     tau, penalty = options
     nearest, active = answers
     place = NO_PLACE
-    for i in range(begin, end):
-        if i > begin and not is_next(slave, segment[i - 1], segment[i]):
+    for i in range(len(segment)):
+        if i > 0 and not is_next(slave, segment[i - 1], segment[i]):
             place = NO_PLACE
         v = PointOnSegment(node(x, slave[segment[i], 0]), node(x, slave[segment[i], 1]), c[slot[i]])
         place = nearest_place_from(place, v, x, master, order, boxes)

@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import NumberArray, add_column, add_entry, add_row
 from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import Vector, frame, node
-from contactverif_nts.eq6 import CURRENT, NODAL, REFERENCE, Contact, Fields, area_length, contact_at
+from contactverif_nts.eq6 import CURRENT, NODAL, REFERENCE, Contact, Csr, Fields, area_length, contact_at
 from contactverif_nts.turned_force import ZERO, add_turned_force, plus, times
 
 # Local nodes: those of the other slave segment at a slave node; B, 1, 2, A.
@@ -47,7 +47,7 @@ class Force(NamedTuple):
 
 @compile_maker
 def add_tangent(
-    csr: Fields, x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
+    csr: Csr, x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
 ) -> None:
     """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`.
 
@@ -84,7 +84,7 @@ def add_tangent(
 
 @compile_inline
 def _add_forces(
-    csr: Fields, nodes: NumberArray, begin: int, first_row: int, v: Contact, force: Force, is_spring: bool
+    csr: Csr, nodes: NumberArray, begin: int, first_row: int, v: Contact, force: Force, is_spring: bool
 ) -> None:
     """Add Δ of the forces on A, B, 1 and 2, share × F n."""
     f = force.f
@@ -104,7 +104,7 @@ def _add_forces(
 
 @compile_inline
 def _add_constraint(
-    csr: Fields, nodes: NumberArray, begin: int, first_row: int, unknown: int, v: Contact, force: Force
+    csr: Csr, nodes: NumberArray, begin: int, first_row: int, unknown: int, v: Contact, force: Force
 ) -> None:
     """Add Δ of the constraint −area × g, and what a unit of the multiplier pushes with: −area n."""
     for k in range(begin, N_LOCAL):

@@ -31,49 +31,39 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
+from contactverif.geometry.compiled import match_precision
 from contactverif.geometry.local_matrix import NO_NODE, share_couplings
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import run_in_threads, split_range
 from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields
-from contactverif_nts.point_contact import add_locking, place_points
+from contactverif_nts.point_contact import POINT_TRAITS, add_locking, place_points, surfaces_of
 from contactverif_nts.walk import FREE_ENDS, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
-_PRINTED = Traits(
-    promises=Promises(
-        patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=False),
-        converges=True,
-        tangent="exact",
-        symmetric=False,
-        conserves_force=False,
-        conserves_moment=False,
-        integrates_linear_gap=False,
-        local=True,
-        nodes_push=True,
-        unbiased=False,
-        continuity="jumps",
-        translation_stable=True,
-    ),
-    rules=Rules(area="current", gap="closest point", force_along="master normal", penalty="distributed"),
-    abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-    evidence=Evidence(
-        witnesses={
-            "balance.force": "tilted",
-            "balance.moment": "tilted",
-            "patch.dead-zone": "dead-zone",
-            "patch.tilted": "tilted",
-            "symmetric": "offset-c",
-            "swap": "tilted",
-            "continuity": "sliding",
-        },
-        published_forces={"c": "1 2 3 4 2; 3/2 3 3 3 3/2"},  # Fig. 20
-        source=_PAPER,
-    ),
+_PRINTED = POINT_TRAITS.revise(
+    flat=True,
+    normal=True,
+    single=True,
+    kinked=True,
+    converges=True,
+    symmetric=False,
+    conserves_force=False,
+    conserves_moment=False,
+    integrates_linear_gap=False,
+    area="current",
+    penalty="distributed",
+    witnesses={
+        "balance.force": "tilted",
+        "balance.moment": "tilted",
+        "patch.dead-zone": "dead-zone",
+        **POINT_TRAITS.evidence.witnesses,
+    },
+    published_forces={"c": "1 2 3 4 2; 3/2 3 3 3 3/2"},  # Fig. 20
+    source=_PAPER,
 )
 
 
@@ -102,7 +92,7 @@ class PatchTestPassing:
         """Find the master segments under each area of competence, and decide which virtual slave nodes are active."""
         x, multipliers = split_state(interface, z)
         tree = search_tree(interface.master, x)
-        surfaces = self._surfaces(interface, interface.nodes)
+        surfaces = surfaces_of(interface, interface.nodes)
         balanced = self.transmission == box3.BALANCED
         search = self.n, self.free_end, self.tau, self.penalty, balanced
         areas = walk.pair(x, multipliers, surfaces, tree, search, self.threads)
@@ -174,17 +164,11 @@ class PatchTestPassing:
             area_to=ends[:, 0],
         )
 
-    @staticmethod
-    def _surfaces(interface: Interface, reference: FloatArray) -> Fields:
-        """Return the fields of `Surfaces`."""
-        master = interface.master
-        return reference, interface.slave.segments, master.segments, master.neighbours
-
     def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `Surfaces`, `Areas` and `Options`."""
         (reference,) = match_precision(z, interface.nodes)
         areas = tuple([pairing[name] for name in Areas._fields])
-        return self._surfaces(interface, reference), areas, (self.n, self.transmission, self.current_area, self.penalty)
+        return surfaces_of(interface, reference), areas, (self.n, self.transmission, self.current_area, self.penalty)
 
 
 def vts_ppt(
@@ -296,6 +280,6 @@ def _balanced_promises(free_end: int, n: int, current: bool) -> Traits:
         conserves_moment=covers,
         nodes_push=covers or None,
         area="current" if current else "reference",
-        witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"},
+        witnesses=POINT_TRAITS.evidence.witnesses,
     )
     return add_locking(traits, n)

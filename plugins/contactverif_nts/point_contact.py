@@ -47,6 +47,25 @@ _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416
 # Up to so many points on a segment, forces are seen not to converge. With 6 to 20, `accuracy.wavy` still sees it on a
 # slave four times coarser than the master, but in `accuracy.hertz` the error of the bodies hides theirs.
 FEW_POINTS = 5
+# What all methods promise whose points press on master segments along their normals.
+POINT_TRAITS = Traits(
+    promises=Promises(
+        patch=PatchPromises(flat=False, kinked=False, overhang=False),
+        tangent="exact",
+        conserves_force=True,
+        conserves_moment=True,
+        local=True,
+        nodes_push=True,
+        unbiased=False,
+        continuity="jumps",
+        translation_stable=True,
+    ),
+    rules=Rules(gap="closest point", force_along="master normal"),
+    abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+    evidence=Evidence(
+        witnesses={"patch.tilted": "tilted", "symmetric": "offset-c", "swap": "tilted", "continuity": "sliding"}
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +88,7 @@ class PointContact:
         """Find the nearest master segment of each point, and decide which points are active."""
         x, multipliers = split_state(interface, z)
         segment, other, slot = self._points(interface)
-        tree, surfaces = search_tree(interface.master, x), self._surfaces(interface, interface.nodes)
+        tree, surfaces = search_tree(interface.master, x), surfaces_of(interface, interface.nodes)
         points, options = (segment, slot, self.c), (self.tau, self.penalty)
         nearest, active = eq6.pair(x, multipliers, surfaces, tree, points, options)
         return Pairing({"segment": segment, "other": other, "slot": slot, "master": nearest, "active": active})
@@ -127,17 +146,17 @@ class PointContact:
         other = np.concatenate([slave.neighbours[:, 0], np.full_like(last, -1)])
         return segment, other, slot
 
-    @staticmethod
-    def _surfaces(interface: Interface, reference: FloatArray) -> Fields:
-        """Return the fields of `eq6.Surfaces`."""
-        master = interface.master
-        return reference, interface.slave.segments, master.segments, master.neighbours
-
     def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
         """Return the fields of `eq6.Surfaces`, `eq6.Points` and `eq6.Options`."""
         reference, c, weight = match_precision(z, interface.nodes, self.c, self.weight)
         points = tuple([pairing[name] for name in eq6.Points._fields])
-        return self._surfaces(interface, reference), points, (c, weight, self.area_from, self.penalty)
+        return surfaces_of(interface, reference), points, (c, weight, self.area_from, self.penalty)
+
+
+def surfaces_of(interface: Interface, reference: FloatArray) -> Fields:
+    """Return the fields of `eq6.Surfaces`."""
+    master = interface.master
+    return reference, interface.slave.segments, master.segments, master.neighbours
 
 
 def place_points(
@@ -281,45 +300,26 @@ def _traits(
     are those of a table in `force_tables`.
     """
     areas = {eq6.CURRENT: "current", eq6.REFERENCE: "reference", None: None}
-    traits = Traits(
-        promises=Promises(
-            patch=PatchPromises(flat=False, normal=passes_normal, single=passes_single, kinked=False, overhang=False),
-            locks=None if n_points else False,
-            converges=False if n_points <= FEW_POINTS else None,
-            tangent="exact",
-            symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
-            conserves_force=True,
-            conserves_moment=True,
-            local=True,
-            nodes_push=True,
-            unbiased=False,
-            continuity="jumps",
-            integrates_linear_gap=None if area_from is None else linear,
-            translation_stable=True,
-        ),
-        rules=Rules(
-            area=areas[area_from],  # type: ignore[arg-type]
-            gap="closest point",
-            force_along="master normal",
-            penalty=penalty,  # type: ignore[arg-type]
-        ),
-        abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
-        evidence=Evidence(
-            witnesses={
-                "patch": patch_witness,
-                "patch.dead-zone": "dead-zone",
-                "patch.kinked": "edge of 53°, lower slave",
-                "patch.tilted": "tilted",
-                "symmetric": "offset-c",
-                "swap": "tilted",
-                "continuity": "sliding",
-                "accuracy.hertz": "parabola-layer",
-                "accuracy.wavy": "upper slave, 10 E/h",
-                "accuracy.wavy-curved": "upper slave, 100 E/h",
-            },
-            published_forces=force_tables.BY_METHOD.get(table, {}),
-            source=_PAPER,
-        ),
+    traits = POINT_TRAITS.revise(
+        normal=passes_normal,
+        single=passes_single,
+        locks=None if n_points else False,
+        converges=False if n_points <= FEW_POINTS else None,
+        symmetric=area_from == eq6.REFERENCE if symmetric is None else symmetric,
+        integrates_linear_gap=None if area_from is None else linear,
+        area=areas[area_from],
+        penalty=penalty,
+        witnesses={
+            "patch": patch_witness,
+            "patch.dead-zone": "dead-zone",
+            "patch.kinked": "edge of 53°, lower slave",
+            **POINT_TRAITS.evidence.witnesses,
+            "accuracy.hertz": "parabola-layer",
+            "accuracy.wavy": "upper slave, 10 E/h",
+            "accuracy.wavy-curved": "upper slave, 100 E/h",
+        },
+        published_forces=force_tables.BY_METHOD.get(table, {}),
+        source=_PAPER,
     )
     return add_locking(traits, n_points)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from contactverif.geometry.block_rows import add_block
 from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector
-from contactverif_nts.eq6 import Contact, Fields
+from contactverif_nts.eq6 import Contact, Csr
 
 ZERO = (0.0, 0.0)
 
@@ -26,9 +26,7 @@ def plus(a: Vector, b: Vector) -> Vector:
 
 
 @compile_inline
-def add_turned_force(
-    csr: Fields, row: int, column: int, v: Contact, force: float, d_force: Vector, omega: Vector
-) -> None:
+def add_turned_force(csr: Csr, row: int, column: int, v: Contact, force: float, d_force: Vector, omega: Vector) -> None:
     """Add Δ(force n) = n Δforce + force Δn, with Δn = −t ω, to the rows of one node and the columns of another.
 
     `d_force` and `omega` are gained for a displacement of the node `column`.

@@ -41,9 +41,7 @@ class Pass:
 
     def part(self, pairing: Pairing | None) -> Pairing | None:
         """Return the part of a pairing of both passes that belongs to this one."""
-        if pairing is None:
-            return None
-        if pairing.opaque:  # Each pass decides anew.
+        if pairing is None or pairing.opaque:  # Each pass decides anew.
             return None
         arrays = {name.removeprefix(self.name): array for name, array in pairing.items() if name.startswith(self.name)}
         return Pairing(arrays)

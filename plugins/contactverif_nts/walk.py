@@ -85,14 +85,7 @@ class Search(NamedTuple):
     balanced: bool
 
 
-def pair(
-    x: FloatArray,
-    multipliers: FloatArray,
-    surfaces: Fields,
-    tree: Tree,
-    options: Fields,
-    threads: int = 1,
-) -> Fields:
+def pair(x: FloatArray, multipliers: FloatArray, surfaces: Fields, tree: Tree, options: Fields, threads: int) -> Fields:
     """Return the fields of `Areas` for the virtual slave nodes, at x (n_nodes, 2); `options` are `Search`."""
     n, n_segments = options[0], len(surfaces[1])
     integers = np.full((8, n_segments * n), NOT_CUT, dtype=np.int64)
