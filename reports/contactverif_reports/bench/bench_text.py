@@ -72,8 +72,7 @@ def _table(results: BenchResults, scene: str) -> str:
     lines = [f"| {' | '.join(heads)} |", f"|---|{'--:|' * (len(heads) - 1)}"]
     for name in results.formulations:
         times = [_milliseconds(time_to_reach(results, name, scene, target)) for target in TARGETS]
-        ratio = cost_ratio(results, name, scene) if REFERENCE in results.formulations else float("nan")
-        lines.append(f"| `{name}` | {' | '.join(times)} | {_plain(ratio)} |")
+        lines.append(f"| `{name}` | {' | '.join(times)} | {format_ratio(cost_ratio(results, name, scene))} |")
     return "\n".join(lines)
 
 
@@ -93,7 +92,7 @@ def _profiles(results: BenchResults, with_pictures: bool) -> str:
     lines += ["| | solved | faster | within twice | ratio |", "|---|--:|--:|--:|--:|"]
     for pair in profiles:
         shares = (f"{share:.0%}" for share in (pair.share_solved, pair.share(1), pair.share(2)))
-        lines.append(f"| `{pair.formulation}` | {' | '.join(shares)} | {_plain(pair.median_ratio)} |")
+        lines.append(f"| `{pair.formulation}` | {' | '.join(shares)} | {format_ratio(pair.median_ratio)} |")
     return "\n".join(lines)
 
 
@@ -101,5 +100,6 @@ def _milliseconds(seconds: float) -> str:
     return "∞" if isinf(seconds) else f"{1e3 * seconds:.3g}"
 
 
-def _plain(ratio: float) -> str:
+def format_ratio(ratio: float) -> str:
+    """Return a ratio with two digits; ∞ for a formulation that never gets there, a dash where there is no ratio."""
     return "–" if isnan(ratio) else "∞" if isinf(ratio) else f"{ratio:.2g}"

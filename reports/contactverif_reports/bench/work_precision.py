@@ -49,8 +49,10 @@ def time_to_reach(
 def cost_ratio(results: BenchResults, formulation: str, scene: str, reference: str = REFERENCE) -> float:
     """Return the time to an error of 1 % in the forces over that of the reference.
 
-    It is infinite if the formulation never reaches the error, NaN if the reference does not.
+    It is infinite if the formulation never reaches the error, NaN if the reference does not, or is not there.
     """
+    if reference not in results.formulations:
+        return np.nan
     time, other = (time_to_reach(results, name, scene, SENTENCE_TARGET) for name in (formulation, reference))
     return time / other if isfinite(other) else np.nan
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from contactverif_reports.bench.bench_text import format_ratio
 from contactverif_reports.bench.clocks import clock_sentences
 from contactverif_reports.bench.results import COUNTS, ERRORS, PARTS, BenchResults, Outcome
 from contactverif_reports.bench.slowdown import Slowdown
@@ -28,10 +29,7 @@ _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version
 
 def bench_page(results: BenchResults, changes: Sequence[Slowdown] = ()) -> str:
     """Return the page of a bench."""
-    from contactverif_reports.draw.bench_figures import (  # Importing matplotlib is slow.
-        make_cost_figure,
-        make_profile_figure,
-    )
+    from contactverif_reports.draw.bench_figures import make_cost_figure, make_profile_figure  # Importing it is slow.
 
     scenes = results.scenes
     profile = make_profile_figure(results)
@@ -87,8 +85,8 @@ def _target_rows(results: BenchResults, scene: str, kind: str) -> dict[str, Any]
     rows = []
     for name in results.formulations:
         times = [format_time(time_to_reach(results, name, scene, target, kind)) for target in TARGETS]
-        ratio = cost_ratio(results, name, scene) if REFERENCE in results.formulations and kind == "forces" else np.nan
-        rows.append((name, times, "∞" if isinf(ratio) else "–" if isnan(ratio) else f"{ratio:.2g}"))
+        ratio = cost_ratio(results, name, scene) if kind == "forces" else np.nan
+        rows.append((name, times, format_ratio(ratio)))
     return {"scene": scene, "rows": rows}
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Run, coverage_of
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Iterations, count_iterations
 from contactverif_reports.draw import as_text
@@ -37,23 +37,12 @@ class Example:
     reason: str
     replay: str  # The command that judges the case again.
 
-    @property
-    def id(self) -> str:
-        """The id of the counterexample."""
-        return self.counterexample.id
-
-    @property
-    def row(self) -> Row:
-        """The row that the case belongs to."""
-        return self.counterexample.row
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
     """A row of the table of a formulation."""
 
-    row: Row  # The row.
-    cell: Cell  # Its numbers by case.
+    cell: Cell  # The row, and its numbers by case.
     promise: str  # What the formulation states, in a word.
     strip: Markup  # The distribution of value over tolerance.
     example: str  # The id of its counterexample, empty if it has none.
@@ -69,12 +58,12 @@ class Section:
     missing: tuple[str, ...]  # Parts of the contract that the formulation does not provide.
     lines: tuple[Line, ...]  # A line for each property.
     examples: tuple[Example, ...]  # Its counterexamples.
-    iterations: tuple[Iterations, ...] = field(default=())  # Newton's iterations where a property solved.
+    iterations: tuple[Iterations, ...]  # Newton's iterations where a property solved.
 
     @property
     def counts(self) -> str:
         """The numbers of properties with each result, in words."""
-        results = [line.row.result for line in self.lines]
+        results = [line.cell.result for line in self.lines]
         return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
 
@@ -90,7 +79,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
         row_of=run.row_of,
         title=_title(run),
         headline=headline(run),
-        sections=_sections(run, cells, examples, axis),
+        sections=[_section(run, name, cells, examples, axis) for name in run.formulations],
         chunks=_chunks(list(run.properties)),
         anchors={id_: f"property-{n}" for n, id_ in enumerate(run.properties, 1)},
         numbers={name: n for n, name in enumerate(run.formulations, 1)},
@@ -128,47 +117,30 @@ def _title(run: Run) -> str:
     return f"Verification of {', '.join(names)}" if len(names) <= 3 else f"Verification of {len(names)} formulations"
 
 
-def _sections(
-    run: Run, cells: Mapping[tuple[str, str], Cell], examples: Sequence[Example], axis: Axis
-) -> tuple[Section, ...]:
-    """Return a section for each formulation."""
-    few = len(run.formulations) <= _OPEN_SECTIONS
-    return tuple(
-        _section(
-            number,
-            name,
-            run,
-            [cell for (formulation, _), cell in cells.items() if formulation == name],
-            [example for example in examples if example.row.formulation == name],
-            axis,
-            is_open=few or any(row.unexpected for row in run.rows_of(name)),
-        )
-        for number, name in enumerate(run.formulations, 1)
-    )
-
-
 def _section(
-    number: int, name: str, run: Run, cells: Sequence[Cell], examples: Sequence[Example], axis: Axis, *, is_open: bool
+    run: Run, name: str, cells: Mapping[tuple[str, str], Cell], examples: Sequence[Example], axis: Axis
 ) -> Section:
-    example_of = {example.row.property_id: example.id for example in examples}
+    """Return the section of one formulation."""
+    own_cells = [cell for (formulation, _), cell in cells.items() if formulation == name]
+    own_examples = [example for example in examples if example.counterexample.formulation == name]
+    example_of = {example.counterexample.property_id: example.counterexample.id for example in own_examples}
     lines = [
         Line(
-            row=cell.row,
             cell=cell,
             promise=_PROMISES[cell.row.promise],
             strip=strip(cell.margins, axis),
             example=example_of.get(cell.property_id, ""),
         )
-        for cell in cells
+        for cell in own_cells
     ]
     return Section(
         formulation=name,
-        number=number,
-        open=is_open,
+        number=run.formulations.index(name) + 1,
+        open=len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in run.rows_of(name)),
         missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
         lines=tuple(lines),
-        examples=tuple(examples),
-        iterations=tuple(line for cell in cells for line in count_iterations([cell])),
+        examples=tuple(own_examples),
+        iterations=tuple(line for cell in own_cells for line in count_iterations([cell])),
     )
 
 
