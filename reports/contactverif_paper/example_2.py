@@ -7,6 +7,7 @@ Source: Zavarise & De Lorenzis (2009), Section 7.2, Figs. 37 and 38. What is giv
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -80,9 +81,10 @@ def compute(report_progress: Progress) -> Example2:
     )
 
 
-def statements(example: Example2) -> tuple[Statement, ...]:
+def statements(example: Example2) -> Iterator[Statement]:
     """Compare pressures and numbers of iterations."""
-    return _peak_statement(example), _iteration_statement(example)
+    yield _peak_statement(example)
+    yield _iteration_statement(example)
 
 
 def _peak_statement(example: Example2) -> Statement:
@@ -114,16 +116,14 @@ def _iteration_statement(example: Example2) -> Statement:
     )
 
 
-def tables(example: Example2) -> tuple[PageTable, ...]:
-    """Return the table of the page."""
+def tables(example: Example2) -> Iterator[PageTable]:
+    """Yield the table of the page."""
     rows = [(row.formulation.legend, row.peak, row.half_width, str(row.iterations)) for row in example.solutions]
     rows += [("Hertz", *example.hertz, "–"), ("Hertz on springs ε̂", *example.winkler, "–")]
-    return (
-        PageTable.of_numbers(
-            "Largest pressure, half-width of the contact, linear systems solved",
-            ("Formulation", "Largest pressure", "Half-width", "Iterations"),
-            [(head, number(peak, 5), number(width, 4), count) for head, peak, width, count in rows],
-        ),
+    yield PageTable.of_numbers(
+        "Largest pressure, half-width of the contact, linear systems solved",
+        ("Formulation", "Largest pressure", "Half-width", "Iterations"),
+        [(head, number(peak, 5), number(width, 4), count) for head, peak, width, count in rows],
     )
 
 

@@ -10,7 +10,7 @@ Source: Zavarise & De Lorenzis (2009), Fig. 30, Sections 6.1 and 6.2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -173,9 +173,11 @@ def _rate(stiffness: float) -> tuple[float, float]:
     return radius, late_rate(trace.residuals, float(trace.floors[-1]))
 
 
-def statements(convergence: Convergence) -> tuple[Statement, ...]:
+def statements(convergence: Convergence) -> Iterator[Statement]:
     """Compare the numbers of iterations and the rate."""
-    return _basic_statement(convergence), _quick_statement(convergence), _rate_statement(convergence)
+    yield _basic_statement(convergence)
+    yield _quick_statement(convergence)
+    yield _rate_statement(convergence)
 
 
 def _basic_statement(convergence: Convergence) -> Statement:
@@ -234,19 +236,17 @@ def _rate_statement(convergence: Convergence) -> Statement:
     )
 
 
-def tables(convergence: Convergence) -> tuple[PageTable, ...]:
-    """Return the iterations by stopping rule."""
+def tables(convergence: Convergence) -> Iterator[PageTable]:
+    """Yield the iterations by stopping rule."""
     heads = [f"{row.legend}, {material}" for row in FORMULATIONS for material in MATERIALS]
     columns = np.hstack([convergence.counts(row) for row in FORMULATIONS])
-    return (
-        PageTable.of_numbers(
-            "Fig. 30: linear systems solved, by stopping rule",
-            ("Newton’s method stops when", *heads),
-            [
-                (rule, *(str(count) if count >= 0 else "never" for count in row))
-                for rule, row in zip(RULES, columns.tolist(), strict=True)
-            ],
-        ),
+    yield PageTable.of_numbers(
+        "Fig. 30: linear systems solved, by stopping rule",
+        ("Newton’s method stops when", *heads),
+        [
+            (rule, *(str(count) if count >= 0 else "never" for count in row))
+            for rule, row in zip(RULES, columns.tolist(), strict=True)
+        ],
     )
 
 

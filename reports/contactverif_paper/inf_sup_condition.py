@@ -8,6 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Section 6.3.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -74,26 +75,24 @@ def _series(case: Case, formulation: PaperFormulation) -> list[FloatArray]:
     return [measurement.series[name] for name in _SERIES]
 
 
-def statements(constants: Constants) -> tuple[Statement, ...]:
+def statements(constants: Constants) -> Iterator[Statement]:
     """Answer the question that the paper leaves open."""
     coarser, finer, matching = range(len(FAMILIES))
     pair, single, passes = (FORMULATIONS.index(row) for row in (VTS_PPT, ONE_POINT, TWO_PASS))
     stable = [row.legend for row in FORMULATIONS if constants.stable(row)]
-    return (
-        Statement(
-            "Section 6.3",
-            "it is not proved that VTS-PPT satisfies the inf-sup condition, and it is possible that it shares what the "
-            "mortar method has",
-            "it does not: with two virtual slave nodes a segment, β falls like h to the power "
-            f"{constants.slopes[pair, coarser]:.2f} on a slave that is coarser than the master (2:3), and "
-            f"{constants.zeros[pair, finer]:.0%} of all pressures move nothing on a finer one (3:2). With one virtual "
-            f"slave node, β falls like h to the power {constants.slopes[single, matching]:.2f} on matching meshes. "
-            f"β is constant on all meshes for: {', '.join(stable)}. In two passes, "
-            f"{constants.zeros[passes, coarser]:.0%} (2:3) to {constants.zeros[passes, matching]:.0%} (matching) of "
-            "all pressures move nothing: one for each pair of nodes in one place",
-            Agreement.decide(constants.stable(VTS_PPT) is constants.stable(MORTAR)),
-            "inf-sup",
-        ),
+    yield Statement(
+        "Section 6.3",
+        "it is not proved that VTS-PPT satisfies the inf-sup condition, and it is possible that it shares what the "
+        "mortar method has",
+        "it does not: with two virtual slave nodes a segment, β falls like h to the power "
+        f"{constants.slopes[pair, coarser]:.2f} on a slave that is coarser than the master (2:3), and "
+        f"{constants.zeros[pair, finer]:.0%} of all pressures move nothing on a finer one (3:2). With one virtual "
+        f"slave node, β falls like h to the power {constants.slopes[single, matching]:.2f} on matching meshes. "
+        f"β is constant on all meshes for: {', '.join(stable)}. In two passes, "
+        f"{constants.zeros[passes, coarser]:.0%} (2:3) to {constants.zeros[passes, matching]:.0%} (matching) of "
+        "all pressures move nothing: one for each pair of nodes in one place",
+        Agreement.decide(constants.stable(VTS_PPT) is constants.stable(MORTAR)),
+        "inf-sup",
     )
 
 
@@ -113,8 +112,8 @@ def plot(constants: Constants) -> Figure:
     return figure
 
 
-def tables(constants: Constants) -> tuple[PageTable, ...]:
-    """Return β on the finest mesh, its slope, and the share of pressures that move nothing."""
+def tables(constants: Constants) -> Iterator[PageTable]:
+    """Yield β on the finest mesh, its slope, and the share of pressures that move nothing."""
     rows = []
     for row, formulation in enumerate(FORMULATIONS):
         cells = [Cell((formulation.legend,))]
@@ -126,7 +125,7 @@ def tables(constants: Constants) -> tuple[PageTable, ...]:
             cells.append(Cell((number(constants.beta[row, column, -1], 2),), details, tone))
         rows.append(tuple(cells))
     caption = "Inf-sup constant β on the finest of five meshes; below, its slope against h, and how many pressures move"
-    return (PageTable(f"{caption} nothing", ("Formulation", *FAMILIES), tuple(rows)),)
+    yield PageTable(f"{caption} nothing", ("Formulation", *FAMILIES), tuple(rows))
 
 
 ITEM = Item(

@@ -8,7 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Sections 2, 5.1.3, 6, 6.3 and 7.1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -112,9 +112,12 @@ def eight_on_two() -> Scene:
     )
 
 
-def statements(tests: Sequence[MultiplierTest]) -> tuple[Statement, ...]:
+def statements(tests: Sequence[MultiplierTest]) -> Iterator[Statement]:
     """Compare who passes, which multipliers are uniform, and which are unique."""
-    return (_pass_statement(tests), _range_statement(tests), _two_pass_statement(tests), _stability_statement(tests))
+    yield _pass_statement(tests)
+    yield _range_statement(tests)
+    yield _two_pass_statement(tests)
+    yield _stability_statement(tests)
 
 
 def _pass_statement(tests: Sequence[MultiplierTest]) -> Statement:
@@ -169,15 +172,13 @@ def _largest_deficiency(tests: Sequence[MultiplierTest], formulation: PaperFormu
     return max(test.deficiency for test in tests if test.formulation == formulation)
 
 
-def tables(tests: Sequence[MultiplierTest]) -> tuple[PageTable, ...]:
-    """Return the table of the page."""
+def tables(tests: Sequence[MultiplierTest]) -> Iterator[PageTable]:
+    """Yield the table of the page."""
     rows = {formulation: [test for test in tests if test.formulation == formulation] for formulation in FORMULATIONS}
-    return (
-        PageTable(
-            "Patch tests with multipliers instead of a penalty: the stress, and the range of the multipliers",
-            ("Formulation", *(title.removeprefix("case ") for title in SCENES.values())),
-            tuple((Cell((formulation.legend,)), *(_cell(test) for test in row)) for formulation, row in rows.items()),
-        ),
+    yield PageTable(
+        "Patch tests with multipliers instead of a penalty: the stress, and the range of the multipliers",
+        ("Formulation", *(title.removeprefix("case ") for title in SCENES.values())),
+        tuple((Cell((formulation.legend,)), *(_cell(test) for test in row)) for formulation, row in rows.items()),
     )
 
 

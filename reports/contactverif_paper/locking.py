@@ -8,6 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Section 6.3.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -99,22 +100,20 @@ def _real_contact(formulation: PaperFormulation) -> Contact:
     return Contact(points.position[order, 0], points.pressure[order] / MEAN_PRESSURE, converged)
 
 
-def statements(result: Locking) -> tuple[Statement, ...]:
+def statements(result: Locking) -> Iterator[Statement]:
     """Say what happens at a high penalty."""
     drift = dict(zip(FORMULATIONS, result.drift[:, -1], strict=True))
     rough, smooth = (f"{row.pressure.min():.2f} to {row.pressure.max():.1f}" for row in result.contacts)
-    return (
-        Statement(
-            "Section 6.3",
-            "what a high penalty does to VTS-PPT and to segment-to-segment is not said",
-            f"both lock. From ε̂ = 10 to 1e8 E/h an interface of {FINER[0]} on {FINER[1]} segments loses "
-            f"{drift[VTS_PPT]:.0%} (VTS-PPT), {drift[STS]:.0%} (segment-to-segment) and "
-            f"{drift[TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
-            f"{abs(drift[MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
-            f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
-            Agreement.SILENT,
-            "locking-stiff",
-        ),
+    yield Statement(
+        "Section 6.3",
+        "what a high penalty does to VTS-PPT and to segment-to-segment is not said",
+        f"both lock. From ε̂ = 10 to 1e8 E/h an interface of {FINER[0]} on {FINER[1]} segments loses "
+        f"{drift[VTS_PPT]:.0%} (VTS-PPT), {drift[STS]:.0%} (segment-to-segment) and "
+        f"{drift[TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
+        f"{abs(drift[MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
+        f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
+        Agreement.SILENT,
+        "locking-stiff",
     )
 
 

@@ -117,13 +117,13 @@ class Item:
     name: str  # Its group in `paper.nc`.
     title: str  # The heading of its section on the page.
     compute: Callable[[Progress], Any]  # Computes its data and calls `Progress` `n_steps` times.
-    statements: Callable[[Any], tuple[Statement, ...]]  # Compares the data with what the paper says.
+    statements: Callable[[Any], Iterable[Statement]]  # Compares the data with what the paper says.
     # Returns its numbers: {name below its own: group}, with "" for its own group. The default is the columns of its
     # data, with `attributes`.
     datasets: Callable[[Any], Mapping[str, Group]] | None = None
     attributes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     figures: tuple[PaperFigure, ...] = ()  # Its figures, in order.
-    tables: Callable[[Any], tuple[PageTable, ...]] = lambda _: ()  # Fills its tables.
+    tables: Callable[[Any], Iterable[PageTable]] = lambda _: ()  # Fills its tables.
     text: str = ""  # A paragraph under the heading.
     # {subject: what was chosen where the paper is silent}.
     choices: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))

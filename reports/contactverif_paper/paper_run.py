@@ -26,7 +26,7 @@ def compute(
     """Compute the items."""
     selection = _select(items, with_study=with_study)
     data = _compute_all(selection, report_progress, executor)
-    results = [ItemResult(item, each, item.statements(each), item.tables(each)) for item, each in data]
+    results = [ItemResult(item, each, tuple(item.statements(each)), tuple(item.tables(each))) for item, each in data]
     return Paper(tuple(results), _provenance())
 
 

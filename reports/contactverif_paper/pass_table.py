@@ -5,7 +5,7 @@ Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1, with Figs. 9–12,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -113,7 +113,7 @@ def compute(report_progress: Progress) -> PassTable:
     return PassTable(errors, tolerances, np.array(printed))
 
 
-def statements(table: PassTable) -> tuple[Statement, ...]:
+def statements(table: PassTable) -> Iterator[Statement]:
     """Count the verdicts that the paper shares."""
     spoken = table.printed != SILENT
     names = list(SCENES)
@@ -122,20 +122,18 @@ def statements(table: PassTable) -> tuple[Statement, ...]:
     ]
     result = f"{int(table.same.sum())} of {int(spoken.sum())} verdicts are the same"
     result += f"; others: {', '.join(wrong)}" if wrong else ""
-    return (
-        Statement(
-            "Figs. 9–12, 17, 18, 21, 22, 32, 33, 35, 36",
-            "NTS fails everywhere; NTS-AR passes where each slave segment faces one master segment; VTS-ME passes "
-            "where each area of competence does; VTS-PPT passes C and Example 1bis; two-pass NTS-AR fails",
-            result,
-            Agreement.decide(not wrong),
-        ),
-        Statement(
-            "Sections 4, 5, 7.1",
-            "no numbers are given for errors, materials, supports, heights or penalties of the patch tests",
-            _gap(table),
-            Agreement.SILENT,
-        ),
+    yield Statement(
+        "Figs. 9–12, 17, 18, 21, 22, 32, 33, 35, 36",
+        "NTS fails everywhere; NTS-AR passes where each slave segment faces one master segment; VTS-ME passes "
+        "where each area of competence does; VTS-PPT passes C and Example 1bis; two-pass NTS-AR fails",
+        result,
+        Agreement.decide(not wrong),
+    )
+    yield Statement(
+        "Sections 4, 5, 7.1",
+        "no numbers are given for errors, materials, supports, heights or penalties of the patch tests",
+        _gap(table),
+        Agreement.SILENT,
     )
 
 
@@ -147,16 +145,14 @@ def _gap(table: PassTable) -> str:
     return f"errors of the stress are at roundoff or above {FAILS:g} at ε̂ = 10 E/h; nothing lies between"
 
 
-def tables(table: PassTable) -> tuple[PageTable, ...]:
-    """Return the table of the page."""
-    return (
-        PageTable(
-            "Elastic patch tests of Sections 4, 5 and 7.1: largest error of a stress over the pressure",
-            ("Formulation", *SCENES.values()),
-            tuple(
-                (Cell((formulation.legend,)), *(_cell(table, row, column) for column in range(len(SCENES))))
-                for row, formulation in enumerate(FORMULATIONS)
-            ),
+def tables(table: PassTable) -> Iterator[PageTable]:
+    """Yield the table of the page."""
+    yield PageTable(
+        "Elastic patch tests of Sections 4, 5 and 7.1: largest error of a stress over the pressure",
+        ("Formulation", *SCENES.values()),
+        tuple(
+            (Cell((formulation.legend,)), *(_cell(table, row, column) for column in range(len(SCENES))))
+            for row, formulation in enumerate(FORMULATIONS)
         ),
     )
 

@@ -5,7 +5,7 @@ Such an item gives its patch tests, its captions and what the paper prints; all 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -54,6 +54,42 @@ class PatchTests:
     study: Any
 
 
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What an item of patch tests computes, declares and states."""
+
+    setups: tuple[PatchSetup, ...]
+    printed: PrintedForces | None
+    study: Study | None
+
+    def compute(self, report_progress: Progress) -> PatchTests:
+        """Solve the patch tests, and compute forces and numbers beside them."""
+        patches = []
+        for setup in self.setups:
+            report_progress(setup.title)
+            patches.append(patch_solution(setup))
+        first, printed = self.setups[0], self.printed
+        forces = force_table(first.scene, first.title, printed.exact, printed.transmitted) if printed else None
+        return PatchTests(tuple(patches), forces, self.study.compute() if self.study else None)
+
+    def statements(self, tests: PatchTests) -> Iterator[Statement]:
+        """Compare the printed forces and axes, and what the study finds."""
+        if self.printed and tests.forces:
+            yield force_statement(tests.forces, self.printed.figure, self.printed.claim)
+        yield from map(range_statement, tests.patches)
+        if self.study:
+            yield self.study.statement(tests)
+
+    def datasets(self, tests: PatchTests) -> dict[str, Group]:
+        """Return patch tests, forces and numbers beside them, a group each."""
+        datasets = {"patch": _patch_dataset(tests.patches)}
+        if self.printed and tests.forces:
+            datasets["forces"] = force_dataset(tests.forces, self.printed.figure)
+        if self.study:
+            datasets[self.study.name] = to_group(tests.study, **self.study.attributes)
+        return datasets
+
+
 def patch_item(
     name: str,
     title: str,
@@ -65,53 +101,22 @@ def patch_item(
     choices: Mapping[str, str] | None = None,
 ) -> Item:
     """Return the item of some patch tests; the last two figures show penetrations and pressures, one before meshes."""
-    plots = (plot_meshes, plot_penetrations, plot_pressures)[-len(captions) :]
+    plots, plan = (plot_meshes, plot_penetrations, plot_pressures)[-len(captions) :], _Plan(setups, printed, study)
     return Item(
         name=name,
         title=title,
-        compute=partial(_compute, setups, printed, study),
-        statements=partial(_statements, printed, study),
-        datasets=partial(_datasets, printed, study),
+        compute=plan.compute,
+        statements=plan.statements,
+        datasets=plan.datasets,
         figures=tuple(
             PaperFigure(f"fig{number:02}", caption, partial(_plot, plot))
             for (number, caption), plot in zip(captions.items(), plots, strict=True)
         ),
-        tables=lambda tests: () if tests.forces is None else (force_page_table(tests.forces),),
+        tables=lambda tests: [force_page_table(tests.forces)] if tests.forces else [],
         text=text,
         choices=choices or {},
         n_steps=len(setups),
     )
-
-
-def _compute(
-    setups: tuple[PatchSetup, ...], printed: PrintedForces | None, study: Study | None, report_progress: Progress
-) -> PatchTests:
-    patches = []
-    for setup in setups:
-        report_progress(setup.title)
-        patches.append(patch_solution(setup))
-    first = setups[0]
-    forces = force_table(first.scene, first.title, printed.exact, printed.transmitted) if printed else None
-    return PatchTests(tuple(patches), forces, study.compute() if study else None)
-
-
-def _statements(printed: PrintedForces | None, study: Study | None, tests: PatchTests) -> tuple[Statement, ...]:
-    """Compare the printed forces and axes, and what the study finds."""
-    statements = [range_statement(patch) for patch in tests.patches]
-    if printed and tests.forces:
-        statements.insert(0, force_statement(tests.forces, printed.figure, printed.claim))
-    if study:
-        statements.append(study.statement(tests))
-    return tuple(statements)
-
-
-def _datasets(printed: PrintedForces | None, study: Study | None, tests: PatchTests) -> dict[str, Group]:
-    datasets = {"patch": _patch_dataset(tests.patches)}
-    if printed and tests.forces:
-        datasets["forces"] = force_dataset(tests.forces, printed.figure)
-    if study:
-        datasets[study.name] = to_group(tests.study, **study.attributes)
-    return datasets
 
 
 def _patch_dataset(patches: tuple[PatchSolution, ...]) -> Group:

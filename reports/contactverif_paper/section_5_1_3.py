@@ -8,6 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Section 5.1.3.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -43,22 +44,20 @@ def two_passes_are_no_better(departure: dict[PaperFormulation, float]) -> bool:
     return departure[TWO_PASS] >= departure[NTS_AR]
 
 
-def statements(errors: TwoPasses) -> tuple[Statement, ...]:
+def statements(errors: TwoPasses) -> Iterator[Statement]:
     """Say up to which penalty the claim holds."""
     (single, double), (moderate_one, moderate_two) = errors.departure, errors.stress_error
     agreement = Agreement.decide(double >= single, always=moderate_two >= moderate_one)
     condition = f"ε̂ ≤ {errors.limit:.2f} E per unit of length" if agreement is Agreement.CONDITIONAL else ""
-    return (
-        Statement(
-            "Section 5.1.3",
-            "case B: two passes with a penalty do not come nearer than one",
-            f"at the soft penalty of Fig. 18 pressures depart by up to {double:.2f} from the exact one with "
-            f"two passes and by {single:.2f} with one. At ε̂ = 10 E/h the error of the stress is "
-            f"{moderate_one / moderate_two:.0f} times smaller with two, which lock",
-            agreement,
-            "fig18",
-            condition,
-        ),
+    yield Statement(
+        "Section 5.1.3",
+        "case B: two passes with a penalty do not come nearer than one",
+        f"at the soft penalty of Fig. 18 pressures depart by up to {double:.2f} from the exact one with "
+        f"two passes and by {single:.2f} with one. At ε̂ = 10 E/h the error of the stress is "
+        f"{moderate_one / moderate_two:.0f} times smaller with two, which lock",
+        agreement,
+        "fig18",
+        condition,
     )
 
 

@@ -10,7 +10,7 @@ Source: Zavarise & De Lorenzis (2009), Section 6.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -122,10 +122,12 @@ def long_interface(ratio: float) -> Case:
     return Case(interface, np.vstack([upper, lower]).reshape(-1), penalty=PENALTY)
 
 
-def statements(section: Section63) -> tuple[Statement, ...]:
+def statements(section: Section63) -> Iterator[Statement]:
     """Compare terms, feasibility and cost."""
     terms = section.terms.terms
-    return _feasible_statement(terms, section.tangents), _terms_statement(terms), _cost_statement(section.cost)
+    yield _feasible_statement(terms, section.tangents)
+    yield _terms_statement(terms)
+    yield _cost_statement(section.cost)
 
 
 def _feasible_statement(terms: IntArray, result: Tangents) -> Statement:
@@ -171,8 +173,8 @@ def _cost_statement(cost: Cost) -> Statement:
     )
 
 
-def tables(section: Section63) -> tuple[PageTable, ...]:
-    """Return the tables of terms and of cost."""
+def tables(section: Section63) -> Iterator[PageTable]:
+    """Yield the tables of terms and of cost."""
     cost, terms = section.cost, section.terms.terms
     microseconds = np.stack([1e6 * cost.residual, 1e6 * cost.tangent], axis=-1)
     cells = [
@@ -182,19 +184,17 @@ def tables(section: Section63) -> tuple[PageTable, ...]:
         )
         for row in zip(cost.entries, microseconds, strict=True)
     ]
-    return (
-        PageTable.of_numbers(
-            "Terms of the tangent: coefficients of dyads of t and n for one slave segment with one virtual slave node "
-            "(segment-to-segment: all of it), by master segments under it",
-            ("Formulation", *MASTERS),
-            [(row.legend, *map(str, counts)) for row, counts in zip(FORMULATIONS, terms.tolist(), strict=True)],
-        ),
-        PageTable(
-            f"Cost for each of {_N_SEGMENTS} slave segments: entries of the tangent; below, measured times of a "
-            "residual and of a tangent on this machine",
-            ("Formulation", *(f"master {head}" for head in MESH_RATIOS)),
-            tuple((Cell((row.legend,)), *its_cells) for row, its_cells in zip(TIMED, cells, strict=True)),
-        ),
+    yield PageTable.of_numbers(
+        "Terms of the tangent: coefficients of dyads of t and n for one slave segment with one virtual slave node "
+        "(segment-to-segment: all of it), by master segments under it",
+        ("Formulation", *MASTERS),
+        [(row.legend, *map(str, counts)) for row, counts in zip(FORMULATIONS, terms.tolist(), strict=True)],
+    )
+    yield PageTable(
+        f"Cost for each of {_N_SEGMENTS} slave segments: entries of the tangent; below, measured times of a "
+        "residual and of a tangent on this machine",
+        ("Formulation", *(f"master {head}" for head in MESH_RATIOS)),
+        tuple((Cell((row.legend,)), *its_cells) for row, its_cells in zip(TIMED, cells, strict=True)),
     )
 
 

@@ -8,6 +8,7 @@ Source: Zavarise & De Lorenzis (2009), Section 7.1.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -67,9 +68,10 @@ def areas_are_best(departure: dict[PaperFormulation, float]) -> bool:
     return departure[NTS_AR] <= min(departure[NTS], departure[TWO_PASS])
 
 
-def statements(section: Section71) -> tuple[Statement, ...]:
+def statements(section: Section71) -> Iterator[Statement]:
     """Compare both claims."""
-    return _quality_statement(section), _material_statement(section)
+    yield _quality_statement(section)
+    yield _material_statement(section)
 
 
 def _quality_statement(section: Section71) -> Statement:
