@@ -37,9 +37,8 @@ def bench_tree(results: BenchResults) -> dict[str, Group]:
     """Return the groups of the file: the root, and `timing`."""
     attributes = {name: text(value) or NONE for name, value in results.provenance.items()}
     attributes |= {"title": TITLE, "bench_schema": BENCH_SCHEMA, "Conventions": "CF-1.11"}
-    attributes |= {
-        "not_loaded": "\n".join(f"{name}: {text(reason)}" for name, reason in results.not_loaded.items()) or NONE
-    }
+    not_loaded = [f"{name}: {text(reason)}" for name, reason in results.not_loaded.items()]
+    attributes["not_loaded"] = "\n".join(not_loaded) or NONE
     return {"/": Group(_labels(results) | _runs(results), attributes), "/timing": _timing(results)}
 
 
@@ -97,15 +96,14 @@ def _labels(results: BenchResults) -> dict[str, Any]:
     """Return the names along the dimensions, and what a cell is."""
     cells = results.cells
     scenes = {scene: number for number, scene in enumerate(dict.fromkeys(cell.scene for cell in cells))}
+    labels, units = ([texts.get(scene, "") for scene in scenes] for texts in (results.labels, results.units))
     return {
         "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
         "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
         "mesh": numbers(["cell"], [cell.mesh for cell in cells], "fineness of the mesh, as the scene counts it", RATIO),
         "stiffness": numbers(["cell"], [cell.stiffness for cell in cells], "penalty in the unit of the scene", RATIO),
-        "scene_label": words(["scene_name"], [results.labels.get(scene, "") for scene in scenes], "what a scene is"),
-        "scene_unit": words(
-            ["scene_name"], [results.units.get(scene, "") for scene in scenes], "unit of penalty; none for itself"
-        ),
+        "scene_label": words(["scene_name"], labels, "what a scene is"),
+        "scene_unit": words(["scene_name"], units, "unit of penalty; none for itself"),
         "slave_segments": numbers(["cell"], results.segments, "number of slave segments", RATIO),
         "unknowns": numbers(["cell"], results.unknowns, "number of unknowns of the scene", RATIO),
         "error_kind": words(["error_kind"], list(ERRORS), "kind of error", "; ".join(map(": ".join, ERRORS.items()))),
@@ -117,17 +115,12 @@ def _runs(results: BenchResults) -> dict[str, Any]:
     remarks = [
         [results.remarks.get((name, cell), "") for cell in range(len(results.cells))] for name in results.formulations
     ]
+    comment = "NaN without a solution, or where nothing is reported"
     outcomes = {outcome.word.replace(" ", "_"): int(outcome) for outcome in Outcome}
     return {
         "outcome": codes(_RUN, results.outcomes, outcomes, "how the run ended"),
         "remark": words(_RUN, remarks, "how the run ended, where it gave no solution"),
-        "error": numbers(
-            [*_RUN, "error_kind"],
-            results.errors,
-            "error",
-            RATIO,
-            "NaN without a solution, or where nothing is reported",
-        ),
+        "error": numbers([*_RUN, "error_kind"], results.errors, "error", RATIO, comment),
         "count": numbers([*_RUN, "count_kind"], results.counts, "count", RATIO),
     }
 
@@ -160,6 +153,7 @@ def _results(root: Group, timing: Group) -> BenchResults:
     unsolved = np.argwhere(outcomes != Outcome.SOLVED).tolist()
     attributes = {str(name): str(value) for name, value in root.attrs.items()}
     not_loaded = attributes["not_loaded"]
+    lines = (line.partition(": ") for line in not_loaded.splitlines())
     structure = ("title", "bench_schema", "Conventions", "not_loaded")
     return BenchResults(
         formulations=formulations,
@@ -175,7 +169,7 @@ def _results(root: Group, timing: Group) -> BenchResults:
         wall=_wall(timing),
         yardstick=timing["yardstick_seconds"].values,
         remarks={(formulations[row], cell): str(remarks[row, cell]) for row, cell in unsolved},
-        not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
+        not_loaded={} if not_loaded == NONE else {name: reason for name, _, reason in lines},
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
 
@@ -191,8 +185,3 @@ def _wall(timing: Group) -> FloatArray:
     nothing = np.full_like(timing["seconds"].values[:, :, -1], np.nan)
     wall: FloatArray = timing["wall_seconds"].values if "wall_seconds" in timing else nothing
     return wall
-
-
-def _split(line: str) -> tuple[str, str]:
-    name, _, reason = line.partition(": ")
-    return name, reason

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -137,15 +139,10 @@ class OutcomeVariables:
         units = {quantity.unit for quantity in quantities}
         unit = units.pop() if len(units) == 1 else "see quantity_units"
         value, tolerance = (self._by_name(names, kind) for kind in ("values", "tolerances"))
+        comment = "made from tolerance_formula; for the side see sense"
         return {
             "value": self._numbers("quantity", value, "measured value", unit, "missing where nothing was measured"),
-            "tolerance": self._numbers(
-                "quantity",
-                tolerance,
-                "tolerance of the value",
-                unit,
-                "made from tolerance_formula; for the side see sense",
-            ),
+            "tolerance": self._numbers("quantity", tolerance, "tolerance of the value", unit, comment),
         }
 
     def _details(self) -> Table:
@@ -174,43 +171,25 @@ class OutcomeVariables:
         """Return what kind of case each is: sizes, penalty, and parameters that are one number."""
         summaries = [None if outcome is None else outcome.summary for outcome in self._outcomes]
 
-        def count(read: Callable[[CaseSummary], int], long_name: str) -> Variable:
-            counts = [-1 if summary is None else read(summary) for summary in summaries]
-            return numbers(self._dims, self._array(counts, np.int32), long_name, "1", fill=-1)
+        def column(
+            read: Callable[[CaseSummary], float], missing: float, long_name: str, unit: str = "1", comment: str = ""
+        ) -> Variable:
+            values = [missing if summary is None else read(summary) for summary in summaries]
+            dtype = np.int32 if missing == -1 else np.float64  # Counts and codes are missing as −1.
+            return numbers(self._dims, self._array(values, dtype), long_name, unit, comment, fill=missing)
 
-        def real(read: Callable[[CaseSummary], float], long_name: str, unit: str) -> Variable:
-            reals = [schema.NOT_MEASURED if summary is None else read(summary) for summary in summaries]
-            return numbers(self._dims, self._array(reals, np.float64), long_name, unit, fill=schema.NOT_MEASURED)
-
-        penalty = "distributed penalty: force per length of the interface, per length of penetration"
-        table = {
-            "n_slave_segments": count(lambda case: case.n_slave_segments, "number of slave segments"),
-            "n_master_segments": count(lambda case: case.n_master_segments, "number of master segments"),
-            "penalty": real(lambda case: case.penalty, penalty, schema.PENALTY),
-            "largest_coordinate": real(
-                lambda case: case.largest_coordinate, "largest coordinate, of state and reference", schema.LENGTH
-            ),
-            "shortest_segment": real(
-                lambda case: case.shortest_segment, "shortest current segment, both sides", schema.LENGTH
-            ),
-        }
+        nothing = schema.NOT_MEASURED
+        table = {name: column(attrgetter(name), -1, meaning) for name, meaning in schema.CASE_COUNTS.items()}
+        table |= {name: column(attrgetter(name), nothing, *words_) for name, words_ in schema.CASE_REALS.items()}
         for name, safe in zip(self._names.parameters, safe_names(self._names.parameters), strict=True):
-
-            def parameter(case: CaseSummary, name: str = name) -> float:
-                return case.parameters.get(name, schema.NOT_MEASURED)
-
+            read, long_name = partial(_parameter, name), f"parameter of the case: {schema.text(name)}"
             unit = schema.PARAMETER_UNITS.get(name, schema.UNKNOWN)
-            table[f"parameter_{safe}"] = real(parameter, f"parameter of the case: {schema.text(name)}", unit)
+            table[f"parameter_{safe}"] = column(read, nothing, long_name, unit)
         if self._names.kinds:
             place = {kind: number for number, kind in enumerate(self._names.kinds)}
-            table["case_kind"] = numbers(
-                self._dims,
-                self._array([place.get(summary.kind, -1) if summary else -1 for summary in summaries], np.int32),
-                "kind of situation of the case",
-                "1",
-                "the index along `kind`; missing where the case is of none",
-                fill=-1,
-            )
+            comment = "the index along `kind`; missing where the case is of none"
+            long_name = "kind of situation of the case"
+            table["case_kind"] = column(lambda case: place.get(case.kind, -1), -1, long_name, "1", comment)
         case_names = ["" if summary is None else summary.name for summary in summaries]
         return table | self._words("case_name", case_names, "name of the case")
 
@@ -236,22 +215,8 @@ class OutcomeVariables:
 def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
     """Return what stands along `quantity`, `detail`, `series` and `kind`: names, units, formulas and reasons."""
     table: Table = {}
-    if quantities := info.quantities:
-        axis = ["quantity"]
-        symbols = (
-            "u: unit roundoff; X, S: largest coordinate, of case and state; ℓ: shortest segment; L, D: length and "
-            "diameter of the interface; N: number of segments; g: penetration"
-        )
-        formulas = [quantity.tolerance for quantity in quantities]
-        table |= {
-            "quantity": words(axis, [quantity.name for quantity in quantities], "name of the measured number"),
-            "quantity_units": words(axis, [quantity.unit for quantity in quantities], "unit of value and tolerance"),
-            "tolerance_formula": words(axis, formulas, "formula of the tolerance", symbols),
-            "tolerance_reason": words(axis, [quantity.reason for quantity in quantities], "reason for that formula"),
-            "sense": words(
-                axis, [quantity.sense for quantity in quantities], "relation of value to tolerance in a pass"
-            ),
-        }
+    for name, (attribute, long_name, comment) in schema.QUANTITY.items() if info.quantities else ():
+        table[name] = words(["quantity"], [getattr(each, attribute) for each in info.quantities], long_name, comment)
     if names.details:
         table["detail"] = words(["detail"], names.details, "name of the further number")
     if info.series:
@@ -270,6 +235,10 @@ def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
 def safe_names(names: Sequence[str] | Mapping[str, Any]) -> list[str]:
     """Return the names as parts of the names of variables, each different."""
     return distinct(map(typeable, names))
+
+
+def _parameter(name: str, case: CaseSummary) -> float:
+    return case.parameters.get(name, schema.NOT_MEASURED)
 
 
 def _state(outcome: Outcome | None) -> int:

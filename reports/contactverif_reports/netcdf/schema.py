@@ -35,37 +35,39 @@ PARTS = ("pair", "tangent", "contact_points")
 
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"
 FORCE, STRESS = "N", "N m-1"  # Forces are per unit of thickness.
-PARAMETER_UNITS: Mapping[str, str] = {
-    "penetration": LENGTH,
-    "along": LENGTH,
-    "direction": RATIO,
-    "cosine": RATIO,
-    "variant": RATIO,
-    "probe_segment": RATIO,
-    "probe_c": RATIO,
-    "approach": LENGTH,
-    "gap": LENGTH,
-    "offset": LENGTH,
-    "shift": LENGTH,
-    "ratio": RATIO,
-    "stiffness": RATIO,
-    "turn": RATIO,
-    "pressure": STRESS,
-    "compliance": "m2 N-1",
-    "bodies_nodes": LENGTH,
-    "bodies_cells": RATIO,
-    "bodies_contact": RATIO,
-    "bodies_fixed": RATIO,
-    "bodies_imposed": LENGTH,
-    "bodies_load": FORCE,
-    "bodies_count": RATIO,
-    "bodies_is_slave": RATIO,
-    "bodies_young": STRESS,
-    "bodies_poisson": RATIO,
-    "bodies_axis": RATIO,
-    "bodies_start": LENGTH,
+_PARAMETERS: Mapping[str, str] = {  # {unit: names of parameters}
+    LENGTH: "penetration along approach gap offset shift bodies_nodes bodies_imposed bodies_start",
+    RATIO: "direction cosine variant probe_segment probe_c ratio stiffness turn bodies_cells bodies_contact "
+    "bodies_fixed bodies_count bodies_is_slave bodies_poisson bodies_axis",
+    FORCE: "bodies_load",
+    STRESS: "pressure bodies_young",
+    "m2 N-1": "compliance",
 }
+PARAMETER_UNITS: Mapping[str, str] = {name: unit for unit, names in _PARAMETERS.items() for name in names.split()}
 
+PENALTY_MEANING = "distributed penalty: force per length of the interface, per length of penetration"
+# The numbers of a `CaseSummary`: {attribute: what it is}, and {attribute: (what it is, unit)}.
+CASE_COUNTS: Mapping[str, str] = {
+    "n_slave_segments": "number of slave segments",
+    "n_master_segments": "number of master segments",
+}
+CASE_REALS: Mapping[str, tuple[str, str]] = {
+    "penalty": (PENALTY_MEANING, PENALTY),
+    "largest_coordinate": ("largest coordinate, of state and reference", LENGTH),
+    "shortest_segment": ("shortest current segment, both sides", LENGTH),
+}
+# The words of a `Quantity`, {variable: (attribute, what it is, comment)}.
+_SYMBOLS = (
+    "u: unit roundoff; X, S: largest coordinate, of case and state; ℓ: shortest segment; L, D: length and "
+    "diameter of the interface; N: number of segments; g: penetration"
+)
+QUANTITY: Mapping[str, tuple[str, str, str]] = {
+    "quantity": ("name", "name of the measured number", ""),
+    "quantity_units": ("unit", "unit of value and tolerance", ""),
+    "tolerance_formula": ("tolerance", "formula of the tolerance", _SYMBOLS),
+    "tolerance_reason": ("reason", "reason for that formula", ""),
+    "sense": ("sense", "relation of value to tolerance in a pass", ""),
+}
 # The words of a `Finding`, {attribute: (variable, what it is)}.
 FINDING: Mapping[str, tuple[str, str]] = {
     "place": ("place", "place of the worst number, such as a row and a column of the tangent"),

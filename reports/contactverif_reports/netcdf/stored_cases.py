@@ -25,18 +25,13 @@ _FOLDER = f"/{schema.NAMED_CASES}"
 _PREFIX = "bodies_"
 _OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
 _OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (2,), "start": (2,)}
-_PENALTY = "distributed penalty: force per length of the interface, per length of penetration"
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
 _ARRAYS = {  # {array: (dimensions, long name, unit)}
     "nodes": (("node", "dim"), "reference positions, slave nodes first", schema.LENGTH),
     "slave_segments": (("slave_segment", "two"), "first and second node of each slave segment", "1"),
     "master_segments": (("master_segment", "two"), "first and second node of each master segment", "1"),
     "z": (("unknown",), "current positions, flat: x and y of each node in turn", schema.LENGTH),
-    "penalty": (
-        (),
-        "distributed penalty: force per length of the interface, per length of penetration",
-        schema.PENALTY,
-    ),
+    "penalty": ((), schema.PENALTY_MEANING, schema.PENALTY),
     "seed": ((), "seed of anything random that the property does with the case", "1"),
     "name": ((), "name of the case, empty if it has none", ""),
     "kind": ((), "kind of situation of the case, empty if it has none", ""),

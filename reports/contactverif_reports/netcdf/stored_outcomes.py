@@ -19,9 +19,8 @@ from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group
 from contactverif_reports.netcdf.outcome_variables import safe_names
 
-_REALS = ("penalty", "largest_coordinate", "shortest_segment")
 # The kind of numpy's types of each variable; all others hold reals.
-_KINDS = dict.fromkeys(("verdict", "state", "n_slave_segments", "n_master_segments", "case_kind"), "i")
+_KINDS = dict.fromkeys(("verdict", "state", *schema.CASE_COUNTS, "case_kind"), "i")
 _TEXTS = ("reason", "undecided", "broken", *(name for name, _ in schema.FINDING.values()))
 _KINDS |= dict.fromkeys((*_TEXTS, "case_name"), "U")
 
@@ -84,8 +83,8 @@ class OutcomeArrays:
         self._parameters = self._dataset.labels("parameter")
         if not self._dims:  # The whole case of a single outcome stands elsewhere.
             return
-        self._counts = np.column_stack([self._read("n_slave_segments"), self._read("n_master_segments")])
-        columns = (*_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
+        self._counts = np.column_stack([self._read(name) for name in schema.CASE_COUNTS])
+        columns = (*schema.CASE_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
         self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
         self._case_names = self._read("case_name") if self._has("case_name") else None
         self._kinds = [*self._dataset.labels("kind"), ""]  # A case of none has the code −1, which is the last.
@@ -199,7 +198,7 @@ class StoredOutcomes(Sequence[Outcome]):
 
 def read_info(dataset: Group) -> PropertyInfo:
     """Return the property of a group."""
-    columns = ("quantity", "tolerance_formula", "tolerance_reason", "quantity_units", "sense")
+    columns = {attribute: dataset.words(name) for name, (attribute, _, _) in schema.QUANTITY.items()}
     needs = str(dataset.attrs["needs"])
     dataset.labels("quantity")
     strangers = set(dataset.words("sense")) - {"at most", "at least"}
@@ -209,10 +208,7 @@ def read_info(dataset: Group) -> PropertyInfo:
         str(dataset.attrs["property_id"]),
         str(dataset.attrs["family"]),
         str(dataset.attrs["summary"]),
-        tuple(
-            Quantity(*words, unit=unit, sense=sense)
-            for *words, unit, sense in zip(*(dataset.words(name) for name in columns), strict=True)
-        ),
+        tuple(Quantity(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
         series=dict(zip(dataset.labels("series"), dataset.words("series_units"), strict=True)),
         kinds=tuple(dataset.labels("kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),

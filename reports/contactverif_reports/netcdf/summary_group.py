@@ -189,30 +189,25 @@ def _closest(grid: _Grid) -> Table:
     def each(read: Callable[[ClosestNumber], Any], missing: Any) -> list[list[Any]]:
         return grid.each(lambda row: missing if row.closest is None else read(row.closest), missing)
 
-    units = {unit for line in each(lambda closest: closest.number.quantity.unit, "") for unit in line} - {""}
+    name_of_each = each(lambda closest: closest.number.quantity.name, "")
+    unit_of_each = each(lambda closest: closest.number.quantity.unit, "")
+    units = {unit for line in unit_of_each for unit in line} - {""}
     unit = units.pop() if len(units) == 1 else "see closest_units" if units else schema.RATIO
     cases = each(lambda closest: schema.NO_CASE if closest.case is None else closest.case, schema.NO_CASE)
-    missing = schema.NOT_MEASURED
+
+    def real(read: Callable[[ClosestNumber], float], long_name: str, comment: str = "") -> Variable:
+        missing = schema.NOT_MEASURED
+        return numbers(_ROW, each(read, missing), long_name, unit, comment, fill=missing)
+
     return {
-        "closest_value": numbers(
-            _ROW,
-            each(lambda closest: closest.number.value, missing),
+        "closest_value": real(
+            lambda closest: closest.number.value,
             "number nearest to its tolerance, or furthest beyond it",
-            unit,
             "missing where nothing was measured",
-            fill=missing,
         ),
-        "closest_tolerance": numbers(
-            _ROW,
-            each(lambda closest: closest.number.tolerance, missing),
-            "tolerance of closest_value",
-            unit,
-            fill=missing,
-        ),
-        "closest_quantity": words(
-            _ROW, each(lambda closest: closest.number.quantity.name, ""), "name of closest_value"
-        ),
-        "closest_units": words(_ROW, each(lambda closest: closest.number.quantity.unit, ""), "unit of closest_value"),
+        "closest_tolerance": real(lambda closest: closest.number.tolerance, "tolerance of closest_value"),
+        "closest_quantity": words(_ROW, name_of_each, "name of closest_value"),
+        "closest_units": words(_ROW, unit_of_each, "unit of closest_value"),
         "closest_case": numbers(
             _ROW,
             np.array(cases, dtype=np.int32),
