@@ -31,22 +31,15 @@ FORMULATIONS = (VTS_ME, VTS_PPT, BALANCED, STS)
 _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses a node, up to θ = 0.5.
 
 
-def tilted_pair(theta: float, master: Sequence[float]) -> tuple[Interface, FloatArray]:
-    """Return the interface and its positions (n_nodes, 2) at a tilt in radians.
+def nodal_forces(formulation: PaperFormulation, theta: float, master: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Return positions and forces, both (n_nodes, 2), slave nodes first, at a tilt in radians.
 
     The slave has unit length and begins at x = 0; `master` is the ascending x of the master's nodes.
     """
     chain = np.column_stack([master[::-1], np.zeros(len(master))])
-    reference = np.array([[0.0, 0.0], [1.0, 0.0]])
-    slave = np.array([[0.0, -DEPTH], [np.cos(theta), -DEPTH - np.sin(theta)]])
-    return Interface.from_chains(reference, chain), np.vstack([slave, chain])
-
-
-def nodal_forces(formulation: PaperFormulation, theta: float, master: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Return positions and forces, both (n_nodes, 2), slave nodes first."""
-    interface, x = tilted_pair(theta, master)
-    plugin = subject_of(formulation).with_penalty(_PENALTY)
-    z = x.reshape(-1)
+    interface = Interface.from_chains(np.array([[0.0, 0.0], [1.0, 0.0]]), chain)
+    x = np.vstack([[0.0, -DEPTH], [np.cos(theta), -DEPTH - np.sin(theta)], chain])
+    plugin, z = subject_of(formulation).with_penalty(_PENALTY), x.reshape(-1)
     forces: FloatArray = -plugin.residual(interface, plugin.pair(interface, z), z).reshape(-1, 2)
     return x, forces
 

@@ -25,6 +25,7 @@ from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_sty
 from contactverif_paper.paper_columns import Column, Formulations, variables_of
 from contactverif_paper.paper_formulations import NTS_AR, VTS_G, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
+from contactverif_paper.patch_plots import edges_of
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group
@@ -185,10 +186,8 @@ def mesh_lines(body: Body, box: FloatArray, tolerance: float) -> list[FloatArray
     """
     corners = body.nodes[body.cells]
     inside = (corners.max(axis=1) >= box[0]).all(axis=1) & (corners.min(axis=1) <= box[1]).all(axis=1)
-    cells = body.cells[inside]
-    pairs = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges = np.unique(np.sort(pairs, axis=1), axis=0)
-    return [thin_out(body.nodes[chain], tolerance) for chain in _chains(body.nodes, edges)]
+    chains = _chains(body.nodes, edges_of(body.cells[inside]))
+    return [thin_out(body.nodes[chain], tolerance) for chain in chains]
 
 
 def thin_out(points: FloatArray, tolerance: float) -> FloatArray:

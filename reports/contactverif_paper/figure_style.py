@@ -7,7 +7,7 @@ so that they read in grey; a formulation has the same pen in every figure. Axes 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -117,8 +117,7 @@ def plot_series(axes: Axes, series: Series, *, markers: bool = True) -> None:
 
 def plot_logarithmic(axes: Axes, series: Series) -> None:
     """Plot each row over a logarithmic axis; zeros are drawn at its lower end."""
-    for formulation, values in zip(series.formulations, series.values, strict=True):
-        axes.plot(series.at, np.maximum(values, _LOWEST), **line_style(formulation, 1))
+    plot_series(axes, replace(series, values=np.maximum(series.values, _LOWEST)))
     use_decades(axes)
 
 

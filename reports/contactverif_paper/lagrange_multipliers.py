@@ -21,6 +21,7 @@ from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
+from contactverif_paper.inf_sup_condition import DUAL, MORTAR, NTS, TWO_PASS, VTS_PPT
 from contactverif_paper.paper_columns import WORDS, Column, variables_of
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
@@ -28,12 +29,7 @@ from contactverif_paper.patch_solutions import PRINTED_COLUMN
 from contactverif_reports.html.pages import number
 from contactverif_reports.netcdf.groups import Group
 
-NTS = PaperFormulation("NTS", "nts-lm")
-TWO_PASS = PaperFormulation("two-pass NTS", "two-pass/nts-lm")
 VTS_ME = PaperFormulation("VTS-ME", "vts-me-lm")
-VTS_PPT = PaperFormulation("VTS-PPT", "vts-ppt-lm")
-MORTAR = PaperFormulation("mortar", "mortar-lm")
-DUAL = PaperFormulation("dual mortar", "mortar-dual-lm")
 FORMULATIONS = (NTS, TWO_PASS, VTS_ME, VTS_PPT, MORTAR, DUAL)
 
 EIGHT_ON_TWO, REFINED = "eight on two", "C with halved cells"

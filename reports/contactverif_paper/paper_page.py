@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -26,19 +27,12 @@ from contactverif_reports.netcdf.write_tree import write_tree
 TITLE = "contactverif: the reference paper, computed again"
 REFERENCE = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"
 NUMBERS, PAGE = "paper.nc", "paper.html"
-MARKS: Mapping[Agreement, str] = {
-    Agreement.AGREES: "✓",
-    Agreement.DIFFERS: "✗",
-    Agreement.SILENT: "–",
-    Agreement.DEFECT: "!",
-    Agreement.CONDITIONAL: "(✓)",
-}
-CLASSES: Mapping[Agreement, str] = {
-    Agreement.AGREES: "good",
-    Agreement.DIFFERS: "bad",
-    Agreement.SILENT: "soft",
-    Agreement.DEFECT: "warn",
-    Agreement.CONDITIONAL: "warn",
+LOOKS: Mapping[Agreement, tuple[str, str]] = {  # {verdict: (mark, CSS class)}
+    Agreement.AGREES: ("✓", "good"),
+    Agreement.DIFFERS: ("✗", "bad"),
+    Agreement.SILENT: ("–", "soft"),
+    Agreement.DEFECT: ("!", "warn"),
+    Agreement.CONDITIONAL: ("(✓)", "warn"),
 }
 
 
@@ -99,12 +93,8 @@ def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
         paper=paper,
         figures=figures,
         agreements=Agreement,
-        marks_of=MARKS,
-        class_of=CLASSES,
-        counts={
-            agreement: sum(statement.agreement is agreement for statement in paper.statements)
-            for agreement in Agreement
-        },
+        look_of=LOOKS,
+        counts=Counter(statement.agreement for statement in paper.statements),
         statements_of={figure.name: statements_of(paper, figure.name) for figure in paper.figures},
         lone_statements_of={result.item.name: lone_statements(result) for result in paper.results},
         reference=REFERENCE,
@@ -129,7 +119,8 @@ def summary(paper: Paper) -> str:
 
 
 def _line(statement: Statement) -> str:
-    verdict = f"{MARKS[statement.agreement]:3} {statement.agreement.words:17}"
+    mark, _ = LOOKS[statement.agreement]
+    verdict = f"{mark:3} {statement.agreement.words:17}"
     condition = f". It holds if: {statement.condition}" if statement.condition else ""
     return f"  {verdict} {statement.place}: {statement.result}{condition}"
 

@@ -13,7 +13,7 @@ from typing import Any
 from contactverif.run.provenance import collect_provenance
 from contactverif.run.scheduler import Job, Scheduler
 from contactverif_paper.items import ITEMS
-from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress, steps_of
+from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress
 
 
 def compute(
@@ -32,7 +32,7 @@ def compute(
 
 def steps(*, with_study: bool = True, items: tuple[Item, ...] = ITEMS) -> int:
     """Return how many times `compute` and `write` together report progress."""
-    return steps_of(_select(items, with_study=with_study))
+    return sum(item.n_steps + len(item.figures) for item in _select(items, with_study=with_study))
 
 
 def _select(items: tuple[Item, ...], *, with_study: bool) -> tuple[Item, ...]:

@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif_paper.figure_style import (
     LETTERS,
@@ -96,7 +96,8 @@ def plot_meshes(patches: Sequence[PatchSolution]) -> Figure:
     axes = figure.subplots()
     axes.set_axis_off()
     for body in patches[0].solved.bodies:
-        axes.add_collection(LineCollection(list(_edges(body)), colors="0.35", linewidths=0.7, zorder=2))
+        edges = list(body.nodes[edges_of(body.cells)])
+        axes.add_collection(LineCollection(edges, colors="0.35", linewidths=0.7, zorder=2))
         _draw_contact(axes, body)
         _draw_load(axes, body)
     axes.set_aspect("equal")
@@ -120,11 +121,10 @@ def _above_and_below(lines: list[str]) -> list[str]:
     return [f"above: {lines[0]}", f"below: {lines[1]}"] if len(lines) == 2 else lines
 
 
-def _edges(body: Body) -> FloatArray:
-    """Return the ends (n_edges, 2, 2) of the edges of a body's cells, each once."""
-    pairs = np.stack([body.cells, np.roll(body.cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges: FloatArray = body.nodes[np.unique(np.sort(pairs, axis=1), axis=0)]
-    return edges
+def edges_of(cells: IntArray) -> IntArray:
+    """Return the nodes (n_edges, 2) of the edges of some cells, each edge once."""
+    pairs = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def _draw_contact(axes: Axes, body: Body) -> None:

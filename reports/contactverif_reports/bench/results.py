@@ -118,12 +118,6 @@ class BenchResults:
         least: FloatArray = self.seconds.min(axis=-1)
         return least
 
-    @property
-    def medians(self) -> FloatArray:
-        """The median time (n_formulations, n_cells, n_parts) of all repeats, in seconds."""
-        middle: FloatArray = np.median(self.seconds, axis=-1)
-        return middle
-
     def times(self, formulation: str, part: str = "total") -> FloatArray:
         """Return the least time (n_cells,) of a part, in seconds; infinite where there is no solution."""
         row = self.formulations.index(formulation)

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Surface
-from contactverif_reports.draw.case_geometry import Course, Gaps
+from contactverif_reports.draw.case_geometry import Course, Gaps, segment_lengths
 from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.plain_labels import save_plainly
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
@@ -36,7 +35,7 @@ def make_case_figure(
     """Return the figure of a case: both surfaces, the hatched bodies and the forces, as `draw_case` does."""
     course, gaps = Course.from_case(case), Gaps.from_case(case)
     with_forces = forces is not None or exact is not None
-    lengths = _lengths(case)
+    lengths = segment_lengths(case)
     unit, unit_name = unit_of(np.concatenate(lengths))
     positions, change = _positions_to_draw(case, gaps, course.roundoff, with_forces)
     positions = positions / unit
@@ -44,7 +43,8 @@ def make_case_figure(
     figure, axes = _empty_figure(positions, width, margin=(_BODY + _ARROW * with_forces) * size)
     # Labels are legible on the side of the other body, where nothing is hatched.
     side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0
-    for surface, pen, its_lengths in zip(_surfaces(case)[::-1], (MASTER, SLAVE), lengths[::-1], strict=True):
+    surfaces = (case.interface.master, case.interface.slave)
+    for surface, pen, its_lengths in zip(surfaces, (MASTER, SLAVE), lengths[::-1], strict=True):
         labels = [format_number(length, course.roundoff / unit) for length in (its_lengths / unit).tolist()]
         draw_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
     draw_arrows(axes, positions, forces, exact, longest=_ARROW * size)
@@ -57,16 +57,6 @@ def make_case_figure(
     lines = [*textwrap.wrap(title, 92), ", ".join(notes)]
     axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
     return figure
-
-
-def _surfaces(case: Case) -> tuple[Surface, Surface]:
-    """Return the slave and the master surface."""
-    return case.interface.slave, case.interface.master
-
-
-def _lengths(case: Case) -> list[FloatArray]:
-    """Return the lengths of the segments, of the slave and of the master."""
-    return [surface.lengths(case.positions) for surface in _surfaces(case)]
 
 
 def _empty_figure(positions: FloatArray, width: float, *, margin: float) -> tuple[Figure, Axes]:

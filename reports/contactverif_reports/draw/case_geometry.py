@@ -101,6 +101,11 @@ class Gaps:
         return bool(len(gap) and np.ptp(gap) <= max(roundoff, 1e-9 * np.abs(gap).max()))
 
 
+def segment_lengths(case: Case) -> list[FloatArray]:
+    """Return the current lengths of the segments, of the slave and of the master."""
+    return [surface.lengths(case.positions) for surface in (case.interface.slave, case.interface.master)]
+
+
 def _chords(surface: Surface, positions: FloatArray) -> FloatArray:
     """Return vectors (n_segments, 2) from first to second node."""
     chords: FloatArray = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]

@@ -7,7 +7,7 @@ import textwrap
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif_reports.draw.case_geometry import Course, Gaps
+from contactverif_reports.draw.case_geometry import Course, Gaps, segment_lengths
 from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.raster import draw_raster
 from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, draw_strips
@@ -30,8 +30,7 @@ def as_text(case: Case, width: int = 72) -> str:
     """
     width = max(width, 60)
     course, gaps = Course.from_case(case), Gaps.from_case(case)
-    surfaces = case.interface.slave, case.interface.master
-    unit, unit_name = unit_of(np.concatenate([surface.lengths(case.positions) for surface in surfaces]))
+    unit, unit_name = unit_of(np.concatenate(segment_lengths(case)))
     if course.nearly_flat:
         picture, note = draw_strips(case, course, unit, width)
     else:

@@ -7,7 +7,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
-from contactverif_reports.draw.case_geometry import Course
+from contactverif_reports.draw.case_geometry import Course, segment_lengths
 from contactverif_reports.draw.lengths import unit_of
 from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, draw_strips
 
@@ -23,8 +23,8 @@ def blocks_as_text(case: Case, slave: Body, master: Body, width: int = 72) -> st
     Loads on the slave, and on the master beside it, are a row of arrows; a rigid master is hatched.
     """
     course = Course.from_case(case)
-    lengths = [side.lengths(case.positions) for side in (case.interface.slave, case.interface.master)]
-    rows, note = draw_strips(case, course, unit_of(np.concatenate(lengths))[0], max(width, 40))
+    unit, _ = unit_of(np.concatenate(segment_lengths(case)))
+    rows, note = draw_strips(case, course, unit, max(width, 40))
     upper, lower = (row[_LABEL:] for row in rows[1:3])
     top = _box(upper, SLAVE_NODE, "slave", ("┌", "┐"))
     if (slave.load != 0).any() or (slave.imposed != 0).any():
