@@ -67,7 +67,8 @@ class ChenHisada:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
-        cells, ends = _carrying(interface, pairing, len(self.quadrature))
+        cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
+        ends = interface.slave.segments[np.repeat(cells.slave, len(self.quadrature))]
         points = self.quadrature.points(interface, cells, x)
         pressure = self._node_pressures(interface, pairing, x)[:, ends]  # (n_states, n_points, 2)
         c = points[..., C]
@@ -111,12 +112,6 @@ class ChenHisada:
         """Return pressures (n_states, n_slave_nodes) at positions x (n_states, n_nodes, 2)."""
         gaps = _node_gaps(x, interface.master.segments, pairing["nearest"])
         return np.where(pairing["active"], -self.penalty * gaps, 0.0)
-
-
-def _carrying(interface: Interface, pairing: Pairing, n_q: int) -> tuple[Cells, IntArray]:
-    """Return the cells whose slave segment has an active node, and the slave nodes (n_points, 2) of their points."""
-    cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
-    return cells, interface.slave.segments[np.repeat(cells.slave, n_q)]
 
 
 def _couple(interface: Interface, cells: Cells, facing: IntArray) -> Couplings:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from math import floor, log10
 from pathlib import Path
 
 import matplotlib
@@ -15,7 +14,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.draw.case_geometry import Course, Gaps, segment_lengths
-from contactverif_reports.draw.lengths import format_number, unit_of
+from contactverif_reports.draw.lengths import format_number, one_digit, unit_of
 from contactverif_reports.draw.plain_labels import save_plainly
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
 from contactverif_reports.files import whole
@@ -30,7 +29,7 @@ _SHORT = 0.04  # The length of a segment that is shorter is written below the ti
 
 
 def make_case_figure(
-    case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
+    case: Case, *, title: str = "", forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
 ) -> Figure:
     """Return the figure of a case: both surfaces, the hatched bodies and the forces, as `draw_case` does."""
     course, gaps = Course.from_case(case), Gaps.from_case(case)
@@ -89,9 +88,7 @@ def magnification(gap: FloatArray, roundoff: float, size: float) -> float:
     largest = float(np.abs(gap).max())
     if largest <= roundoff * 1e-3 or largest >= _VISIBLE_GAP * size:
         return 1.0
-    factor = _VISIBLE_GAP * size / largest
-    power = 10.0 ** floor(log10(factor))
-    return max(1.0, round(factor / power) * power)
+    return max(1.0, one_digit(_VISIBLE_GAP * size / largest))
 
 
 def _gap_note(gaps: Gaps, roundoff: float) -> str:

@@ -22,6 +22,12 @@ def format_number(value: float, slack: float = 0.0, digits: int = 4) -> str:
     return min(texts, key=len, default=_decimal(value, digits))
 
 
+def one_digit(value: float) -> float:
+    """Round to one significant digit."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return float(f"{round(value / power) * power:.3g}")
+
+
 def unit_of(lengths: FloatArray) -> tuple[float, str]:
     """Return a power of two as unit of the lengths, and its name; 1 and no name if they are of everyday size."""
     shortest, longest = float(np.min(lengths)), float(np.max(lengths))

@@ -6,7 +6,6 @@ A contact that is small against the bodies is drawn enlarged, and beside it all 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor, log10
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,6 +18,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif_reports.draw.case_geometry import Gaps
+from contactverif_reports.draw.lengths import one_digit
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene, pressures_across
 
 # Lengths as shares of the size of the scene.
@@ -51,9 +51,9 @@ class Magnification:
         roundoff = 64 * UNIT_ROUNDOFF * solved.case.largest_coordinate
         if (box := close_up(solved)) is not None:
             deep = max(-float(_gaps(solved, solution.z).gap.min()) for solution in solutions)
-            return cls(1.0, 1.0 if deep <= roundoff else _one_digit(_VISIBLE_GAP * float(np.ptp(box[:, 0])) / deep))
-        move = 1.0 if moves <= roundoff else _one_digit(_VISIBLE_MOVE * solved.size / moves)
-        return cls(move, 1.0 if gaps <= roundoff else _one_digit(_VISIBLE_GAP * solved.size / gaps))
+            return cls(1.0, 1.0 if deep <= roundoff else one_digit(_VISIBLE_GAP * float(np.ptp(box[:, 0])) / deep))
+        move = 1.0 if moves <= roundoff else one_digit(_VISIBLE_MOVE * solved.size / moves)
+        return cls(move, 1.0 if gaps <= roundoff else one_digit(_VISIBLE_GAP * solved.size / gaps))
 
     @property
     def words(self) -> str:
@@ -234,9 +234,3 @@ def _draw_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: F
             list(quads), facecolor="white", edgecolor="black", linewidth=0, hatch="xxxxxx", alpha=0.55, zorder=4
         )
     )
-
-
-def _one_digit(value: float) -> float:
-    """Round to one significant digit."""
-    power = 10.0 ** floor(log10(value))
-    return float(f"{round(value / power) * power:.3g}")

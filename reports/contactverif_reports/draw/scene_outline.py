@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
+from contactverif_reports.draw.case_figure import make_case_figure
 from contactverif_reports.draw.strokes import MASTER, SLAVE
 
 _BODIES = "bodies_"
@@ -25,6 +26,15 @@ _SUPPORT = 0.02  # Half the length of the mark of a support, as a share of the s
 def has_outline(case: Case) -> bool:
     """Return whether the case holds bodies."""
     return f"{_BODIES}nodes" in case.parameters
+
+
+def make_mesh_figure(
+    case: Case, width: float, *, forces: FloatArray | None = None, exact: FloatArray | None = None
+) -> Figure:
+    """Return the figure of a case: its bodies, if it holds any, else its interface with forces."""
+    if has_outline(case):
+        return make_outline_figure(case, width)
+    return make_case_figure(case, forces=forces, exact=exact, width=width)
 
 
 def make_outline_figure(case: Case, width: float) -> Figure:
@@ -74,13 +84,7 @@ def _draw_cells(axes: Axes, cells: IntArray, nodes: FloatArray, is_slave: Any) -
 def _draw_surfaces(axes: Axes, contact: IntArray, nodes: FloatArray, is_slave: Any, rigid: Any) -> None:
     for pen, side in ((MASTER, False), (SLAVE, True)):
         edges = contact[is_slave[contact[:, 0]] == side]
-        few = len(edges) <= 30
-        look: dict[str, Any] = {
-            "color": pen.color,
-            "marker": pen.marker,
-            "markerfacecolor": pen.fill,
-            "markersize": 4.5 if few else 2,
-        }
+        look = pen.marks(4.5 if len(edges) <= 30 else 2)
         axes.add_collection(
             LineCollection(list(nodes[edges]), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3)
         )

@@ -29,20 +29,18 @@ class Pen:
     fill: str
     hatch: str
 
+    def marks(self, size: float) -> dict[str, Any]:
+        """Return the arguments of a plot that draws nodes of that size in points."""
+        return {"color": self.color, "marker": self.marker, "markerfacecolor": self.fill, "markersize": size}
+
 
 SLAVE = Pen("slave", "black", "solid", "o", "black", "///")
 MASTER = Pen("master", "0.4", "dashed", "s", "white", "\\\\\\")
 
 
+_BROAD = {"width": 0.010, "headwidth": 2.2, "headlength": 2.4, "headaxislength": 2.4}
 _ARROWS: dict[str, dict[str, Any]] = {
-    "exact": {
-        "color": "0.72",
-        "width": 0.010,
-        "headwidth": 2.2,
-        "headlength": 2.4,
-        "headaxislength": 2.4,
-        "label": "exact force",
-    },
+    "exact": {"color": "0.72", "label": "exact force", **_BROAD},
     "formulation": {"color": "black", "width": 0.003, "label": "force of the formulation"},
 }
 
@@ -63,12 +61,7 @@ def draw_surface(
     )
     axes.add_collection(LineCollection(list(ends), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3))
     few = len(surface.nodes) <= _NUMBERED
-    marks: dict[str, Any] = {
-        "color": pen.color,
-        "marker": pen.marker,
-        "markerfacecolor": pen.fill,
-        "markersize": 5.5 if few else 3,
-    }
+    marks = pen.marks(5.5 if few else 3)
     axes.plot(*nodes[surface.nodes].T, linestyle="none", zorder=4, **marks)
     axes.plot([], [], linestyle=pen.style, label=f"{pen.name} (body hatched {pen.hatch[0]})", **marks)
     size = float(np.ptp(nodes, axis=0).max())
@@ -114,16 +107,8 @@ def _write_sizes(axes: Axes, nodes: FloatArray, forces: list[FloatArray], scale:
         tip, reach = at_node[int(np.argmax(sizes))], max(sizes)
         if reach > 0:
             words = _size_in_words(sizes[-1], sizes[0], slack)
-            lines = 1 + words.count("\n")
-            _write(
-                axes,
-                words,
-                nodes[node] + tip * scale,
-                (3 + 4 * lines) * tip / reach,
-                fontsize=7,
-                color="black",
-                zorder=7,
-            )
+            offset = (3 + 4 * (1 + words.count("\n"))) * tip / reach
+            _write(axes, words, nodes[node] + tip * scale, offset, fontsize=7, color="black", zorder=7)
 
 
 def _size_in_words(size: float, exact: float, slack: float) -> str:

@@ -162,12 +162,8 @@ def _case_figure(case: Case, forces: FloatArray | None, exact: FloatArray | None
     """Return the figure of a case: its bodies, or its interface with forces."""
     import matplotlib  # Importing it is slow.
 
-    from contactverif_reports.draw.case_figure import make_case_figure
-    from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
+    from contactverif_reports.draw.scene_outline import make_mesh_figure
 
-    if has_outline(case):
-        return svg_inline(make_outline_figure(case, _FIGURE_WIDTH), label)
     with matplotlib.rc_context({"legend.fontsize": _LEGEND_SIZE}):
         beside = exact if forces is not None else None  # The exact multipliers are not known.
-        figure = make_case_figure(case, title="", forces=forces, exact=beside, width=_FIGURE_WIDTH)
-    return svg_inline(figure, label)
+        return svg_inline(make_mesh_figure(case, _FIGURE_WIDTH, forces=forces, exact=beside), label)

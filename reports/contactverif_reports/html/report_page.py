@@ -171,19 +171,13 @@ def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
     """Return {id: figure} of as many counterexamples as are drawn."""
     if not examples:
         return {}
-    from contactverif_reports.draw.case_figure import make_case_figure  # Importing matplotlib is slow.
-    from contactverif_reports.draw.scene_outline import has_outline, make_outline_figure
+    from contactverif_reports.draw.scene_outline import make_mesh_figure  # Importing matplotlib is slow.
 
     ids = sorted(examples, key=lambda id_: not examples[id_].row.unexpected)
     figures = {}
     for id_ in ids[:MOST_FIGURES]:
         case = examples[id_].case
-        figure = (
-            make_outline_figure(case, _WIDTH)
-            if has_outline(case)
-            else make_case_figure(case, title="", forces=None, exact=None, width=_WIDTH)
-        )
-        figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
+        figures[id_] = svg_inline(make_mesh_figure(case, _WIDTH), as_text(case).splitlines()[0])
     return figures
 
 

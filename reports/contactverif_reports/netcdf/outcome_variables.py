@@ -116,10 +116,7 @@ class OutcomeVariables:
         for attribute, (name, long_name) in schema.FINDING.items():
             table |= self._words(name, [getattr(finding, attribute) for finding in findings], long_name)
         for name in ("found", "right") if self._names.n_components else ():
-            values = np.full((len(findings), self._names.n_components), schema.NOT_MEASURED)
-            for row, finding in zip(values, findings, strict=True):
-                numbers_there = getattr(finding, name)
-                row[: len(numbers_there)] = numbers_there
+            values = _pad([getattr(finding, name) for finding in findings], self._names.n_components)
             comment = "at the place; missing behind the last one"
             table[name] = self._numbers("component", values, f"numbers: {name}", "see finding_unit", comment)
         return table
@@ -158,10 +155,8 @@ class OutcomeVariables:
         if not self._names.n_iterates:
             return table
         for name, safe in zip(self._info.series, safe_names(self._info.series), strict=True):
-            values = np.full((len(self._outcomes), self._names.n_iterates), schema.NOT_MEASURED)
-            for number, measurement in enumerate(self._measurements):
-                series = measurement.series.get(name, ()) if measurement is not None else ()
-                values[number, : len(series)] = series
+            series = [measurement.series.get(name, ()) if measurement else () for measurement in self._measurements]
+            values = _pad(series, self._names.n_iterates)
             long_name = f"{schema.text(name)} at each iterate"
             unit = self._info.series[name]
             table[f"series_{safe}"] = self._numbers("iterate", values, long_name, unit, "missing behind the last one")
@@ -235,6 +230,14 @@ def coordinates(info: PropertyInfo, names: SharedNames) -> Table:
 def safe_names(names: Sequence[str] | Mapping[str, Any]) -> list[str]:
     """Return the names as parts of the names of variables, each different."""
     return distinct(map(typeable, names))
+
+
+def _pad(rows: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:
+    """Return rows of numbers as an array (n_rows, width)."""
+    values = np.full((len(rows), width), schema.NOT_MEASURED)
+    for padded, row in zip(values, rows, strict=True):
+        padded[: len(row)] = row
+    return values
 
 
 def _parameter(name: str, case: CaseSummary) -> float:
