@@ -97,6 +97,11 @@ def statements(result: Jump) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "defect-jump",
+    "(a) The force that reaches the master while the end of an area of competence slides past a master node, "
+    "and (b) the largest jump of a nodal force there.",
+)
 def plot(result: Jump) -> Figure:
     """Draw the transmitted force beside the node, and the jump over the tilt."""
     figure, (sliding, jump) = new_panels(3.6, 2)
@@ -136,12 +141,5 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     attributes={"tilt_of_transmitted": SLIDING_TILT},
-    figures=(
-        PaperFigure(
-            "defect-jump",
-            "(a) The force that reaches the master while the end of an area of competence slides past a master node, "
-            "and (b) the largest jump of a nodal force there.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
 )

@@ -79,6 +79,10 @@ def statements(imbalance: Imbalance) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "defect-tilt",
+    "(a) Force and (b) moment that are lost between slave and master when the slave is tilted.",
+)
 def plot(imbalance: Imbalance) -> Figure:
     """Draw both losses over the tilt."""
     figure, (force, moment) = new_panels(3.6, 2)
@@ -107,13 +111,7 @@ ITEM = Item(
     title="Defect 1: action is not reaction under tilt",
     compute=compute,
     statements=statements,
-    figures=(
-        PaperFigure(
-            "defect-tilt",
-            "(a) Force and (b) moment that are lost between slave and master when the slave is tilted.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     text="No case of the paper shows it: slave and master are parallel in contact, or nearly so on the disk. "
     "vts-ppt-balanced hands the master what the slave has, in proportion to Box 3.",
 )

@@ -128,6 +128,11 @@ def tables(example: Example2) -> Iterator[PageTable]:
     )
 
 
+@PaperFigure.define(
+    "fig37",
+    "Example 2: (a) the meshes of the disk (black) and of the foundation (blue, 160 × 30 elements); (b) "
+    "close-up of the contact zone. The paper draws them and prints no coordinates: the grading is ours.",
+)
 def plot_meshes(example: Example2) -> Figure:
     """Draw all of the meshes, and the contact zone from near."""
     figure, (whole, near) = new_panels(5.0, 2)
@@ -139,6 +144,10 @@ def plot_meshes(example: Example2) -> Figure:
     return figure
 
 
+@PaperFigure.define(
+    "fig38",
+    "Example 2: (a) contact pressure; (b) close-up of its middle. Pressures are negative, as in the paper.",
+)
 def plot_pressures(example: Example2) -> Figure:
     """Draw the pressures on the paper's axes, where they are negative."""
     figure, panels = new_panels(3.9, 2)
@@ -257,19 +266,7 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     datasets=datasets,
-    figures=(
-        PaperFigure(
-            "fig37",
-            "Example 2: (a) the meshes of the disk (black) and of the foundation (blue, 160 × 30 elements); (b) "
-            "close-up of the contact zone. The paper draws them and prints no coordinates: the grading is ours.",
-            plot_meshes,
-        ),
-        PaperFigure(
-            "fig38",
-            "Example 2: (a) contact pressure; (b) close-up of its middle. Pressures are negative, as in the paper.",
-            plot_pressures,
-        ),
-    ),
+    figures=(plot_meshes, plot_pressures),
     tables=tables,
     choices={
         "Example 2": "plane strain, the whole disk held on its axis, a foundation 20 wide and 10 deep, clamped below, "

@@ -98,6 +98,10 @@ def statements(study: PeakStudy) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "example-2-peak",
+    "Example 2: the largest pressure (a) over the size of an element and (b) over the slope of the contact.",
+)
 def plot(study: PeakStudy) -> Figure:
     """Draw the largest pressure over the mesh and over the slope."""
     figure, (meshes, slopes) = new_panels(3.6, 2)
@@ -139,13 +143,7 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     datasets=datasets,
-    figures=(
-        PaperFigure(
-            "example-2-peak",
-            "Example 2: the largest pressure (a) over the size of an element and (b) over the slope of the contact.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     n_steps=len(REFINE) + 2,
     slow=True,
 )

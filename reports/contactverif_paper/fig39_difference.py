@@ -76,6 +76,11 @@ def statements(differences: tuple[Difference, ...]) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "fig39",
+    "Example 2: the pressure of VTS-PPT minus that of VTS-ME, (a) on the paper’s axes, which the curve of the "
+    "base meshes leaves, (b) on axes that hold both.",
+)
 def plot(differences: tuple[Difference, ...]) -> Figure:
     """Draw both differences on the paper's axes, and on axes that hold both."""
     figure, (printed, whole) = new_panels(3.6, 2)
@@ -107,14 +112,7 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     datasets=datasets,
-    figures=(
-        PaperFigure(
-            "fig39",
-            "Example 2: the pressure of VTS-PPT minus that of VTS-ME, (a) on the paper’s axes, which the curve of the "
-            "base meshes leaves, (b) on axes that hold both.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     n_steps=len(REFINE),
     slow=True,
 )

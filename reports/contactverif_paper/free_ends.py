@@ -108,6 +108,11 @@ def statements(result: FreeEnds) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "free-ends",
+    "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. Half a "
+    "segment is an area of competence: nothing is cut there.",
+)
 def plot(result: FreeEnds) -> Figure:
     """Draw the errors over the overhang."""
     figure, (axes,) = new_panels(3.8, 1)
@@ -130,14 +135,7 @@ ITEM = Item(
     title="Free ends of the master: the paper is silent",
     compute=compute,
     statements=statements,
-    figures=(
-        PaperFigure(
-            "free-ends",
-            "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. Half a "
-            "segment is an area of competence: nothing is cut there.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     choices={
         "Free ends of the master": "free_end=truncate: where several segments are involved, the area of competence is "
         "cut at a free end on the master’s side only; elsewhere Box 3 holds as printed",

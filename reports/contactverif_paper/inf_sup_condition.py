@@ -96,6 +96,11 @@ def statements(constants: Constants) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "inf-sup",
+    "The inf-sup constant on five meshes, (a) with a slave that is coarser than the master, (b) with a finer "
+    "one, and (c) with nodes on nodes. Pale: some pressures move nothing, and are left out.",
+)
 def plot(constants: Constants) -> Figure:
     """Draw β over h, a panel a family."""
     figure, panels = new_panels(3.6, len(FAMILIES), sharey=True)
@@ -134,14 +139,7 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     attributes={"n_meshes": N_MESHES},
-    figures=(
-        PaperFigure(
-            "inf-sup",
-            "The inf-sup constant on five meshes, (a) with a slave that is coarser than the master, (b) with a finer "
-            "one, and (c) with nodes on nodes. Pale: some pressures move nothing, and are left out.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     tables=tables,
     text="The paper has no proof that VTS-PPT satisfies the inf-sup condition, and supposes that it does what the "
     "mortar method does. With multipliers it does not. B S⁻¹ Bᵀ λ = β² h A λ / E has an eigenvalue for "

@@ -117,6 +117,12 @@ def statements(result: Locking) -> Iterator[Statement]:
     )
 
 
+@PaperFigure.define(
+    "locking-stiff",
+    f"(a) The compliance to a wave of pressure that an interface of {FINER[0]} on {FINER[1]} segments loses as "
+    f"the penalty rises, beside matching meshes. (b) The pressures of {REAL[0]} on {REAL[1]} segments at "
+    "1e6 E/h under 1 + 0.8 cos(2πx/L), in contact that may open.",
+)
 def plot(result: Locking) -> Figure:
     """Draw the loss of compliance over the penalty, and pressures of real contact."""
     figure, (loss, pressure) = new_panels(3.8, 2)
@@ -142,15 +148,7 @@ ITEM = Item(
     compute=compute,
     statements=statements,
     datasets=datasets,
-    figures=(
-        PaperFigure(
-            "locking-stiff",
-            f"(a) The compliance to a wave of pressure that an interface of {FINER[0]} on {FINER[1]} segments loses as "
-            f"the penalty rises, beside matching meshes. (b) The pressures of {REAL[0]} on {REAL[1]} segments at "
-            "1e6 E/h under 1 + 0.8 cos(2πx/L), in contact that may open.",
-            plot,
-        ),
-    ),
+    figures=(plot,),
     text="Two 4 × 1 blocks with meshes that share no node but at the ends. Springs at two points of a slave segment or "
     "more are more conditions than the gap between the meshes can satisfy. So the gap, and with it the interface, "
     "becomes straight. In real contact, points open until the rest carries the load.",

@@ -103,6 +103,11 @@ class PaperFigure:
     caption: Annotated[str, Column("", WORDS, "what it shows")]  # In whole sentences.
     plot: Callable[[Any], Figure]  # Draws it from the data that the item's `compute` returns.
 
+    @classmethod
+    def define(cls, name: str, caption: str) -> Callable[[Callable[[Any], Figure]], PaperFigure]:
+        """Return a decorator that makes a figure of the function that draws it."""
+        return lambda plot: cls(name, caption, plot)
+
     @property
     def source(self) -> Annotated[str, Column("", WORDS, "the paper's figure, or ours")]:
         """The paper's figure that it reproduces, or `OURS`."""
