@@ -87,6 +87,16 @@ class Cut(NamedTuple):
     by_2: Vector
 
 
+class LinearizedNode(NamedTuple):
+    """A virtual slave node with all that its derivatives need."""
+
+    v: VirtualSlaveNode
+    force: Force
+    at: Places
+    p_cut: Cut
+    q_cut: Cut
+
+
 class Gain(NamedTuple):
     """The gains of a virtual slave node for one displacement: Δω, Δg, l Δξ, Δl_AB, Δc_P and Δc_Q."""
 

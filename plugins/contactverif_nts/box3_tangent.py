@@ -37,7 +37,7 @@ from contactverif_nts.box3_gains import (
     NO_GAIN,
     Cut,
     Ends,
-    Force,
+    LinearizedNode,
     Part,
     Places,
     Pressure,
@@ -123,19 +123,20 @@ def _sweep(
             force = force_at(v, l_ab, stiffness, e, has_multipliers, current_area)
             p_cut = cut_end(x, master, slots, v, v.c_p, area.frame, area.cut_p)
             q_cut = cut_end(x, master, slots, v, v.c_q, area.frame, area.cut_q)
+            point = LinearizedNode(v, force, at, p_cut, q_cut)
             if only[coupling] in (WHOLE, area.first):
-                _add_segment_forces(local, push, at, v, force, p_cut, q_cut, True)
+                _add_segment_forces(local, push, point, True)
                 if has_multipliers:
-                    _add_constraint(local, push, at, v, force, p_cut, q_cut)
+                    _add_constraint(local, push, point)
             if area.first == area.last:  # IF only one segment is involved THEN Eq. 6
-                _add_segment_forces(local, push, at, v, force, p_cut, q_cut, False)
+                _add_segment_forces(local, push, point, False)
             else:  # ELSE assembly of all the involved segments
                 pressure = pressure_on_master(v, force, transmission == BALANCED)
                 j, j_last = (area.first, area.last) if only[coupling] == WHOLE else (only[coupling], only[coupling])
                 while j >= 0:
                     f, m = master[j, 0], master[j, 1]
                     part_j = part_under_area(node(x, f), node(x, m), v, area, j)
-                    _add_part_forces(local, push, at, v, force, p_cut, q_cut, pressure, part_j, slots[f], slots[m])
+                    _add_part_forces(local, push, point, pressure, part_j, slots[f], slots[m])
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
         add_local_matrix(*csr, nodes, start, n_coupled, runs, local, owner, part)
@@ -241,17 +242,9 @@ def _add_unit(local: FloatArray, row: int, size: float, v: VirtualSlaveNode, at:
 
 
 @compile_inline
-def _add_segment_forces(
-    local: FloatArray,
-    push: FloatArray,
-    at: Places,
-    v: VirtualSlaveNode,
-    force: Force,
-    p_cut: Cut,
-    q_cut: Cut,
-    is_slave: bool,
-) -> None:
+def _add_segment_forces(local: FloatArray, push: FloatArray, point: LinearizedNode, is_slave: bool) -> None:
     """Add the forces on A and B, or on 1 and 2 (Eq. 6), and their Δ."""
+    v, force, at, p_cut, q_cut = point
     first, second, share_1, share_2 = at.node_1, at.node_2, -(1 - force.xi), -force.xi
     if is_slave:
         first, second, share_1, share_2 = at.a, at.b, (1 - v.c) / 2, (1 + v.c) / 2
@@ -276,19 +269,10 @@ def _add_segment_forces(
 
 @compile_inline
 def _add_part_forces(
-    local: FloatArray,
-    push: FloatArray,
-    at: Places,
-    v: VirtualSlaveNode,
-    force: Force,
-    p_cut: Cut,
-    q_cut: Cut,
-    pressure: Pressure,
-    part: Part,
-    f: int,
-    m: int,
+    local: FloatArray, push: FloatArray, point: LinearizedNode, pressure: Pressure, part: Part, f: int, m: int
 ) -> None:
     """Add the forces −pressure × W n on the nodes f and m of one of several master segments, and their Δ."""
+    v, force, at, p_cut, q_cut = point
     f_f, f_m = -pressure.size * part.w_f, -pressure.size * part.w_m
     _add_force(push, f, f_f, v)
     _add_force(push, m, f_m, v)
@@ -313,10 +297,9 @@ def _add_part_forces(
 
 
 @compile_inline
-def _add_constraint(
-    local: FloatArray, push: FloatArray, at: Places, v: VirtualSlaveNode, force: Force, p_cut: Cut, q_cut: Cut
-) -> None:
+def _add_constraint(local: FloatArray, push: FloatArray, point: LinearizedNode) -> None:
     """Add the constraint −g × size of a multiplier, and its Δ."""
+    v, force, at, p_cut, q_cut = point
     row, normal, t = at.multiplier, v.normal, v.t
     push[row] -= v.g * force.size
     for k in range(N_CORE):

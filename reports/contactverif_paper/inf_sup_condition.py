@@ -44,18 +44,14 @@ class Constants:
     ]
     segments: Annotated[FloatArray, Column("family mesh", "length", "slave segment h", name="segment")]
     zeros: Annotated[FloatArray, Column("formulation family", "1", "share of pressures that move nothing, finest mesh")]
-    slopes: Annotated[
-        FloatArray, Column("formulation family", "1", "slope of log β against log h, two finest meshes", name="slope")
-    ]
+    slope: Annotated[FloatArray, Column("formulation family", "1", "slope of log β against log h, two finest meshes")]
     formulations: Formulations = FORMULATIONS
-    families: Annotated[tuple[str, ...], Column("family", WORDS, "slave against master", name="family")] = tuple(
-        FAMILIES
-    )
+    family: Annotated[tuple[str, ...], Column("family", WORDS, "slave against master")] = tuple(FAMILIES)
 
     def stable(self, formulation: PaperFormulation) -> bool:
         """Return whether β does not fall, and every pressure moves something, on all families."""
         row = FORMULATIONS.index(formulation)
-        return bool((self.zeros[row] == 0).all() and (self.slopes[row] <= STABLE_SLOPE).all())
+        return bool((self.zeros[row] == 0).all() and (self.slope[row] <= STABLE_SLOPE).all())
 
 
 def compute(report_progress: Progress) -> Constants:
@@ -85,9 +81,9 @@ def statements(constants: Constants) -> Iterator[Statement]:
         "it is not proved that VTS-PPT satisfies the inf-sup condition, and it is possible that it shares what the "
         "mortar method has",
         "it does not: with two virtual slave nodes a segment, β falls like h to the power "
-        f"{constants.slopes[pair, coarser]:.2f} on a slave that is coarser than the master (2:3), and "
+        f"{constants.slope[pair, coarser]:.2f} on a slave that is coarser than the master (2:3), and "
         f"{constants.zeros[pair, finer]:.0%} of all pressures move nothing on a finer one (3:2). With one virtual "
-        f"slave node, β falls like h to the power {constants.slopes[single, matching]:.2f} on matching meshes. "
+        f"slave node, β falls like h to the power {constants.slope[single, matching]:.2f} on matching meshes. "
         f"β is constant on all meshes for: {', '.join(stable)}. In two passes, "
         f"{constants.zeros[passes, coarser]:.0%} (2:3) to {constants.zeros[passes, matching]:.0%} (matching) of "
         "all pressures move nothing: one for each pair of nodes in one place",
@@ -123,7 +119,7 @@ def tables(constants: Constants) -> Iterator[PageTable]:
     for row, formulation in enumerate(FORMULATIONS):
         cells = [Cell((formulation.legend,))]
         for column in range(len(FAMILIES)):
-            zeros, slope = constants.zeros[row, column], constants.slopes[row, column]
+            zeros, slope = constants.zeros[row, column], constants.slope[row, column]
             tone = "n good" if zeros == 0 and slope <= STABLE_SLOPE else "n bad"
             slope = 0.0 if abs(slope) < 0.005 else slope  # No −0.00.
             details = (f"slope {slope:.2f}", f"{zeros:.0%} move nothing")

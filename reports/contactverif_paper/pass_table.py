@@ -68,20 +68,11 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says
 class PassTable:
     """The largest error of a stress over the pressure, and what the paper says."""
 
-    errors: Annotated[
-        FloatArray,
-        Column(
-            "formulation scene",
-            "1",
-            STRESS_ERROR,
-            "NaN: Newton's method ended at no solution",
-            np.nan,
-            name="stress_error",
-        ),
+    stress_error: Annotated[
+        FloatArray, Column("formulation scene", "1", STRESS_ERROR, "NaN: Newton's method ended at no solution", np.nan)
     ]
-    tolerances: Annotated[
-        FloatArray,
-        Column("scene", "1", "what roundoff explains: an error below it passes", CONDITION_TOLERANCE, name="tolerance"),
+    tolerance: Annotated[
+        FloatArray, Column("scene", "1", "what roundoff explains: an error below it passes", CONDITION_TOLERANCE)
     ]
     printed: Annotated[IntArray, replace(PRINTED_COLUMN, dims="formulation scene")]
     formulations: Formulations = FORMULATIONS
@@ -90,7 +81,7 @@ class PassTable:
     @property
     def verdicts(self) -> np.ndarray:
         """The verdicts (n_formulations, n_scenes): pass, fail, between, or no solution."""
-        conditions = [self.errors <= self.tolerances, self.errors > FAILS, np.isnan(self.errors)]
+        conditions = [self.stress_error <= self.tolerance, self.stress_error > FAILS, np.isnan(self.stress_error)]
         return np.select(conditions, ["pass", "fail", "no solution"], "between")
 
     @property
@@ -140,7 +131,7 @@ def statements(table: PassTable) -> Iterator[Statement]:
 def _gap(table: PassTable) -> str:
     between = int((table.verdicts == "between").sum())
     if between:
-        n_errors = table.errors.size
+        n_errors = table.stress_error.size
         return f"{between} of {n_errors} errors of the stress lie between roundoff and {FAILS:g} at ε̂ = 10 E/h"
     return f"errors of the stress are at roundoff or above {FAILS:g} at ε̂ = 10 E/h; nothing lies between"
 
@@ -163,7 +154,7 @@ def _cell(table: PassTable, row: int, column: int) -> Cell:
     if table.printed[row, column] != SILENT:
         text += " =" if table.same[row, column] else " ≠"
     tone = {"pass": "good", "fail": "bad"}.get(word, "")
-    return Cell((text,), (number(float(table.errors[row, column]), 2),), f"row {tone}")
+    return Cell((text,), (number(float(table.stress_error[row, column]), 2),), f"row {tone}")
 
 
 ITEM = Item(
