@@ -147,13 +147,7 @@ def _average_turn(
 
 @compile_part
 def cut_gains(
-    d_c: FloatArray,
-    c: float,
-    cutting: int,
-    x_e: Vector,
-    view: SlaveView,
-    d_omega_a: FloatArray,
-    d_omega_b: FloatArray,
+    d_c: FloatArray, c: float, cutting: int, x_e: Vector, view: SlaveView, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
     """Write Δ of the c from which local node `cutting`, at x_e, is seen, into d_c (n_local, 2).
 
@@ -180,13 +174,7 @@ def cut_gains(
 
 @compile_part
 def point_gains(
-    gains: FloatArray,
-    c: float,
-    view: SlaveView,
-    x_1: Vector,
-    x_2: Vector,
-    d_omega_a: FloatArray,
-    d_omega_b: FloatArray,
+    gains: FloatArray, c: float, view: SlaveView, x_1: Vector, x_2: Vector, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
     """Write Δξ, Δg and ω at c into `gains` (5, n_local, 2), which holds Δc already.
 

@@ -23,7 +23,7 @@ from contactverif_mortar.cell_forces import Shapes, integrals
 from contactverif_mortar.integration_cells import Cells, Quadrature, Sides
 from contactverif_mortar.node_factors import Factors, NodeRows
 from contactverif_mortar.node_groups import RowGroups, check_product, group_nodes
-from contactverif_mortar.node_rows import NodeState, Weights, node_rows, weigh
+from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
 
 # The smallest covered share of a node's own length that counts. Below it the node would carry less than the roundoff of
@@ -47,17 +47,12 @@ def divide_covered(areas: FloatArray, with_gap: FloatArray, lengths: FloatArray)
     return np.where(covered, areas, 0.0), gaps
 
 
-class WeightedState(NamedTuple):
-    """The points of some cells at one state, the slave nodes' shapes there, and the integrals of the shapes."""
+class StateWeights(NamedTuple):
+    """The integrals of the shapes of the slave nodes at one state, and the shapes: their numbers, or at points."""
 
-    areas: FloatArray  # (n_slave_nodes,)
-    with_gap: FloatArray  # (n_slave_nodes,)
-    points: FloatArray  # (n_points, 6)
-    shapes: Shapes
-    segment: IntArray  # (n_points,)
-
-
-StateWeights = Weights | WeightedState
+    areas: FloatArray  # (n_slave_nodes,) ∫φ_j and ∫φ_j g.
+    with_gap: FloatArray
+    shapes: FloatArray | ShapedPoints
 
 
 class Carried(NamedTuple):
@@ -82,10 +77,6 @@ class Weighted:
     nodes: NumberArray  # (n_cells, n_local)
     areas: Array  # (n_states, n_slave_nodes) ∫φ_j and ∫φ_j g.
     with_gap: Array
-
-    def one_state(self) -> WeightedState:
-        """Return what there is of the first state."""
-        return WeightedState(self.areas[0], self.with_gap[0], self.points[0], self.shapes, self.segment)
 
     def forces(self, pressure: Array, n_nodes: int) -> Array:
         """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_slave_nodes) of the slave nodes."""
@@ -116,8 +107,15 @@ class Weighting:
     def weigh(self, interface: Interface, cells: Cells, x: FloatArray) -> StateWeights:
         """Compute the integrals of the shapes on some cells at one state, x (n_nodes, 2)."""
         if not self.averaged:
-            return weigh(interface, cells, self.quadrature, x, self.dual)
-        return self.at(interface, cells, x[None]).one_state()
+            return StateWeights(*weigh(interface, cells, self.quadrature, x, self.dual))
+        weighted = self.at(interface, cells, x[None])
+
+        def make_gains(begin: int, end: int) -> FloatArray:
+            return self.quadrature.gains(interface, cells.select(slice(begin, end)), x)
+
+        points, slave = weighted.points[0], interface.slave.segments
+        shaped = ShapedPoints(points, weighted.shapes, weighted.segment, slave, make_gains)
+        return StateWeights(weighted.areas[0], weighted.with_gap[0], shaped)
 
     def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
@@ -172,14 +170,9 @@ class Weighting:
         groups = group_nodes(
             interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, self.dual
         )
-        pattern = choose_pattern(groups)
-        if isinstance(weights, Weights):
-            return node_rows(interface, cells, self.quadrature, x, weights.shapes, state, groups, pattern)
-
-        def make_gains(begin: int, end: int) -> FloatArray:
-            return self.quadrature.gains(interface, cells.select(slice(begin, end)), x)
-
-        shaped = ShapedPoints(weights.points, weights.shapes, weights.segment, interface.slave.segments, make_gains)
+        pattern, shapes = choose_pattern(groups), weights.shapes
+        if not isinstance(shapes, ShapedPoints):
+            return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         forces, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
-        left, right = add_shaped_rows(shaped, groups, state, 4, forces, rest)
+        left, right = add_shaped_rows(shapes, groups, state, 4, forces, rest)
         return NodeRows(forces, rest, groups, left, right)

@@ -213,14 +213,7 @@ def _truncate(
 
 @compile_inline
 def _cover(
-    x: FloatArray,
-    master: IntArray,
-    neighbours: IntArray,
-    m: int,
-    x_a: Vector,
-    x_b: Vector,
-    c_p: float,
-    c_q: float,
+    x: FloatArray, master: IntArray, neighbours: IntArray, m: int, x_a: Vector, x_b: Vector, c_p: float, c_q: float
 ) -> tuple[float, float, int, int]:
     """Cut the area of competence [c_q, c_p] to what faces the master, in the frame of master segment m.
 
