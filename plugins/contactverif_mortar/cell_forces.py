@@ -97,15 +97,8 @@ class Shapes:
         kappa = (1 - mean) * (1 + mean) / (2 * variance)
         second = (1 + mean) / 2 + kappa * centred
         first_value = (1 - mean) / 2 - kappa * centred
-        return cls(
-            np.stack([first_value, second], axis=-1),
-            kappa,
-            0.5 - kappa - mean / variance * centred,
-            -kappa / variance * centred,
-            centred,
-            extent,
-            variance,
-        )
+        values, by_mean = np.stack([first_value, second], axis=-1), 0.5 - kappa - mean / variance * centred
+        return cls(values, kappa, by_mean, -kappa / variance * centred, centred, extent, variance)
 
     def fields_of_first_state(self) -> tuple[Array, ...]:
         """Return all fields at the first state, in their order."""

@@ -145,12 +145,6 @@ def add_cell(forces: FloatArray, csr: Csr, rows: FloatArray, pushes: FloatArray,
         turn = pushes[k] / cell.length
         for column, omega in enumerate((-turn, turn, 0.0, 0.0)):
             x, y = turn_row(rows, k, column, cell)
-            add_block(
-                *csr,
-                local[k],
-                local[column],
-                n[0] * x - omega * tau[0] * n[0],
-                n[0] * y - omega * tau[0] * n[1],
-                n[1] * x - omega * tau[1] * n[0],
-                n[1] * y - omega * tau[1] * n[1],
-            )
+            xx, xy = n[0] * x - omega * tau[0] * n[0], n[0] * y - omega * tau[0] * n[1]
+            yx, yy = n[1] * x - omega * tau[1] * n[0], n[1] * y - omega * tau[1] * n[1]
+            add_block(*csr, local[k], local[column], xx, xy, yx, yy)

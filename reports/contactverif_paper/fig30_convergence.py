@@ -25,7 +25,7 @@ from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_decades
-from contactverif_paper.paper_columns import WORDS, Column, Formulations, variables_of
+from contactverif_paper.paper_columns import WORDS, Column, Formulations, sparse_column, variables_of
 from contactverif_paper.paper_formulations import BASIC, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
@@ -44,10 +44,6 @@ _ENERGY = 1e-15  # The paper's energy norm in Example 2; here it is taken over t
 _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the stopping rules that ask for more.
 
 
-def _steps(name: str, dim: str, units: str, meaning: str) -> Column:
-    return Column(dim, units, meaning, "NaN: nothing there", np.nan, name=name)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
     """The way of Newton's method to a solution."""
@@ -55,14 +51,14 @@ class History:
     formulation: PaperFormulation
     # The first two, (n_iterates,), go up to the solution.
     residuals: Annotated[
-        FloatArray, _steps("residual", "residuals_step", schema.FORCE, "largest entry of the residual")
+        FloatArray, sparse_column("residuals_step", schema.FORCE, "largest entry of the residual", "residual")
     ]
     energies: Annotated[
-        FloatArray, _steps("energy", "energies_step", "N m", "energy of a Newton step")
+        FloatArray, sparse_column("energies_step", "N m", "energy of a Newton step", "energy")
     ]  # |Δq · residual|
     # Only roundoff stops these steps.
     beyond: Annotated[
-        FloatArray, _steps("beyond", "beyond_step", schema.FORCE, "largest entry of the residual in further steps")
+        FloatArray, sparse_column("beyond_step", schema.FORCE, "largest entry of the residual in further steps")
     ]
     floor: Annotated[float, Column("", schema.FORCE, "what roundoff alone makes of the residual")]
     end: Annotated[str, Column("", WORDS, "end of Newton")]

@@ -54,6 +54,11 @@ class Column:
         return np.array(list(itertools.zip_longest(*rows, fillvalue=self.pad))).T.reshape(*shape, -1)
 
 
+def sparse_column(dims: str, units: str, meaning: str, name: str = "") -> Column:
+    """Return the column of numbers that are not there in all cells."""
+    return Column(dims, units, meaning, "NaN: nothing there", np.nan, name=name)
+
+
 def name_columns(dims: str) -> tuple[Column, Column]:
     """Return both names of the formulations of a field."""
     return (

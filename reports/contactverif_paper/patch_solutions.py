@@ -23,7 +23,7 @@ from contactverif.mechanics import newton
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
-from contactverif_paper.paper_columns import WORDS, Column
+from contactverif_paper.paper_columns import WORDS, Column, sparse_column
 from contactverif_paper.paper_formulations import (
     NTS,
     NTS_AR,
@@ -45,10 +45,6 @@ _STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffnes
 TWO = (NTS, NTS_AR)
 FOUR = (*TWO, TWO_PASS, VTS_ME)
 FIVE = (*FOUR, VTS_PPT)
-
-
-def _some(dims: str, units: str, meaning: str) -> Column:
-    return Column(dims, units, meaning, "NaN: nothing there", np.nan)
 
 
 PASSES, FAILURE, SILENT = 1, 0, -1  # What the paper says of a patch test.
@@ -84,8 +80,8 @@ class Curve:
     """The pressure that one formulation leaves on a scene."""
 
     formulation: PaperFormulation
-    x: Annotated[FloatArray, _some("point", schema.LENGTH, "reference coordinate on the paper's axis")]
-    pressure: Annotated[FloatArray, _some("point", "1", "contact pressure over the exact one")]
+    x: Annotated[FloatArray, sparse_column("point", schema.LENGTH, "reference coordinate on the paper's axis")]
+    pressure: Annotated[FloatArray, sparse_column("point", "1", "contact pressure over the exact one")]
     # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
     at_points: Annotated[
         bool, Column("", "1", "where pressures are taken", "missing: not shown", -1, {"at_nodes": 0, "at_points": 1})
@@ -113,12 +109,12 @@ class Curve:
         return self.solution.end
 
     @property
-    def displacement_x(self) -> Annotated[FloatArray, _some("node", schema.LENGTH, "displacement along x")]:
+    def displacement_x(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along x")]:
         """The displacements of all nodes along x."""
         return np.vstack(self.solution.displacements)[:, 0]
 
     @property
-    def displacement_y(self) -> Annotated[FloatArray, _some("node", schema.LENGTH, "displacement along y")]:
+    def displacement_y(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along y")]:
         """The displacements of all nodes along y."""
         return np.vstack(self.solution.displacements)[:, 1]
 

@@ -42,14 +42,9 @@ class Course:
         roundoff = 64 * UNIT_ROUNDOFF * case.largest_coordinate
         forwards = np.diff(along[interface.slave.segments], axis=1)
         backwards = np.diff(along[interface.master.segments], axis=1)
-        return cls(
-            direction,
-            along,
-            above,
-            float(max(np.ptp(above[:n_slave]), np.ptp(above[n_slave:]))),
-            roundoff,
-            bool((forwards > 0).all() and (backwards < 0).all()),
-        )
+        rise = float(max(np.ptp(above[:n_slave]), np.ptp(above[n_slave:])))
+        straight = bool((forwards > 0).all() and (backwards < 0).all())
+        return cls(direction, along, above, rise, roundoff, straight)
 
     @property
     def flat(self) -> bool:

@@ -167,23 +167,21 @@ class _Reader:
                 continue
             shrunk, first, case = self._example(formulation, property_id, info)
             length = self._n_outcomes(i, j, property_id, codes[i])
-            yield (
-                i,
-                Row(
-                    formulation=formulation,
-                    info=info,
-                    verdict=Verdict(verdict),
-                    promise=schema.Promise(int(self._summary["promise"].values[i, j])).promise,
-                    known=str(self._summary["known"].values[i, j]),
-                    reason=str(self._summary["reason"].values[i, j]),
-                    planned=int(self._summary["planned"].values[i, j]),
-                    outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
-                    witness=None if witnesses is None else witnesses.outcome(i, case),
-                    shrunk=shrunk,
-                    first=first,
-                    seconds=float(self._timing["row_seconds"].values[i, j]),
-                ),
+            row = Row(
+                formulation=formulation,
+                info=info,
+                verdict=Verdict(verdict),
+                promise=schema.Promise(int(self._summary["promise"].values[i, j])).promise,
+                known=str(self._summary["known"].values[i, j]),
+                reason=str(self._summary["reason"].values[i, j]),
+                planned=int(self._summary["planned"].values[i, j]),
+                outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
+                witness=None if witnesses is None else witnesses.outcome(i, case),
+                shrunk=shrunk,
+                first=first,
+                seconds=float(self._timing["row_seconds"].values[i, j]),
             )
+            yield i, row
 
     def _n_outcomes(self, i: int, j: int, property_id: str, codes: np.ndarray[Any, Any]) -> int:
         """Return the number of outcomes of a row, checked against what the summary counts."""

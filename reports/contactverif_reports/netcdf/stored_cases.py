@@ -109,14 +109,9 @@ def case_group(case: Case) -> Group:
 
 def _array(safe: str, name: str, values: NDArray[Any]) -> Variable:
     parameter = name.removeprefix("parameter_")
-    dims, long_name, units = _ARRAYS.get(
-        name,
-        (
-            tuple(f"{safe}_axis_{axis}" for axis in range(values.ndim)),
-            schema.text(f"parameter of the case: {parameter}"),
-            schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN),
-        ),
-    )
+    axes, meaning = tuple(f"{safe}_axis_{axis}" for axis in range(values.ndim)), f"parameter of the case: {parameter}"
+    of_parameter = axes, schema.text(meaning), schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN)
+    dims, long_name, units = _ARRAYS.get(name, of_parameter)
     if values.dtype.kind in "OU":  # Words, and integers beyond 64 bits.
         return words(dims, values.astype(np.str_).tolist(), long_name)
     return numbers(dims, values, long_name, units)

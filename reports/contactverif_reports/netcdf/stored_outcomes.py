@@ -109,16 +109,8 @@ class OutcomeArrays:
         n_slave, n_master = self._counts[number].tolist()
         penalty, largest, shortest, *parameters = self._reals[number].tolist()
         name = "" if self._case_names is None else str(self._case_names[number])
-        return CaseSummary(
-            n_slave,
-            n_master,
-            penalty,
-            largest,
-            shortest,
-            _present(self._parameters, parameters),
-            name,
-            self._kinds[self._case_kinds[number]],
-        )
+        present, kind = _present(self._parameters, parameters), self._kinds[self._case_kinds[number]]
+        return CaseSummary(n_slave, n_master, penalty, largest, shortest, present, name, kind)
 
     def _measurement(self, number: int, *, idle: bool) -> Measurement:
         pairs = zip(self._quantities, self._values[number].tolist(), self._tolerances[number].tolist(), strict=True)
