@@ -35,6 +35,9 @@ from contactverif_reports.html.pages import number
 FORMULATIONS = (VTS_PPT, BALANCED, STS)
 SLIDING_TILT = 0.3  # Radians: the tilt at which the area slides past the node.
 SHIFTS = np.linspace(-0.06, 0.06, 121) + 2.0**-12  # The end of the area past the node over the slave's length.
+_TRANSMITTED = series_columns(
+    "shift", "1", "end of the area past the node over the slave's length", "force on the master over that on the slave"
+)
 _NEAR = 2.0**-40  # The distance to either side of the jump over the slave's length.
 
 
@@ -44,15 +47,7 @@ class Jump:
 
     jump: Annotated[Series, series_columns("tilt", "rad", "tilt of the slave", "largest jump over the slave's force")]
     known: Annotated[FloatArray, Column("tilt", "1", "the jump of the printed algorithm, by formula")]
-    transmitted: Annotated[
-        Series,
-        series_columns(
-            "shift",
-            "1",
-            "end of the area past the node over the slave's length",
-            "force on the master over that on the slave",
-        ),
-    ]  # At `SLIDING_TILT`.
+    transmitted: Annotated[Series, _TRANSMITTED]  # At `SLIDING_TILT`.
     formulations: Formulations = FORMULATIONS
 
 

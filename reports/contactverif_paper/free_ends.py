@@ -37,6 +37,9 @@ from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress
 FORMULATIONS = (NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 OVERHANGS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])  # Parts of a slave segment.
 _YOUNG, _POISSON, _PRESSURE = 1e4, 0.3, 100.0
+_ERRORS = series_columns(
+    "overhang", "1", "part of a slave segment that overhangs", "largest error of a stress over the pressure", np.nan
+)
 _SEGMENT = 2.0  # The length of a slave segment.
 
 
@@ -44,16 +47,7 @@ _SEGMENT = 2.0  # The length of a slave segment.
 class FreeEnds:
     """The error of the stress over the part of a slave segment that overhangs."""
 
-    stress_error: Annotated[
-        Series,
-        series_columns(
-            "overhang",
-            "1",
-            "part of a slave segment that overhangs",
-            "largest error of a stress over the pressure",
-            fill=np.nan,
-        ),
-    ]
+    stress_error: Annotated[Series, _ERRORS]
     formulations: Formulations = FORMULATIONS
 
 

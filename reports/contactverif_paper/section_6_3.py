@@ -43,8 +43,10 @@ MASTERS: Mapping[str, tuple[tuple[float, float], ...]] = {  # {head of a column:
 }
 SLAVE = ((0.0, -0.11), (1.9, -0.17))
 MESH_RATIOS: Mapping[str, float] = {"coarser": 0.5, "as fine": 1.0, "finer": 2.0}  # Master segments a slave segment.
+_RATIOS = tuple(MESH_RATIOS.values())
 PENALTY = 16.0
 _N_SEGMENTS = 64  # Slave segments of the interface on which cost is counted.
+_TERMS = "coefficients of dyads in the tangent of one slave segment, over 1, 2 and 3 master segments"
 _VANISHES = 1e-12  # A coefficient below this share of the largest one is zero.
 
 
@@ -52,14 +54,7 @@ _VANISHES = 1e-12  # A coefficient below this share of the largest one is zero.
 class Terms:
     """The terms of each formulation."""
 
-    terms: Annotated[
-        IntArray,
-        Column(
-            "formulation master",
-            "1",
-            "coefficients of dyads in the tangent of one slave segment, over 1, 2 and 3 master segments",
-        ),
-    ]
+    terms: Annotated[IntArray, Column("formulation master", "1", _TERMS)]
     formulations: Formulations = FORMULATIONS
 
 
@@ -71,9 +66,7 @@ class Cost:
     residual: Annotated[FloatArray, Column("formulation ratio", "s", "time a slave segment")]
     tangent: Annotated[FloatArray, Column("formulation ratio", "s", "time a slave segment")]
     formulations: Formulations = TIMED
-    ratio: Annotated[tuple[float, ...], Column("ratio", "1", "master segments for each slave segment")] = tuple(
-        MESH_RATIOS.values()
-    )
+    ratio: Annotated[tuple[float, ...], Column("ratio", "1", "master segments for each slave segment")] = _RATIOS
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,6 +24,7 @@ from contactverif_reports.html.pages import number
 UNEQUAL = 10.0  # The stiffness of the other foundation over that of the punch.
 _SETUPS = (example_1.PATCH, example_1bis.PATCH)
 _COMPARED = (NTS_AR, NTS, TWO_PASS)
+_UNEQUAL = "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +37,7 @@ class Section71:
     limit: Annotated[tuple[float, ...], Column("scene", "m-1", "penalty over E up to which NTS-AR departs least")]
     # Of NTS-AR and of two passes.
     stress_error: Annotated[tuple[float, float], Column("passes", "1", "Example 1: stress error at 10 E/h")]
-    unequal: Annotated[
-        tuple[float, float],
-        Column(
-            "bound",
-            "1",
-            "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance",
-        ),
-    ]
+    unequal: Annotated[tuple[float, float], Column("bound", "1", _UNEQUAL)]
     setups: Annotated[
         tuple[PatchSetup, ...], Column("scene", WORDS, "scene, as on the command line", part="scene", name="scene")
     ] = _SETUPS
