@@ -27,13 +27,9 @@ from contactverif_reports.draw.scene_figures import choose_pen
 WIDTH = 7.2  # The width of a figure in inches: two columns of a journal.
 LETTERS = 11  # Points: 5.5 at half size.
 REFERENCE_LINE: dict[str, Any] = {"color": "0.75", "linewidth": 2.6, "zorder": 1}  # The style of an exact answer.
+_SIZES = ("font.size", "axes.labelsize", "axes.titlesize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize")
 _STYLE: dict[Any, Any] = {
-    "font.size": LETTERS,
-    "axes.labelsize": LETTERS,
-    "axes.titlesize": LETTERS,
-    "xtick.labelsize": LETTERS,
-    "ytick.labelsize": LETTERS,
-    "legend.fontsize": LETTERS,
+    **dict.fromkeys(_SIZES, LETTERS),
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "legend.columnspacing": 1.4,

@@ -26,12 +26,8 @@ from contactverif_reports.files import checked_name
 _WIDTH = 10.0  # Width of the figure in inches.
 _ACROSS = 3  # The largest number of panels side by side.
 _SMALL: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "legend.fontsize": 9,
+    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize", "legend.fontsize"), 9),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 8),
     "hatch.linewidth": 0.5,
 }
 _MANY = 40  # The points of a curve get markers up to this number.

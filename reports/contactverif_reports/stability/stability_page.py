@@ -28,24 +28,15 @@ matrix of bodies and contact."""
 def stability_page(run: Run, files: Mapping[str, str]) -> str:
     """Return the page."""
     panels = sweep_panels(run)
-    parts = [
-        "# Error against condition number",
-        "",
-        f"`{run.provenance['command']}`",
-        "",
-        _origin(run),
-        "",
-        _MEANING,
-        "",
-    ]
-    parts += [f"![Error against condition number, one panel a formulation]({name})\n" for name in _pictures(files)]
-    parts += ["## One sentence for each formulation", ""]
-    parts += [f"- `{panel.formulation}` {sentence_of(panel)}" for panel in panels]
-    parts += [f"- `{plugin.formulation}` was not loaded: {plugin.reason}" for plugin in run.not_loaded]
-    parts += ["", "## ω, the error over u κ", "", *_table(panels), ""]
+    sentences = [f"- `{panel.formulation}` {sentence_of(panel)}" for panel in panels]
+    sentences += [f"- `{plugin.formulation}` was not loaded: {plugin.reason}" for plugin in run.not_loaded]
+    parts = ["# Error against condition number", f"`{run.provenance['command']}`", _origin(run), _MEANING]
+    parts += [f"![Error against condition number, one panel a formulation]({name})" for name in _pictures(files)]
+    parts += ["## One sentence for each formulation", "\n".join(sentences)]
+    parts += ["## ω, the error over u κ", "\n".join(_table(panels))]
     if ".nc" in files:
-        parts += [_how_to_replay(panels, files[".nc"]), ""]
-    return "\n".join(parts)
+        parts.append(_how_to_replay(panels, files[".nc"]))
+    return "\n\n".join(parts) + "\n"
 
 
 def _origin(run: Run) -> str:
