@@ -22,6 +22,7 @@ from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Csr, Fields
+from contactverif_mortar.node_factors import NodeRows
 from contactverif_mortar.node_groups import RowGroups, find_member
 from contactverif_mortar.node_rows import NodeState, add_chains
 
@@ -40,16 +41,11 @@ class ShapedPoints(NamedTuple):
 
 
 def add_shaped_rows(
-    shaped: ShapedPoints,
-    groups: RowGroups,
-    state: NodeState,
-    n_pushed: int,
-    forces: FloatArray,
-    matrix: sparse.csr_array,
-) -> tuple[FloatArray, FloatArray]:
-    """Add forces and their derivative at fixed pressures, and return `left` and `right`.
+    shaped: ShapedPoints, groups: RowGroups, state: NodeState, n_pushed: int, forces: FloatArray, rest: sparse.csr_array
+) -> NodeRows:
+    """Add forces and their derivative at fixed pressures to `forces` and `rest`, and return them with the factors.
 
-    Forces act on the first `n_pushed` local nodes: 4, or 2 where they act on the slave alone. `matrix` has the places
+    Forces act on the first `n_pushed` local nodes: 4, or 2 where they act on the slave alone. `rest` has the places
     of all pushed nodes and local nodes of each cell.
     """
     shapes, n_cells = shaped.shapes, len(groups.local)
@@ -59,7 +55,7 @@ def add_shaped_rows(
     n_q = len(shaped.points) // max(n_cells, 1)
     places, at_points = (shaped.points, shaped.segment, shaped.slave, groups.local), shapes.fields_of_first_state()
     at_nodes, factors = (state.pressure, state.gaps, state.divisor), (groups.nodes, groups.starts, left, right)
-    csr = matrix.indptr, matrix.indices, matrix.data
+    csr = rest.indptr, rest.indices, rest.data
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
         end = min(begin + size, n_cells)
@@ -67,7 +63,7 @@ def add_shaped_rows(
         _add_points(forces, csr, factors, chain, begin * n_q, n_q, n_pushed, places, at_points, gains, at_nodes)
     if dual:
         add_chains(shaped.slave, chain, state.divisor, groups.nodes, groups.starts, right)
-    return left, right
+    return NodeRows(forces, rest, groups, left, right)
 
 
 @compile_maker

@@ -39,7 +39,6 @@ from contactverif_mortar.cell_tangent import ForcesAndTangent
 from contactverif_mortar.cell_traits import CELL_TRAITS, LOCKING_WITNESSES
 from contactverif_mortar.covered_ranges import Ranges
 from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
-from contactverif_mortar.node_factors import NodeRows
 from contactverif_mortar.node_groups import RowGroups, group_nodes
 from contactverif_mortar.node_rows import NodeState
 from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
@@ -117,9 +116,8 @@ class TwoHalfPasses:
             gaps = each.with_gap[0] / areas
             weights = np.where(active, -self.penalty, 0.0)
             state = NodeState(weights * gaps, weights, gaps, areas)
-            shaped = self._shape_points(each, x)
-            left, right = add_shaped_rows(shaped, of_rows, state, 2, forces, matrix)
-            NodeRows(forces, matrix, of_rows, left, right).multiply(weights, 0, interface.n_nodes)
+            rows = add_shaped_rows(self._shape_points(each, x), of_rows, state, 2, forces, matrix)
+            rows.multiply(weights, 0, interface.n_nodes)
         return forces, matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:

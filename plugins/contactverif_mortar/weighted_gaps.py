@@ -174,5 +174,4 @@ class Weighting:
         if not isinstance(shapes, ShapedPoints):
             return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         forces, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
-        left, right = add_shaped_rows(shapes, groups, state, 4, forces, rest)
-        return NodeRows(forces, rest, groups, left, right)
+        return add_shaped_rows(shapes, groups, state, 4, forces, rest)
