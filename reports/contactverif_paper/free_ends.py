@@ -16,23 +16,13 @@ from typing import Annotated
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
-from contactverif.problems.uniform_stress import stress_error
 from contactverif_paper.figure_style import Series, add_legend, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, series_columns
-from contactverif_paper.paper_formulations import (
-    BALANCED,
-    MORTAR,
-    NTS_AR,
-    STS,
-    VTS_ME,
-    VTS_PPT,
-    PaperFormulation,
-    subject_of,
-)
+from contactverif_paper.paper_formulations import BALANCED, MORTAR, NTS_AR, STS, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_paper.patch_solutions import solved_error
 
 FORMULATIONS = (NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 OVERHANGS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])  # Parts of a slave segment.
@@ -54,7 +44,7 @@ class FreeEnds:
 def compute(report_progress: Progress) -> FreeEnds:
     """Solve with all formulations and overhangs."""
     report_progress("free ends")
-    errors = np.array([[_error(formulation, part) for part in OVERHANGS] for formulation in FORMULATIONS])
+    errors = np.array([[solved_error(row, overhanging(part)) for part in OVERHANGS] for row in FORMULATIONS])
     return FreeEnds(Series(FORMULATIONS, OVERHANGS, errors))
 
 
@@ -115,13 +105,6 @@ def plot(result: FreeEnds) -> Figure:
     axes.set_ylabel("largest error of the stress / p (–)")
     add_legend(figure, FORMULATIONS, columns=3)
     return figure
-
-
-def _error(formulation: PaperFormulation, part: float) -> float:
-    """Return the largest error of a stress over the pressure; NaN where Newton's method ends at no solution."""
-    scene = overhanging(part)
-    trace = newton.solve(scene, subject_of(formulation).for_case(scene.case()))
-    return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
 
 
 ITEM = Item(

@@ -20,6 +20,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics import newton
+from contactverif.mechanics.scene import Scene
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
@@ -184,7 +185,11 @@ def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, f
 @cache
 def moderate_error(formulation: PaperFormulation, scene_name: str, ratio: float = 1.0) -> float:
     """Return the largest error of a stress over the pressure at ε̂ = 10 E/h; NaN without a solution."""
-    scene = catalogue.make_scene(scene_name, ratio=ratio)
+    return solved_error(formulation, catalogue.make_scene(scene_name, ratio=ratio))
+
+
+def solved_error(formulation: PaperFormulation, scene: Scene) -> float:
+    """Return the largest error of a stress over the pressure; NaN where Newton's method ends at no solution."""
     trace = newton.solve(scene, subject_of(formulation).for_case(scene.case()))
     return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
 

@@ -47,15 +47,15 @@ def make_outline_figure(case: Case, width: float) -> Figure:
     is_slave = packed["is_slave"] != 0
     size = float(np.ptp(nodes, axis=0).max())
     across, high = np.ptp(nodes, axis=0) / size + 2 * _ARROW
-    figure = Figure(
-        figsize=(width, float(np.clip(width * high / across, 1.8, 0.75 * width)) + 0.5), layout="constrained"
-    )
+    height = float(np.clip(width * high / across, 1.8, 0.75 * width)) + 0.5
+    figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.add_subplot()
     axes.set_aspect("equal", adjustable="datalim")
-    _draw_cells(axes, packed["cells"].astype(np.int64), nodes, is_slave[of_body])
+    cells = packed["cells"].astype(np.int64)
+    _draw_cells(axes, cells, nodes, is_slave[of_body])
     first = packed["axis"][of_body]  # (n_nodes, 2)
     second = np.column_stack([-first[:, 1], first[:, 0]])
-    rigid = ~np.isin(of_body, of_body[_corners(packed["cells"])])  # (n_nodes,)
+    rigid = ~np.isin(of_body, of_body[cells[cells >= 0]])  # (n_nodes,); a triangle has −1 for a fourth corner
     _draw_surfaces(axes, packed["contact"].astype(np.int64), nodes, is_slave[of_body], rigid)
     fixed = (packed["fixed"] != 0) & ~rigid[:, None]
     _draw_supports(axes, nodes, fixed, (first, second), _SUPPORT * size)
@@ -66,12 +66,6 @@ def make_outline_figure(case: Case, width: float) -> Figure:
     axes.spines[["top", "right"]].set_visible(False)
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
-
-
-def _corners(cells: FloatArray) -> IntArray:
-    numbers = cells.astype(np.int64).ravel()
-    corners: IntArray = numbers[numbers >= 0]  # A triangle has −1 for a fourth corner.
-    return corners
 
 
 def _draw_cells(axes: Axes, cells: IntArray, nodes: FloatArray, is_slave: Any) -> None:
