@@ -28,7 +28,7 @@ TILTS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])  # Radians.
 DEPTH = 1.0 / 8  # The penetration of the slave's first node over its length.
 _PENALTY = 8.0
 FORMULATIONS = (VTS_ME, VTS_PPT, BALANCED, STS)
-_LOST = "force lost between slave and master over the slave's force"
+_FORCE_LOSS = "force lost between slave and master over the slave's force"
 _MASTER = (-1.0, 0.25, 0.75, 2.0)  # The area of each virtual slave node crosses a node, up to θ = 0.5.
 
 
@@ -49,7 +49,7 @@ def nodal_forces(formulation: PaperFormulation, theta: float, master: Sequence[f
 class Imbalance:
     """The loss of force, |ΣR|, and of moment about the slave's middle, |Σ x×R|, over the tilt."""
 
-    force: Annotated[Series, series_columns("tilt", "rad", "tilt of the slave", _LOST)]
+    force: Annotated[Series, series_columns("tilt", "rad", "tilt of the slave", _FORCE_LOSS)]
     moment: Annotated[Series, values_column("tilt", "moment lost over the slave's force times its length")]
     formulations: Formulations = FORMULATIONS
 

@@ -56,7 +56,7 @@ class PatchTests:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What an item of patch tests computes, declares and states."""
+    """The parts of an item of patch tests: it computes, declares and states what they say."""
 
     setups: tuple[PatchSetup, ...]
     printed: PrintedForces | None

@@ -88,7 +88,7 @@ def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "f
 def make_cost_figure(results: BenchResults) -> Figure:
     """Return the time to an error of 1 % in the forces over that of the reference, by formulation and scene."""
     names = [name for name in results.formulations if name != REFERENCE]
-    ratios = {scene: {name: cost_ratio(results, name, scene) for name in names} for scene in results.scenes}
+    ratios = _cost_ratios(results, names)
     low, high = _cost_range(ratios)
     order = sorted(names, key=lambda name: _rank([row[name] for row in ratios.values()]), reverse=True)
     with matplotlib.rc_context(_STYLE | {"font.size": 10.0, "lines.markersize": 6.5}):
@@ -138,6 +138,11 @@ def make_profile_figure(results: BenchResults) -> Figure | None:
         handles = [Line2D([], [], color="C3", label="formulation"), Line2D([], [], color="k", ls="--", label=REFERENCE)]
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
+
+
+def _cost_ratios(results: BenchResults, names: list[str]) -> dict[str, dict[str, float]]:
+    """Return {scene: {formulation: time over that of the reference}}."""
+    return {scene: {name: cost_ratio(results, name, scene) for name in names} for scene in results.scenes}
 
 
 def _cost_range(ratios: dict[str, dict[str, float]]) -> tuple[float, float]:

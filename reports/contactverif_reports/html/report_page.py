@@ -121,26 +121,25 @@ def _section(
     run: Run, name: str, cells: Mapping[tuple[str, str], Cell], examples: Sequence[Example], axis: Axis
 ) -> Section:
     """Return the section of one formulation."""
-    own_cells = [cell for (formulation, _), cell in cells.items() if formulation == name]
+    own_cells = [cells[name, row.property_id] for row in run.rows_of(name)]
     own_examples = [example for example in examples if example.counterexample.formulation == name]
-    example_of = {example.counterexample.property_id: example.counterexample.id for example in own_examples}
-    lines = [
-        Line(
-            cell=cell,
-            promise=_PROMISES[cell.row.promise],
-            strip=strip(cell.margins, axis),
-            example=example_of.get(cell.property_id, ""),
-        )
-        for cell in own_cells
-    ]
     return Section(
         formulation=name,
         number=run.formulations.index(name) + 1,
         open=len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in run.rows_of(name)),
         missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
-        lines=tuple(lines),
+        lines=_lines(own_cells, own_examples, axis),
         examples=tuple(own_examples),
         iterations=tuple(line for cell in own_cells for line in count_iterations([cell])),
+    )
+
+
+def _lines(cells: Sequence[Cell], examples: Sequence[Example], axis: Axis) -> tuple[Line, ...]:
+    """Return the table of one formulation, a line for each property."""
+    example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
+    return tuple(
+        Line(cell, _PROMISES[cell.row.promise], strip(cell.margins, axis), example_of.get(cell.property_id, ""))
+        for cell in cells
     )
 
 

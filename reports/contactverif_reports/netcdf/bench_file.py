@@ -153,7 +153,6 @@ def _results(root: Group, timing: Group) -> BenchResults:
     unsolved = np.argwhere(outcomes != Outcome.SOLVED).tolist()
     attributes = {str(name): str(value) for name, value in root.attrs.items()}
     not_loaded = attributes["not_loaded"]
-    lines = (line.partition(": ") for line in not_loaded.splitlines())
     structure = ("title", "bench_schema", "Conventions", "not_loaded")
     return BenchResults(
         formulations=formulations,
@@ -169,7 +168,7 @@ def _results(root: Group, timing: Group) -> BenchResults:
         wall=_wall(timing),
         yardstick=timing["yardstick_seconds"].values,
         remarks={(formulations[row], cell): str(remarks[row, cell]) for row, cell in unsolved},
-        not_loaded={} if not_loaded == NONE else {name: reason for name, _, reason in lines},
+        not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
 
@@ -185,3 +184,8 @@ def _wall(timing: Group) -> FloatArray:
     nothing = np.full_like(timing["seconds"].values[:, :, -1], np.nan)
     wall: FloatArray = timing["wall_seconds"].values if "wall_seconds" in timing else nothing
     return wall
+
+
+def _split(line: str) -> tuple[str, str]:
+    name, _, reason = line.partition(": ")
+    return name, reason
