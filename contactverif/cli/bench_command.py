@@ -154,11 +154,7 @@ def _run(names: list[str], plan: BenchPlan, limits: Limits | None, files: Output
 
 
 def _write(
-    results: BenchResults,
-    changes: tuple[Slowdown, ...],
-    files: OutputFiles,
-    folder: PictureFolder | None,
-    file: str,
+    results: BenchResults, changes: tuple[Slowdown, ...], files: OutputFiles, folder: PictureFolder | None, file: str
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:

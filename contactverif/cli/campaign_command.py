@@ -24,11 +24,7 @@ def campaign(
     *,
     names: Annotated[
         list[str],
-        typer.Argument(
-            help="Formulations, as in verify.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
-        ),
+        typer.Argument(help="Formulations, as in verify.", metavar="NAME", autocompletion=complete_formulation),
     ],
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,

@@ -14,8 +14,7 @@ _TEXT = ".txt"
 
 def queries(
     out: Annotated[
-        Path,
-        typer.Option(help="Write the queries to FILE.txt, their exact answers to FILE.exact.txt.", metavar="FILE"),
+        Path, typer.Option(help="Write the queries to FILE.txt, their exact answers to FILE.exact.txt.", metavar="FILE")
     ],
     seed: Annotated[int, typer.Option(help="The same seed gives the same files, bit for bit.", metavar="N")] = 0,
     number: Annotated[int, typer.Option("-n", "--number", help="Number of queries.", metavar="N")] = 10_000,

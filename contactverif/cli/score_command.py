@@ -46,8 +46,7 @@ def score(
         Path | None, typer.Option(help="The exact answers. (default: QUERIES.exact.txt)", metavar="FILE")
     ] = None,
     at_most: Annotated[
-        float | None,
-        typer.Option(help="Exit with status 1 if more decisions a million are wrong.", metavar="N", min=0),
+        float | None, typer.Option(help="Exit with status 1 if more decisions a million are wrong.", metavar="N", min=0)
     ] = None,
 ) -> None:
     """Score the answers of a program, in any language, to projection queries.

@@ -150,8 +150,7 @@ class PlaceOptions:
     """The mesh of the user or the scene on which the properties are checked, instead of random interfaces."""
 
     mesh: Annotated[
-        Path | None,
-        typer.Option(help="Check on the interface of this mesh file, with random states.", metavar="FILE"),
+        Path | None, typer.Option(help="Check on the interface of this mesh file, with random states.", metavar="FILE")
     ] = None
     slave: Annotated[str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")] = None
     master: Annotated[str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")] = None

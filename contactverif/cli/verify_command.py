@@ -56,8 +56,7 @@ def verify(
     workers: WorkerOptions,
     isolation: IsolationOptions,
     resume: Annotated[
-        Path | None,
-        typer.Option(help="Go on with the run that was to write FILE and was stopped.", metavar="FILE"),
+        Path | None, typer.Option(help="Go on with the run that was to write FILE and was stopped.", metavar="FILE")
     ] = None,
 ) -> None:
     """Check every property of a formulation: print a table, draw what fails.

@@ -122,13 +122,7 @@ class VerifyJob:
     @contextmanager
     def journal(self) -> Iterator[Journal]:
         """Open a block with the journal of the run. In it no other process goes on with the same journal."""
-        from contactverif.run.journal import (
-            begin_journal,
-            hold_journal,
-            journal_folder,
-            keep_earlier,
-            withdraw_journal,
-        )
+        from contactverif.run.journal import begin_journal, hold_journal, journal_folder, keep_earlier, withdraw_journal
         from contactverif.run.run_journal import Journal
 
         if self.output is None:

@@ -10,15 +10,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.oracle.exact_distance import Reach, nearest_of, reach
-from contactverif.oracle.exact_points import (
-    ExactPoints,
-    Integers,
-    Lattice,
-    Ratios,
-    View,
-    positions,
-    slave_normal_view,
-)
+from contactverif.oracle.exact_points import ExactPoints, Integers, Lattice, Ratios, View, positions, slave_normal_view
 
 _SAFE = 2.0**-20  # Floats err by less than this share of a distance, wherever a state makes sense.
 DEEP = 2.0  # Segments that penetrate by more than this many lengths of both need not be in contact.

@@ -326,14 +326,8 @@ CURVED_STUDIES = Studies(
     read=WavyStudy.from_case,
     series=_SERIES,
     bounds=(
-        _FORCE_RATE(
-            limits={"": 1.0},
-            reason="Right ones: at least 1.13.",
-        ),
-        _MOTION_RATE(
-            limits={"": 1.8},
-            reason="The rate of linear elements is 2; right ones: at least 1.89.",
-        ),
+        _FORCE_RATE(limits={"": 1.0}, reason="Right ones: at least 1.13."),
+        _MOTION_RATE(limits={"": 1.8}, reason="The rate of linear elements is 2; right ones: at least 1.89."),
         _PRESSURE_RATE,
         _LAST_PRESSURE(
             limits={"": 4.0},

@@ -75,10 +75,7 @@ def _cross(a: FloatArray, b: FloatArray) -> float:
 _define = partial(Property.define, family="hard", quantities=(DIRECTION, TOTAL, SIZE), promise=lambda traits: True)
 
 
-@_define(
-    id="hard.convex-kink",
-    cases=Cases.from_list(convex_kink_states),
-)
+@_define(id="hard.convex-kink", cases=Cases.from_list(convex_kink_states))
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
@@ -101,10 +98,7 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(
-    id="hard.concave-corner",
-    cases=Cases.from_list(concave_corner_states),
-)
+@_define(id="hard.concave-corner", cases=Cases.from_list(concave_corner_states))
 def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     """A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.
 
@@ -125,10 +119,7 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(
-    id="hard.free-end",
-    cases=Cases.from_list(free_end_states),
-)
+@_define(id="hard.free-end", cases=Cases.from_list(free_end_states))
 def hard_free_end(case: Case, subject: Subject) -> Measurement:
     """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
@@ -151,10 +142,7 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(
-    id="hard.steep-slave",
-    cases=Cases.from_list(steep_slave_states),
-)
+@_define(id="hard.steep-slave", cases=Cases.from_list(steep_slave_states))
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
     """A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.
 

@@ -32,9 +32,7 @@ from contactverif_properties.shared.uniform_pressure import (
 TOTAL = stated_gap_quantity("error of the total force")
 NODAL = stated_gap_quantity("error of a nodal force")
 ALONG = replace(
-    TOTAL,
-    name="force along the surface",
-    reason=f"{TOTAL.reason} A flat surface pushes across itself alone.",
+    TOTAL, name="force along the surface", reason=f"{TOTAL.reason} A flat surface pushes across itself alone."
 )
 FLAT_QUANTITIES = (ALONG, TOTAL, NODAL)
 VACUOUS = "the gap is smaller than the rounding of positions that far from the origin"
@@ -78,18 +76,11 @@ def exact_forces(case: Case) -> FloatArray:
 
 
 _define = partial(
-    Property.define,
-    family="hard",
-    quantities=FLAT_QUANTITIES,
-    promise=promise_flat_forces,
-    exact=exact_forces,
+    Property.define, family="hard", quantities=FLAT_QUANTITIES, promise=promise_flat_forces, exact=exact_forces
 )
 
 
-@_define(
-    id="hard.offset",
-    cases=Cases.from_list(offset_states),
-)
+@_define(id="hard.offset", cases=Cases.from_list(offset_states))
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
 
@@ -113,10 +104,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(
-    id="hard.deep",
-    cases=Cases.from_list(deep_states),
-)
+@_define(id="hard.deep", cases=Cases.from_list(deep_states))
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
 
@@ -134,10 +122,7 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(
-    id="hard.node-hit",
-    cases=Cases.from_list(node_hit_states),
-)
+@_define(id="hard.node-hit", cases=Cases.from_list(node_hit_states))
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
 
@@ -155,10 +140,7 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(
-    id="hard.search",
-    cases=Cases.from_list(search_states),
-)
+@_define(id="hard.search", cases=Cases.from_list(search_states))
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
 

@@ -70,10 +70,7 @@ _define_patch = partial(
 )
 
 
-@_define_patch(
-    id="hard.c",
-    cases=Cases.from_list(case_c),
-)
+@_define_patch(id="hard.c", cases=Cases.from_list(case_c))
 def hard_c(case: Case, subject: Subject) -> Measurement:
     """Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.
 
@@ -94,10 +91,7 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(
-    id="hard.contrast",
-    cases=Cases.from_list(contrast_scenes),
-)
+@_define_patch(id="hard.contrast", cases=Cases.from_list(contrast_scenes))
 def hard_contrast(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.
 
@@ -115,10 +109,7 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(
-    id="hard.short-segment",
-    cases=Cases.from_list(lambda: tiny_segment_states() + tiny_segment_scenes()),
-)
+@_define_patch(id="hard.short-segment", cases=Cases.from_list(lambda: tiny_segment_states() + tiny_segment_scenes()))
 def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     """One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.
 
@@ -138,10 +129,7 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(
-    id="hard.stiff",
-    cases=Cases.from_list(stiff_scenes),
-)
+@_define_patch(id="hard.stiff", cases=Cases.from_list(stiff_scenes))
 def hard_stiff(case: Case, subject: Subject) -> Measurement:
     """Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.
 

@@ -68,11 +68,7 @@ def reflect(points: FloatArray) -> FloatArray:
 _define = partial(Property.define, family="invariants", promise=lambda traits: True)
 
 
-@_define(
-    id="mirror",
-    quantities=IN_MIRROR,
-    cases=Cases.random(smooth_cases),
-)
+@_define(id="mirror", quantities=IN_MIRROR, cases=Cases.random(smooth_cases))
 def mirror(case: Case, subject: Subject) -> Measurement:
     """The mirror image of a state has the mirror image of its forces and of its tangent.
 
@@ -128,12 +124,7 @@ def renumbering_cases(
     return {ANY: smooth_cases(), CLOSED: closed_cases()} if interface is None else smooth_cases(interface)
 
 
-@_define(
-    id="renumbering",
-    quantities=IN_OTHER_NUMBERS,
-    cases=Cases.by_kind(renumbering_cases),
-    kinds=(ANY, CLOSED),
-)
+@_define(id="renumbering", quantities=IN_OTHER_NUMBERS, cases=Cases.by_kind(renumbering_cases), kinds=(ANY, CLOSED))
 def renumbering(case: Case, subject: Subject) -> Measurement:
     """Other numbers of nodes and segments, or another seam of a closed chain, change nothing.
 
@@ -181,12 +172,7 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     return {FAR: smooth_cases(), BEHIND: behind}
 
 
-@_define(
-    id="remote",
-    quantities=BESIDE_OTHERS,
-    cases=Cases.by_kind(remote_cases),
-    kinds=(FAR, BEHIND),
-)
+@_define(id="remote", quantities=BESIDE_OTHERS, cases=Cases.by_kind(remote_cases), kinds=(FAR, BEHIND))
 def remote(case: Case, subject: Subject) -> Measurement:
     """A body that touches nothing, far away or behind the master, changes nothing.
 

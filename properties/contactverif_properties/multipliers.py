@@ -19,12 +19,7 @@ from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases, solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
-from contactverif_properties.shared.newton_solution import (
-    find_solution,
-    is_untouched,
-    solution_details,
-    solution_floor,
-)
+from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details, solution_floor
 from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
 SCALE_RATIO = 8.0  # The first scale c over the second one.

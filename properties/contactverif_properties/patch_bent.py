@@ -54,9 +54,7 @@ def rings() -> tuple[Case, ...]:
     """Return the coarser of both meshes, with either ring as the slave and at two penalties."""
     return tuple(
         replace(
-            shrink_fit(FIT, slave=slave, refine=REFINEMENTS[0]),
-            penalty=penalty,
-            name=f"{slave} slave, ε̂ = {penalty:g}",
+            shrink_fit(FIT, slave=slave, refine=REFINEMENTS[0]), penalty=penalty, name=f"{slave} slave, ε̂ = {penalty:g}"
         ).case()
         for slave, penalty in product(ROLES, PENALTIES)
     )

@@ -212,11 +212,7 @@ _define_class = partial(
 )
 
 
-@_define_class(
-    id="patch.flat.normal",
-    cases=Cases.random(normal_cases),
-    promise=promise_normal,
-)
+@_define_class(id="patch.flat.normal", cases=Cases.random(normal_cases), promise=promise_normal)
 def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     """Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.
 
@@ -243,11 +239,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     return measure_class(case, subject)
 
 
-@_define_class(
-    id="patch.flat.single",
-    cases=Cases.random(single_cases),
-    promise=promise_single,
-)
+@_define_class(id="patch.flat.single", cases=Cases.random(single_cases), promise=promise_single)
 def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     """They are exact too where inner master nodes lie in the middle of slave segments.
 

@@ -75,16 +75,11 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
 
 
 _define = partial(Property.define, family="patch", bodies=True, exact=forces_to_draw)
-_define_at_two_penalties = partial(
-    _define,
-    quantities=(*QUANTITIES, *map(_at_high, QUANTITIES), MULTIPLIERS),
-)
+_define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_high, QUANTITIES), MULTIPLIERS))
 
 
 @_define_at_two_penalties(
-    id="patch.flat.solve",
-    cases=Cases.random(block_cases),
-    promise=lambda traits: traits.promises.patch.flat,
+    id="patch.flat.solve", cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     """Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.
@@ -112,9 +107,7 @@ def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_at_two_penalties(
-    id="patch.flat.normal.solve",
-    cases=_scenes_of_class(normal_scenes, midpoints=False),
-    promise=promise_normal,
+    id="patch.flat.normal.solve", cases=_scenes_of_class(normal_scenes, midpoints=False), promise=promise_normal
 )
 def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
     """Two blocks find the exact stress, forces and gap where each inner master node lies on a slave node.
@@ -138,9 +131,7 @@ def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_at_two_penalties(
-    id="patch.flat.single.solve",
-    cases=_scenes_of_class(single_scenes, midpoints=True),
-    promise=promise_single,
+    id="patch.flat.single.solve", cases=_scenes_of_class(single_scenes, midpoints=True), promise=promise_single
 )
 def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     """Two blocks find them too where inner master nodes lie in the middle of slave segments.

@@ -39,11 +39,7 @@ OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
 FARTHER = Quantity("distance beyond the nearest segment", "4u", LOCAL_REASON)
 
 
-@define_projection(
-    id="projection.segment",
-    quantities=(FARTHER,),
-    applicable=refuse_without_rule,
-)
+@define_projection(id="projection.segment", quantities=(FARTHER,), applicable=refuse_without_rule)
 def projection_segment(case: Case, subject: Subject) -> Measurement:
     """Each contact point is measured against the master segment that the stated rule names.
 
@@ -98,11 +94,7 @@ POSITION = Quantity("error of the position", "4u", "Two products and their sum a
 _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
-@define_projection(
-    id="projection.place",
-    quantities=(GAP, XI, NORMAL, POSITION),
-    applicable=refuse_without_rule,
-)
+@define_projection(id="projection.place", quantities=(GAP, XI, NORMAL, POSITION), applicable=refuse_without_rule)
 def projection_place(case: Case, subject: Subject) -> Measurement:
     """Position, ξ, normal and gap of each contact point are those of its place.
 
@@ -176,11 +168,7 @@ def refuse_other_decisions(traits: Traits) -> str:
     return refuse_without_rule(traits)
 
 
-@define_projection(
-    id="projection.activity",
-    quantities=(WRONG,),
-    applicable=refuse_other_decisions,
-)
+@define_projection(id="projection.activity", quantities=(WRONG,), applicable=refuse_other_decisions)
 def projection_activity(case: Case, subject: Subject) -> Measurement:
     """A contact point is active exactly where its gap is closed and its foot is on the master.
 

@@ -188,10 +188,7 @@ FOOT = Quantity(
 LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
 
 
-@define_projection(
-    id="projection.forces",
-    quantities=(UNIT, FORCES, FOOT, LAW),
-)
+@define_projection(id="projection.forces", quantities=(UNIT, FORCES, FOOT, LAW))
 def projection_forces(case: Case, subject: Subject) -> Measurement:
     """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
 

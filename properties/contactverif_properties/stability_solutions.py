@@ -23,10 +23,7 @@ from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif.problems.stability_states import stability_scenes
 from contactverif.problems.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
-from contactverif_properties.shared.applicability import (
-    refuse_dependent_multipliers,
-    refuse_unstated_penalty,
-)
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.conditioning import (
     Conditioning,
     forces_quantity,

@@ -100,11 +100,7 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
         if len(more):
             comparison = comparison.join(differences.compare(more, length))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
-        tolerances = {
-            CENTRAL: 30 * conditioning ** (2 / 3),
-            TAYLOR: SLOPE,
-            COMPLEX: 1e-11 + 64 * conditioning,
-        }
+        tolerances = {CENTRAL: 30 * conditioning ** (2 / 3), TAYLOR: SLOPE, COMPLEX: 1e-11 + 64 * conditioning}
         values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
             values[TAYLOR] = comparison.slope

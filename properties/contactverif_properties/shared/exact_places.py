@@ -22,14 +22,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
-from contactverif.oracle.exact_points import (
-    ExactPoints,
-    Lattice,
-    View,
-    closest_view,
-    run_against,
-    slave_normal_view,
-)
+from contactverif.oracle.exact_points import ExactPoints, Lattice, View, closest_view, run_against, slave_normal_view
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projections import KINDS, projection_states, projections_by_kind
 from contactverif_properties.shared.any_state import any_cases, prepare_state

@@ -21,12 +21,7 @@ from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
 from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
-from contactverif.problems.uniform_stress import (
-    PRESSURE_TOLERANCE,
-    STRESS_TOLERANCE,
-    stress_error,
-    uniform_tolerances,
-)
+from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import (
