@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import any_cases, forces_of_any_state, prepare_state, random_directions
+from contactverif_properties.shared.any_state import any_cases, freeze_state, random_directions
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.roundoff import (
     SEGMENT_REASON,
@@ -61,8 +61,8 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never: a change of partner moves forces between nodes and leaves their sum as it is.
     """
-    state, forces = forces_of_any_state(case, subject)
-    return _judge(FORCE_IMBALANCE, float(np.linalg.norm(forces.sum(axis=0))), 1.0, state, forces, subject.traits)
+    state = freeze_state(case, subject)
+    return _judge(FORCE_IMBALANCE, float(np.linalg.norm(state.forces.sum(axis=0))), 1.0, state, subject.traits)
 
 
 @Property.define(
@@ -85,18 +85,17 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never: on either side of a kink a formulation that balances moments does so.
     """
-    state, forces = forces_of_any_state(case, subject)
-    arms = state.positions - state.positions.mean(axis=0)
+    state = freeze_state(case, subject)
+    arms, forces = state.case.positions - state.case.positions.mean(axis=0), state.forces
     moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
-    return _judge(MOMENT_IMBALANCE, moment, state.diameter, state, forces, subject.traits)
+    return _judge(MOMENT_IMBALANCE, moment, case.diameter, state, subject.traits)
 
 
-def _judge(
-    quantity: Quantity, remainder: float, arm: float, state: Case, forces: FloatArray, traits: Traits
-) -> Measurement:
-    """Return what remains of the forces (n_nodes, 2), or of their moment, over Σ|R| of the slave times the arm."""
-    tolerance = gap_tolerance(state, mean_penetration(state, forces), rounding_distance(state, traits))
-    imbalance = ratio(remainder, arm * sum_slave_forces(state, forces))
+def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState, traits: Traits) -> Measurement:
+    """Return what remains of the forces, or of their moment, over Σ|R| of the slave times the arm."""
+    case, forces = state.case, state.forces
+    tolerance = gap_tolerance(case, mean_penetration(case, forces), rounding_distance(case, traits))
+    imbalance = ratio(remainder, arm * sum_slave_forces(case, forces))
     return Measurement([quantity.check(imbalance, tolerance)], idle=not forces.any())
 
 
@@ -129,41 +128,40 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
     """
-    formulation, case = prepare_state(case, subject)
-    pairing = formulation.pair(case.interface, case.z)
-    forces = formulation.residual(case.interface, pairing, case.z)
-    distance = rounding_distance(case, subject.traits)
+    state = freeze_state(case, subject)
+    case, distance = state.case, rounding_distance(state.case, subject.traits)
     values, tolerances, undecided = {}, {}, ""
-    if "tangent" in formulation.provides:
-        tangent = dense(formulation.tangent(case.interface, pairing, case.z))
+    if "tangent" in subject.provides:
+        tangent = state.tangent
         values[ASYMMETRY] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
-        tolerances[ASYMMETRY] = segment_tolerance(case, forces, distance)
+        tolerances[ASYMMETRY] = segment_tolerance(case, state.residual, distance)
     if subject.traits.promises.tangent != "approximate":
-        for share in RADII if pairing is None else RADII[:1]:
+        for share in RADII if state.pairing is None else RADII[:1]:
             radius = share * case.shortest_segment
-            values[WORK] = largest_work(case, formulation, pairing, radius)
+            values[WORK] = largest_work(state, radius)
             tolerances[WORK] = 64 * UNIT_ROUNDOFF * distance / radius
             undecided = ""
-            if values[WORK] <= tolerances[WORK] or pairing is not None:
+            if values[WORK] <= tolerances[WORK] or state.pairing is not None:
                 break
             directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
-            kinks = (find_kink(case, formulation, pairing, radius, direction) for direction in directions)
+            kinks = (find_kink(state, radius, direction) for direction in directions)
             undecided = next(filter(None, kinks), "")
             if not undecided:
                 break
-    return Measurement(check_all(values, tolerances), undecided, idle=not forces[: case.interface.n_unknowns].any())
+    return Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())
 
 
-def largest_work(case: Case, formulation: CheckedFormulation, pairing: Pairing | None, radius: float) -> float:
+def largest_work(state: FrozenState, radius: float) -> float:
     """Return the largest work in a closed loop around a state, over the sum of the works on its parts.
 
     The loops are circles (`radius` is a length) on a frozen pairing.
     """
+    case = state.case
     planes = random_directions(case.seed, 2 * N_LOOPS, case.z.size).reshape(N_LOOPS, 2, 1, -1)
     angles = 2 * np.pi * np.arange(N_POINTS)[:, None] / N_POINTS
     moves = radius * (np.cos(angles) * planes[:, 0] + np.sin(angles) * planes[:, 1])  # (N_LOOPS, N_POINTS, n)
     steps = radius * (np.cos(angles) * planes[:, 1] - np.sin(angles) * planes[:, 0]) * (2 * np.pi / N_POINTS)
-    forces = formulation.residual(case.interface, pairing, case.z + moves)
+    forces = state.residual_at(case.z + moves)
     forces = forces - forces.mean(axis=1, keepdims=True)  # A constant force does no work in a loop.
     works = forces * steps
     work, throughput = np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))

@@ -25,6 +25,7 @@ from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
 from contactverif_properties.patch_flat import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
 from contactverif_properties.shared.passes import nearest_sum
+from contactverif_properties.shared.uniform_pressure import uniform_state
 
 
 def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:
@@ -286,24 +287,21 @@ def accuracy_arc(case: Case, subject: Subject) -> Measurement:
 def _errors(arcs: Arcs, refine: int, subject: Subject) -> dict[Quantity, float]:
     """Return the errors {quantity: number} on one mesh."""
     case = arcs.case(refine)
-    formulation, interface, n_slave = subject.for_case(case), case.interface, case.interface.n_slave_nodes
-    case = case.with_multipliers(np.full(formulation.n_multipliers(interface), arcs.pressure))
+    state, n_slave = uniform_state(case, subject, arcs.pressure), case.interface.n_slave_nodes
     # Areas of the reference are those of the master's arc, on which the slave lies there.
     share = arcs.radius / arcs.slave_radius if subject.traits.rules.area == "reference" else 1.0
-    pairing = formulation.pair(interface, case.z)
-    forces = -formulation.residual(interface, pairing, case.z)[: interface.n_unknowns].reshape(-1, 2)
+    forces = -state.forces
     exact = share * arcs.slave_force
     totals = forces[:n_slave].sum(axis=0), -forces[n_slave:].sum(axis=0)
     slave, master = (float(np.linalg.norm(total - exact) / np.linalg.norm(exact)) for total in totals)
     values = {SLAVE: slave, FORCES: _nodal_error(arcs, case, forces, share)}
     if subject.traits.promises.conserves_force:
         values[MASTER] = master
-    if "contact_points" in formulation.provides:
-        points = formulation.contact_points(interface, pairing, case.z)
+    if state.has_points:
         radial = forces[:n_slave] * case.positions[:n_slave] / arcs.slave_radius
-        total = nearest_sum(points, abs(float(radial.sum())))
+        total = nearest_sum(state.points, abs(float(radial.sum())))
         values[SUM] = abs(total / (share * arcs.length * arcs.pressure) - 1)
-        values[PRESSURE] = _pressure_error(points, arcs.pressure)
+        values[PRESSURE] = _pressure_error(state.points, arcs.pressure)
     return values
 
 

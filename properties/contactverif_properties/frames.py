@@ -11,13 +11,12 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, prepare_state
+from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, freeze_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
-from contactverif_properties.shared.passes import split_passes
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import (
     SEGMENT_REASON,
     SEGMENT_TOLERANCE,
@@ -65,22 +64,21 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     interface, random = case.interface, np.random.default_rng(case.seed)
     factor, n = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1)), interface.n_unknowns
     distributed = subject.traits.rules.penalty == "distributed"
-    formulation, case = prepare_state(case, subject)
-    z = np.concatenate([case.z[:n] * factor, case.z[n:] * (1.0 if distributed else factor)])
-    there = replace(case, interface=interface.at(interface.nodes * factor), z=z)
+    state = freeze_state(case, subject)
+    case, z = state.case, state.case.z
+    z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
+    case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
-    rescaled = subject.with_penalty(penalty / (factor if distributed else 1.0))
-    pairing, pairing_there = formulation.pair(interface, case.z), rescaled.pair(there.interface, there.z)
-    (forces,), tangents = ask_forces_and_tangents(formulation, (interface, pairing, case.z))
-    (forces_there,), tangents_there = ask_forces_and_tangents(rescaled, (there.interface, pairing_there, there.z))
+    there = FrozenState.at(subject.with_penalty(penalty / (factor if distributed else 1.0)), case_there)
+    (forces,), tangents = ask_forces_and_tangents(state)
+    (forces_there,), tangents_there = ask_forces_and_tangents(there)
     forces, forces_there = forces[:n], forces_there[:n]
     changes = [Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
         changes.append(Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max())))
     tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
-    states = [(case, formulation, pairing, case.largest_coordinate)]
-    return Measurement(*judge_changes(changes, tolerance, states), idle=not forces.any())
+    return Measurement(*judge_changes(changes, tolerance, [state]), idle=not forces.any())
 
 
 def turn_state(case: Case) -> tuple[Case, FloatArray]:
@@ -118,16 +116,15 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where either state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
     """
-    formulation, case = prepare_state(case, subject)
-    interface, n = case.interface, case.interface.n_unknowns
-    there, rotation = turn_state(case)
-    pairing, pairing_there = (formulation.pair(interface, state.z) for state in (case, there))
-    turn = linalg.block_diag(np.kron(np.eye(interface.n_nodes), rotation), np.eye(case.n_multipliers))
-    states = (interface, pairing, case.z), (interface, pairing_there, there.z)
-    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
+    state = freeze_state(case, subject)
+    case, n = state.case, case.interface.n_unknowns
+    case_there, rotation = turn_state(case)
+    there = FrozenState.at(state.formulation, case_there)
+    turn = linalg.block_diag(np.kron(np.eye(case.interface.n_nodes), rotation), np.eye(case.n_multipliers))
+    (forces, forces_there), tangents = ask_forces_and_tangents(state, there)
 
-    largest = max(case.largest_coordinate, there.largest_coordinate)
-    one_pass = forces / _count_passes(case, subject, formulation, pairing)
+    largest = max(case.largest_coordinate, case_there.largest_coordinate)
+    one_pass = forces / _count_passes(state, subject)
     tolerance = segment_tolerance(case, one_pass, largest)
     size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
     changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
@@ -136,12 +133,10 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
         change = tangent_there - turn @ tangent @ turn.T
         changes.append(Change("tangent", TURNED_TANGENT, change, float(np.abs(tangent).max())))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
-    both = [(state, formulation, of_state, largest) for state, of_state in ((case, pairing), (there, pairing_there))]
-    return Measurement(*judge_changes(changes, tolerance, both), idle=not forces[:n].any())
+    numbers, undecided = judge_changes(changes, tolerance, [state, there], largest)
+    return Measurement(numbers, undecided, idle=not forces[:n].any())
 
 
-def _count_passes(case: Case, subject: Subject, formulation: CheckedFormulation, pairing: Pairing | None) -> int:
+def _count_passes(state: FrozenState, subject: Subject) -> int:
     """Return 2 where springs act twice, in two passes: half of the penetration needs the same forces. Else return 1."""
-    if subject.traits.rules.area is not None or "contact_points" not in formulation.provides:
-        return 1
-    return len(list(split_passes(case, formulation.contact_points(case.interface, pairing, case.z))))
+    return len(list(state.passes)) if subject.traits.rules.area is None and state.has_points else 1

@@ -11,11 +11,12 @@ At a kink two right formulations may give different forces. What they have in co
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity, check_all
@@ -29,8 +30,9 @@ from contactverif.problems.hard_corner_states import (
     steep_slave_states,
 )
 from contactverif_properties.hard_flat import knows_total
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
-from contactverif_properties.shared.uniform_pressure import uniform_forces
+from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state
 
 _TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
 DIRECTION = Quantity("part outside the normals", _TOLERANCE, SEGMENT_REASON)
@@ -42,7 +44,7 @@ SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASS
 def measure_bounded(case: Case, subject: Subject) -> Measurement:
     """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
     bounds = case.parameters["segment_bounds" if subject.traits.rules.gap else "bounds"] * case.penalty
-    slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
+    slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     largest = case.penalty * case.diameter * case.slave_length
     numbers, broken = [SIZE.check(size / largest, 4.0)], ""
@@ -203,27 +205,23 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never: contact may be active or not, and the numbers allow for both.
     """
-    formulation, interface = subject.for_case(case), case.interface
-    state = case.with_multipliers(np.zeros(formulation.n_multipliers(interface)))
-    pairing = formulation.pair(interface, state.z)
-    forces = formulation.residual(interface, pairing, state.z)[: interface.n_unknowns]
-    longest = float(interface.slave.lengths(case.positions).max())
+    state = FrozenState.with_multiplier(subject.for_case(case), case, 0.0)
+    longest = float(case.interface.slave.lengths(case.positions).max())
     size, gap = case.largest_coordinate, abs(case.parameter("shift"))
-    values = {FORCE: float(np.abs(forces).max()) / (case.penalty * longest * size)}
+    values = {FORCE: float(np.abs(state.forces).max()) / (case.penalty * longest * size)}
     tolerances = {FORCE: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
     if "tangent" in subject.provides and subject.traits.promises.tangent == "exact":
-        n = interface.n_unknowns
-        tangent = dense(formulation.tangent(interface, pairing, state.z))[:n, :n]
-        along, across = _motions(case)
+        n = case.interface.n_unknowns
+        tangent, (along, across) = state.tangent[:n, :n], _motions(case)
         resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
         values |= {PRESSING: resistance, PULLING: -resistance}
         roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
         tolerances |= {PRESSING: 4.0, PULLING: roundoff}
         if gap:
             depth = DEPTH * UNIT_ROUNDOFF * size
-            z = state.z.copy()
+            z = state.case.z.copy()
             z[:n] -= depth * across
-            tangent = dense(formulation.tangent(interface, formulation.pair(interface, z), z))[:n, :n]
+            tangent = FrozenState.at(state.formulation, replace(state.case, z=z)).tangent[:n, :n]
             values[SLIDING] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
             tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
     return Measurement(check_all(values, tolerances))

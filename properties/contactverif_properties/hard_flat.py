@@ -26,7 +26,8 @@ from contactverif_properties.shared.uniform_pressure import (
     forces_of_penetration,
     normal_of,
     push_apart,
-    uniform_forces,
+    pushing_forces,
+    uniform_state,
 )
 
 TOTAL = stated_gap_quantity("error of the total force")
@@ -55,7 +56,7 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     if tolerance >= 1:
         return Measurement(undecided=VACUOUS)
     exact = exact_forces(case)
-    slave = uniform_forces(case, subject)[: case.interface.n_slave_nodes]
+    slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
     along, normal = case.parameters["direction"], normal_of(case)
     numbers = [ALONG.check(ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))

@@ -32,6 +32,7 @@ from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_
 from contactverif_properties.hard_flat import FLAT_QUANTITIES, exact_forces, measure_flat
 from contactverif_properties.patch_solved import patch_dead_zone
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.solved_patch import (
     GAP,
@@ -266,8 +267,8 @@ def hard_zero_load(case: Case, subject: Subject) -> Measurement:
     trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
     u = trace.u[int(np.argmin(trace.residuals))] if trace.converged else np.zeros(trace.u.shape[1])
     q = u[: scene.n_free]
-    z = np.append(scene.positions(q), u[scene.n_free :])
-    forces = formulation.residual(case.interface, formulation.pair(case.interface, z), z)[: case.interface.n_unknowns]
+    end = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
+    forces = FrozenState.at(formulation, end).forces
     young = max(body.young for body in scene.bodies)
     height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
     stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))

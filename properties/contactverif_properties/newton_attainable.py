@@ -23,7 +23,6 @@ from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases
-from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
@@ -32,6 +31,7 @@ from contactverif_properties.shared.conditioning import (
     difference_quotient,
     forces_quantity,
 )
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
@@ -174,11 +174,11 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
         The unknowns.
     """
     scene, n_free, z = system.scene, system.scene.n_free, system.state(u)
-    pairing = system.pair(u)
-    state = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)
-    forces = system.formulation.residual(scene.interface, pairing, z)
+    case = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)
+    state = FrozenState(system.formulation, case, system.pair(u))
+    forces = state.residual
     to_unknowns = dense(system.transformation).T  # (n_free + n_multipliers, n_unknowns + n_multipliers)
-    derivative = difference_quotient(state, system.formulation, pairing)
+    derivative = difference_quotient(state)
     rows = to_unknowns @ derivative
     matrix = dense(system.stiffness) + rows @ to_unknowns.T
     condition = system.step(matrix, np.zeros(system.size)).condition
@@ -186,20 +186,18 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
         return None
     # Supported nodes count too: where an axis is inclined, rounding moves a node off its support.
     contact = np.abs(rows[:, : scene.interface.n_unknowns]).sum(axis=1)
-    terms = np.abs(rows[:, scene.interface.n_unknowns :]) @ np.abs(state.multipliers) + np.abs(to_unknowns) @ abs(
-        forces
-    )
+    terms = np.abs(rows[:, scene.interface.n_unknowns :]) @ np.abs(case.multipliers) + np.abs(to_unknowns) @ abs(forces)
     terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + np.abs(scene.load)
     return Solution(
         system=system,
         u=u,
-        pairing=pairing,
+        pairing=state.pairing,
         matrix=matrix,
         units=scale_factors(matrix, n_free)[1],
         inverse=np.abs(linalg.inv(matrix)),
         contact=contact,
         terms=terms,
-        conditioning=conditioning_of(state, derivative, forces),
+        conditioning=conditioning_of(case, derivative, forces),
     )
 
 
@@ -280,9 +278,8 @@ def _attain(solution: Solution, case: Case, place: Place) -> Attained:
     undecided = ""
     if rest.pairing != solution.pairing or rest.pairing is None:
         state = replace(case, interface=near.scene.interface, z=near.state(rest.u), n_multipliers=near.n_multipliers)
-        (direction,) = random_directions(case.seed, 1, state.z.size)
-        reach = COORDINATE_ROUNDING * rest.largest
-        undecided = find_kink(state, near.formulation, near.pair(rest.u), reach, direction)
+        frozen = FrozenState(near.formulation, state, near.pair(rest.u))
+        undecided = find_kink(frozen, COORDINATE_ROUNDING * rest.largest)
     return Attained(place.added, rest.residual, ratio(length, allowed), length, undecided)
 
 

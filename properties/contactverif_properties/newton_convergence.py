@@ -25,6 +25,7 @@ from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import (
     LOAD_STEPS,
@@ -324,10 +325,8 @@ def _pair_alike(
     if pairing is not None:
         pairings = [system.pair(u) for u in states]  # All are asked for before one is looked at.
         return [other == pairing for other in pairings]
-    z = [system.state(u) for u in states]
-    (direction,) = random_directions(case.seed, 1, z[0].size)
-    around = (replace(case, z=state, n_multipliers=system.n_multipliers) for state in z)
+    around = (replace(case, z=system.state(u), n_multipliers=system.n_multipliers) for u in states)
     return [
-        not find_kink(state, system.formulation, None, reach, direction)
+        not find_kink(FrozenState(system.formulation, state, None), reach)
         for state, reach in zip(around, reaches, strict=True)
     ]

@@ -21,8 +21,8 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
-from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import is_untouched, solution_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
@@ -173,5 +173,4 @@ def explain_pairing(system: System, case: Case, u: FloatArray) -> str:
     """Return why another pairing at the unknowns u (n,) may be the fault of a kink, or an empty string."""
     state = replace(case, z=system.state(u), n_multipliers=system.n_multipliers)
     reach = COORDINATE_ROUNDING * state.largest_coordinate
-    (direction,) = random_directions(case.seed, 1, state.z.size)
-    return find_kink(state, system.formulation, system.pair(u), reach, direction)
+    return find_kink(FrozenState(system.formulation, state, system.pair(u)), reach)

@@ -27,6 +27,7 @@ from contactverif.problems.shrink_fit import FIT, FiniteFit, RingStudy, Role, sh
 from contactverif.problems.uniform_stress import uniform_forces
 from contactverif_properties.patch_flat import refuse_unknown_total
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.passes import nearest_sum
 from contactverif_properties.shared.solved_patch import ITERATIONS, is_solved, nearest_to_balance
@@ -267,9 +268,9 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     formulation, multiplier = subject.for_case(start), traits.rules.enforcement == "multiplier"
     trace, u = _solve(scene, formulation, exact_unknowns(problem, scene, 0.0 if multiplier else gap), gap)
     q, multipliers = u[: scene.n_free], u[scene.n_free :]
-    z = np.concatenate([scene.positions(q), multipliers])
-    pairing = formulation.pair(scene.interface, z)
-    by_contact = -formulation.residual(scene.interface, pairing, z)[: scene.interface.n_unknowns].reshape(-1, 2)
+    end = replace(start, z=scene.positions(q)).with_multipliers(multipliers)
+    contact = FrozenState.at(formulation, end)
+    by_contact = -contact.forces
     exact, n_slave = uniform_forces(scene.interface, pressure), scene.interface.n_slave_nodes
     by_bodies = scene.nodal_forces(q)
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
@@ -281,11 +282,10 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     }
     tolerances = dict.fromkeys(values, _floor(problem, start, gap))
     unique = not multiplier or traits.promises.independent_multipliers is True
-    if "contact_points" in formulation.provides and traits.rules.penalty == "distributed" and unique:
-        points = formulation.contact_points(scene.interface, pairing, z)
-        if not points.on_master.any():  # Nobody says how two passes share a pressure.
-            values[PRESSURE] = _pressure_error(points, pressure)
-            tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
+    known = contact.has_points and traits.rules.penalty == "distributed" and unique
+    if known and not contact.points.on_master.any():  # Nobody says how two passes share a pressure.
+        values[PRESSURE] = _pressure_error(contact.points, pressure)
+        tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
     idle = not by_contact.any()
     return Measurement(check_all(values, tolerances), details=end_details(trace), idle=idle)
 

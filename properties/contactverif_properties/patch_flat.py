@@ -18,20 +18,22 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.measurement import Measurement, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.published_forces import parse_forces
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
 from contactverif_properties.shared.solved_patch import point_errors
 from contactverif_properties.shared.uniform_pressure import (
     consistent_forces,
-    forces_of_multiplier,
     forces_of_penetration,
     push_apart,
+    pushing_forces,
     transmission_error,
+    uniform_state,
     unit_forces,
 )
 
@@ -115,17 +117,18 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     """
     stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
     interface, penetration = case.interface.at(case.interface.nodes * stretch), case.parameter("penetration")
-    formulation, stretched = subject.for_case(case), replace(case, interface=interface)
-    state, pairing, forces = forces_of_multiplier(stretched, formulation, case.penalty * penetration)
+    formulation = subject.for_case(case)
+    stretched = replace(case, interface=interface)
+    state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
     exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
         exact = exact * stretch
-    error = float(np.linalg.norm(forces[: interface.n_slave_nodes].sum(axis=0) - exact))
+    error = float(np.linalg.norm(pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0) - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
     undecided = ""
     if value > tolerance:
         rounding = COORDINATE_ROUNDING * case.largest_coordinate
-        undecided = explain_by_kink(state, formulation, pairing, rounding, {"forces": error})
+        undecided = explain_by_kink(state, rounding, {"forces": error})
     return Measurement([TOTAL.check(value, tolerance)], undecided)
 
 
@@ -152,10 +155,10 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
     numbers = [FORCE.check(*transmission_error(case, subject))]
-    formulation = subject.for_case(case)
-    if "contact_points" in formulation.provides:
+    state = uniform_state(case, subject)
+    if state.has_points:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
-        gap, pressure = _point_errors(case, formulation)
+        gap, pressure = point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
         numbers.append(GAP.check(gap, tolerance))
         if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
             numbers.append(PRESSURE.check(pressure, tolerance))
@@ -171,14 +174,6 @@ def _heals(before: Measurement, after: Measurement) -> bool:
     """Return whether values that failed are at roundoff afterwards, and a quarter of what they were or less."""
     failures = [number.quantity.name for number in before.numbers if number.value > number.tolerance]
     return _is_within(after, _MOVED) and all(4 * after.values[name] <= before.values[name] for name in failures)
-
-
-def _point_errors(case: Case, formulation: CheckedFormulation) -> tuple[float, float]:
-    """Return `point_errors` of a uniform penetration; multipliers, if any, are all ε̂ |g|."""
-    pressure = case.penalty * case.parameter("penetration")
-    state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), pressure))
-    points = formulation.contact_points(state.interface, formulation.pair(state.interface, state.z), state.z)
-    return point_errors(state, points, case.penalty, pressure)
 
 
 def _move_ends_inwards(case: Case) -> Case | None:
@@ -290,22 +285,25 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
     """
-    formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
-    pairing, spring = formulation.pair(interface, case.z), subject.penalty(case) * depth
+    state, interface, depth = (
+        FrozenState.at(subject.for_case(case), case),
+        case.interface,
+        case.parameter("penetration"),
+    )
+    spring = subject.penalty(case) * depth
     unbiased = bool(subject.traits.promises.unbiased)
     weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
     exact = spring * push_apart(case, weights, 1.0)
-    forces = -formulation.residual(interface, pairing, case.z).reshape(-1, 2)
+    forces = -state.forces
     if unbiased:
         likeness = float((forces * exact).sum())
         forces = forces * (float((exact**2).sum()) / likeness if likeness > 0 else 1.0)
     tolerance, size = gap_tolerance(case, depth), spring * float(weights[: interface.n_slave_nodes].sum())
     values = {FORCE: float(np.linalg.norm(forces - exact, axis=1).max()) / size}
-    if "contact_points" in formulation.provides:
-        points = formulation.contact_points(interface, pairing, case.z)
-        values[GAP] = point_errors(case, points, case.penalty, case.penalty * depth)[0]
+    if state.has_points:
+        values[GAP] = point_errors(state, case.penalty, case.penalty * depth)[0]
         if not unbiased:
-            values[REPORTED_FORCE] = point_errors(case, points, case.penalty, spring)[1]
+            values[REPORTED_FORCE] = point_errors(state, case.penalty, spring)[1]
     return Measurement(check_all(values, tolerance))
 
 
@@ -367,12 +365,7 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
 
 def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
-    formulation = subject.for_case(case)
-    state = case.with_multipliers(np.ones(formulation.n_multipliers(case.interface)))
-    pairing = formulation.pair(state.interface, state.z)
-    if state.n_multipliers:
-        forces: FloatArray = -unit_forces(state, formulation, pairing).sum(axis=1)
-    else:
-        unit = subject.penalty(case) * case.parameter("penetration")
-        forces = -formulation.residual(case.interface, pairing, case.z) / unit
-    return forces.reshape(-1, 2)
+    state = uniform_state(case, subject, 1.0)
+    if state.case.n_multipliers:
+        return np.asarray(-unit_forces(state).sum(axis=1).reshape(-1, 2))
+    return -state.forces / (subject.penalty(case) * case.parameter("penetration"))

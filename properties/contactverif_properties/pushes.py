@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import Array, BoolArray, FloatArray
+from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
@@ -19,8 +19,9 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases, general_cases
-from contactverif_properties.shared.any_state import prepare_state, random_moves
-from contactverif_properties.shared.passes import Pass, split_passes
+from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
+from contactverif_properties.shared.frozen_state import FrozenState
+from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
     SEGMENT_REASON,
@@ -127,10 +128,9 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
     """
     if "penetration" in case.parameters:
         return measure_flat_contact(case, subject)
-    formulation, state = prepare_state(case, subject)
-    forces = _forces(formulation, state)[: case.interface.n_unknowns]
-    values, tolerances = _pull_of_points(formulation, state)
-    return Measurement(check_all(values, tolerances), idle=not forces.any())
+    state = freeze_state(case, subject)
+    values, tolerances = _pull_of_points(state)
+    return Measurement(check_all(values, tolerances), idle=not state.forces.any())
 
 
 def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
@@ -151,18 +151,19 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
         The pull of a contact point, in the flat state and where one end alone is closed. Broken: nothing begins where
         the surfaces penetrate, or the slave is pulled.
     """
-    formulation, interface = subject.for_case(case), case.interface
-    depth, n = case.parameter("penetration"), interface.n_unknowns
-    count = formulation.n_multipliers(interface)
+    formulation = subject.for_case(case)
+    depth = case.parameter("penetration")
     size = case.penalty * depth * case.slave_length
-    raised = lift_slave(case, 2 * depth).with_multipliers(np.zeros(count))
-    values = {OPEN: float(np.abs(_forces(formulation, raised)[:n]).max()) / size}
+    raised = FrozenState.with_multiplier(formulation, lift_slave(case, 2 * depth), 0.0)
+    values = {OPEN: float(np.abs(raised.forces).max()) / size}
     distant, one_end = nodes_far_from_contact(case), open_all_but_one_end(case)
-    if not count and distant.any():
-        forces = np.linalg.norm(_forces(formulation, one_end).reshape(-1, 2)[: len(distant)], axis=1)
+    if not raised.case.n_multipliers and distant.any():
+        forces = np.linalg.norm(FrozenState.at(formulation, one_end).forces[: len(distant)], axis=1)
         values[DISTANT] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
     tolerances = dict.fromkeys(values, 0.0)
-    pulls = [_pull_of_points(formulation, prepare_state(state, subject)[1]) for state in (case, one_end)]
+    pulls = [
+        _pull_of_points(FrozenState.at(formulation, prepare_state(state, subject)[1])) for state in (case, one_end)
+    ]
     pull, tolerance = max(pulls, key=lambda each: each[0].get(PULL_OF_POINT, 0.0) / each[1].get(PULL_OF_POINT, 1.0))
     pushes = _contact_forces(formulation, case)
     broken = "" if pushes.any() else "nothing begins where the surfaces penetrate"
@@ -175,36 +176,27 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values | pull, tolerances | tolerance), undecided, broken, idle=bool(undecided))
 
 
-def _contact_forces(formulation: CheckedFormulation, case: Case) -> Array:
-    """Return the residual of the nodes (n_unknowns,): of springs, or of multipliers that are all 1."""
-    count = formulation.n_multipliers(case.interface)
-    if not count:
-        return _forces(formulation, case)
-    state = case.with_multipliers(np.zeros(count))
-    columns = unit_forces(state, formulation, formulation.pair(case.interface, state.z))
-    total: FloatArray = columns.sum(axis=1)
-    return total
+def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
+    """Return the residual of the nodes (n_nodes, 2): of springs, or of multipliers that are all 1."""
+    state = FrozenState.with_multiplier(formulation, case, 0.0)
+    return unit_forces(state).sum(axis=1).reshape(-1, 2) if state.case.n_multipliers else state.forces
 
 
-def _push_of_slave(residual: Array, case: Case) -> float:
+def _push_of_slave(forces: FloatArray, case: Case) -> float:
     """Return the total force on the slave along the master's outward normal."""
     x, y = case.parameters["direction"]
-    return -float((residual.reshape(-1, 2)[: case.interface.n_slave_nodes] @ np.array([-y, x])).sum())
+    return -float((forces[: case.interface.n_slave_nodes] @ np.array([-y, x])).sum())
 
 
-def _pull_of_points(
-    formulation: CheckedFormulation, state: Case
-) -> tuple[dict[Quantity, float], dict[Quantity, float]]:
+def _pull_of_points(state: FrozenState) -> tuple[dict[Quantity, float], dict[Quantity, float]]:
     """Return the largest negative pressure over the largest of all, and its tolerance; nothing without points."""
-    if "contact_points" not in formulation.provides:
+    if not state.has_points:
         return {}, {}
-    pairing = formulation.pair(state.interface, state.z)
-    points = formulation.contact_points(state.interface, pairing, state.z)
-    pressure = points.pressure[np.isfinite(points.pressure)]
+    pressure = state.points.pressure[np.isfinite(state.points.pressure)]
     largest, pull = (float(np.max(sign * pressure, initial=0.0)) for sign in (1, -1))
-    forces = formulation.residual(state.interface, pairing, state.z)
     value = pull / max(largest, pull) if pull else 0.0
-    return {PULL_OF_POINT: value}, {PULL_OF_POINT: segment_tolerance(state, forces, state.largest_coordinate)}
+    tolerance = segment_tolerance(state.case, state.residual, state.case.largest_coordinate)
+    return {PULL_OF_POINT: value}, {PULL_OF_POINT: tolerance}
 
 
 def _move_by_roundoff(case: Case) -> Iterator[Case]:
@@ -212,10 +204,6 @@ def _move_by_roundoff(case: Case) -> Iterator[Case]:
     reach = COORDINATE_ROUNDING * case.largest_coordinate
     for direction in random_moves(case.seed, N_MOVES, case.z.size):
         yield replace(case, z=case.z + reach * direction)
-
-
-def _forces(formulation: CheckedFormulation, case: Case) -> Array:
-    return formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
 
 
 @Property.define(
@@ -257,32 +245,29 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
     """
     opened = open_all_but_one_end(case, HALF) if "penetration" in case.parameters else case
-    formulation, state = prepare_state(opened, subject)
-    if state.n_multipliers:
-        state = state.with_multipliers(release_some(state))
-    pairing = formulation.pair(state.interface, state.z)
-    residual = formulation.residual(state.interface, pairing, state.z)[: state.interface.n_unknowns]
-    size = sum_larger_forces(state, residual)
+    formulation, case = prepare_state(opened, subject)
+    if case.n_multipliers:
+        case = case.with_multipliers(release_some(case))
+    state = FrozenState.at(formulation, case)
+    size = sum_larger_forces(case, state.forces)
     if not size:
         return Measurement([PULL_OF_NODE.check(0.0, 0.0)], idle=True)
-    forces = -residual.reshape(-1, 2)
-    normals, allowance = allowed_pushes(formulation, state)
-    pulls = np.array([_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(forces)])
-    tolerance = segment_tolerance(state, residual, state.largest_coordinate)
+    normals, allowance = allowed_pushes(state)
+    pulls = np.array(
+        [_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(-state.forces)]
+    )
+    tolerance = segment_tolerance(case, state.forces, case.largest_coordinate)
     pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
     undecided = ""
-    if pulled and pulled <= _nodes_round_corners(formulation, state):
+    if pulled and pulled <= _nodes_round_corners(state):
         undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
     return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
 
 
-def _nodes_round_corners(formulation: CheckedFormulation, state: Case) -> set[int]:
+def _nodes_round_corners(state: FrozenState) -> set[int]:
     """Return the nodes of all master segments that a point faces beside a corner of more than 60°."""
-    if "contact_points" not in formulation.provides:
-        return set()
-    pairing = formulation.pair(state.interface, state.z)
     nodes: set[int] = set()
-    for each in split_passes(state, formulation.contact_points(state.interface, pairing, state.z)):
+    for each in state.passes if state.has_points else ():
         master = each.interface.master
         for segment, normal in zip(each.points.master_segment, each.points.normal, strict=True):
             for neighbour in master.neighbours[segment] if segment >= 0 else ():
@@ -300,19 +285,18 @@ def release_some(state: Case) -> FloatArray:
     return state.multipliers * (pressing if pressing.any() else 1)
 
 
-def allowed_pushes(formulation: CheckedFormulation, state: Case) -> tuple[dict[int, list[FloatArray]], FloatArray]:
+def allowed_pushes(state: FrozenState) -> tuple[dict[int, list[FloatArray]], FloatArray]:
     """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled."""
-    interface, positions = state.interface, state.positions
+    interface, positions = state.case.interface, state.case.positions
     normals: dict[int, list[FloatArray]] = defaultdict(list)
     allowance = np.zeros(interface.n_nodes)
     for side in (interface.slave, interface.master):
         for node, normal in _inward_normals(side, positions):
             normals[node].append(normal)
-    if "contact_points" not in formulation.provides:
-        _allow_everything(state, normals)
+    if not state.has_points:
+        _allow_everything(state.case, normals)
         return normals, allowance
-    pairing = formulation.pair(interface, state.z)
-    for each in split_passes(state, formulation.contact_points(interface, pairing, state.z)):
+    for each in state.passes:
         _allow_points(each, normals, allowance)
     return normals, allowance
 

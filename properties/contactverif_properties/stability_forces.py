@@ -8,20 +8,19 @@ from fractions import Fraction
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.stability_states import stability_states
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.translations import translated_cases
-from contactverif_properties.shared.any_state import ask_forces_and_tangents, move_state, prepare_state
+from contactverif_properties.shared.any_state import ask_forces_and_tangents, freeze_state, move_state
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
     Conditioning,
@@ -32,6 +31,7 @@ from contactverif_properties.shared.conditioning import (
     measure_tangent_slope,
     tangent_quantity,
 )
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_rounded_decision
 from contactverif_properties.shared.linear_gaps import exact_slave_forces, knows_linear_total, uniform_multiplier
 from contactverif_properties.shared.roundoff import ratio
@@ -75,27 +75,23 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never, if the plugin has a pairing. Without one, or with the far state's own pairing, a case is
     undecided where a decision hangs on less than 64 u D: there a right search may decide otherwise.
     """
-    formulation, near = prepare_state(case, subject)
-    far = move_state(near, case.parameters["shift"])
-    pairing = formulation.pair(near.interface, near.z)
-    states = (near.interface, pairing, near.z), (far.interface, pairing, far.z)
-    (forces, forces_there), tangents = ask_forces_and_tangents(formulation, *states)
-    change = forces_there - forces
-    conditioning = measure_conditioning(near, formulation, pairing, forces)
-    values = {FORCES: conditioning.count_roundings(change)}
+    near = freeze_state(case, subject)
+    far = replace(near, case=move_state(near.case, case.parameters["shift"]))
+    (forces, forces_there), tangents = ask_forces_and_tangents(near, far)
+    conditioning = measure_conditioning(near, forces)
+    values = {FORCES: conditioning.count_roundings(forces_there - forces)}
     if tangents:
         here, there = tangents
-        slope = measure_tangent_slope(near, formulation, pairing, here)
-        values[TANGENT] = count_tangent_roundings(near, here, there, slope)
-    excusable = pairing is None  # A plugin without a pairing decides anew in each residual.
-    if pairing is not None:
+        values[TANGENT] = count_tangent_roundings(near.case, here, there, measure_tangent_slope(near, here))
+    excusable = near.pairing is None  # A plugin without a pairing decides anew in each residual.
+    if near.pairing is not None:
         excusable = max(values.values()) <= MOST_ROUNDINGS  # The frozen pairing decides the same in both places.
-        change = formulation.residual(far.interface, formulation.pair(far.interface, far.z), far.z) - forces
-        values[SEARCH] = conditioning.count_roundings(change)
+        searched = FrozenState.at(near.formulation, far.case)
+        values[SEARCH] = conditioning.count_roundings(searched.residual - forces)
     undecided = ""
     if excusable and max(values.values()) > MOST_ROUNDINGS:
-        undecided = explain_by_rounded_decision(near, formulation, pairing)
-    idle = not forces[: near.interface.n_unknowns].any()
+        undecided = explain_by_rounded_decision(near)
+    idle = not forces[: case.interface.n_unknowns].any()
     return Measurement(check_all(values, MOST_ROUNDINGS), undecided, idle=idle)
 
 
@@ -151,28 +147,25 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where a slave point faces a master node to within 64 u D. Both partners
     give the same gap there, but a search that asks for 0 ≤ ξ ≤ 1 may lose the point between them.
     """
-    formulation, linear = subject.for_case(case), "slope" in case.parameters
+    linear = "slope" in case.parameters
     pressure = uniform_multiplier(case) if linear else case.penalty * case.parameter("penetration")
-    near = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), pressure))
-    far = move_state(near, case.parameters["shift"])
-    pairing = formulation.pair(far.interface, far.z)
-    forces = formulation.residual(far.interface, pairing, far.z)
-    near_forces = formulation.residual(near.interface, pairing, near.z)
-    conditioning = measure_conditioning(near, formulation, pairing, near_forces)
-    errors = (
-        _errors_of_linear(near, subject.traits, forces) if linear else _errors_of_uniform(near, subject.traits, forces)
-    )
+    far = FrozenState.with_multiplier(subject.for_case(case), move_state(case, case.parameters["shift"]), pressure)
+    near = replace(far, case=case.with_multipliers(far.case.multipliers))
+    forces = far.residual
+    conditioning = measure_conditioning(near, near.residual)
+    find_errors = _errors_of_linear if linear else _errors_of_uniform
+    errors = find_errors(near.case, subject.traits, forces)
     if FORCES_THERE not in errors and subject.traits.abilities.takes_longdouble:
-        errors[FORCES_THERE] = forces - _in_long_double(far, formulation, pairing)
+        errors[FORCES_THERE] = forces - far.residual_at(far.case.z.astype(np.longdouble))
     if not errors:
-        errors[FORCES_THERE] = forces - near_forces
+        errors[FORCES_THERE] = forces - near.residual
     values: dict[Quantity, float] = {}
     if FORCES_THERE in errors:
         values[FORCES_THERE] = conditioning.count_roundings(errors[FORCES_THERE])
     if TOTAL_THERE in errors:
-        values[TOTAL_THERE] = _count_total(near, errors[TOTAL_THERE], conditioning)
+        values[TOTAL_THERE] = _count_total(near.case, errors[TOTAL_THERE], conditioning)
     failed = max(values.values()) > MOST_ROUNDINGS
-    undecided = explain_by_rounded_decision(near, formulation, pairing) if failed else ""
+    undecided = explain_by_rounded_decision(near) if failed else ""
     return Measurement(check_all(values, MOST_ROUNDINGS), undecided)
 
 
@@ -226,10 +219,6 @@ def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
             scale = (exact_totals[0] * exact_totals[0] + exact_totals[1] * exact_totals[1]) / projection
     errors = [float(Fraction(force) * scale - right) for force, right in zip(forces[:n].tolist(), exact, strict=True)]
     return np.array([*errors, *([0.0] * case.n_multipliers)])
-
-
-def _in_long_double(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> Array:
-    return formulation.residual(case.interface, pairing, case.z.astype(np.longdouble))
 
 
 def _count_total(case: Case, error: FloatArray, conditioning: Conditioning) -> float:
@@ -289,16 +278,12 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never, since no decision is made anew. A formulation without `pair` decides anew inside its residual.
     One that prefers an axis fails in every state: look at `objectivity` first.
     """
-    formulation, case = prepare_state(case, subject)
-    n = case.interface.n_unknowns
-    pairing = formulation.pair(case.interface, case.z)
-    forces = formulation.residual(case.interface, pairing, case.z)
-    there = move_swept(case)
-    forces_there = formulation.residual(there.interface, pairing, there.z)
-    expected: FloatArray = np.array(forces)
-    expected[:n] = ExactMotion.from_case(case).turn(forces[:n].reshape(-1, 2)).reshape(-1)
-    conditioning = measure_conditioning(case, formulation, pairing, forces)
-    return make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, forces_there - expected, idle=not forces.any())
+    state = freeze_state(case, subject)
+    there = replace(state, case=move_swept(state.case))
+    expected: FloatArray = np.array(state.residual)
+    expected[: case.interface.n_unknowns] = ExactMotion.from_case(case).turn(state.forces).reshape(-1)
+    error, conditioning = there.residual - expected, measure_conditioning(state, state.residual)
+    return make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, error, idle=not state.residual.any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

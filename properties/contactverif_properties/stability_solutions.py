@@ -17,7 +17,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.inf_sup import inf_sup_constant
-from contactverif.mechanics.scene import scene_of
+from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.refined_blocks import refinement_cases, refinements
@@ -30,6 +30,7 @@ from contactverif_properties.shared.conditioning import (
     make_sweep_measurement,
     measure_conditioning,
 )
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.wave_answer import answer_to_wave
 from contactverif_properties.stability_forces import ExactMotion
 
@@ -145,11 +146,9 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
         u_turned = _nearest_to_balance(turned, matrix, u)
     except _SingularMatrix:
         return Measurement(undecided="the matrix has no inverse in floats")
-    state = replace(case, z=system.state(u))
-    forces = system.formulation.residual(scene.interface, pairing, state.z)
-    expected = motion.turn(forces.reshape(-1, 2)).reshape(-1)
-    conditioning = _conditioning(state, system, pairing, forces)
-    return make_sweep_measurement(ROUNDINGS, conditioning, turned.forces(u_turned) - expected, idle=not forces.any())
+    state = FrozenState(system.formulation, replace(case, z=system.state(u)), pairing)
+    error = turned.forces(u_turned) - motion.turn(state.forces).reshape(-1)
+    return make_sweep_measurement(ROUNDINGS, _conditioning(state, scene), error, idle=not state.forces.any())
 
 
 def _solve(system: System, pairing: Pairing | None, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -223,12 +222,11 @@ def _matrix(system: System, pairing: Pairing | None, u: FloatArray) -> FloatArra
     return matrix
 
 
-def _conditioning(state: Case, system: System, pairing: Pairing | None, forces: FloatArray) -> Conditioning:
+def _conditioning(state: FrozenState, scene: Scene) -> Conditioning:
     """Return the conditioning of the contact forces, to which the bodies add |S| |z − z̄| at their contact nodes."""
-    conditioning = measure_conditioning(state, system.formulation, pairing, forces)
-    scene = system.scene
+    conditioning, positions = measure_conditioning(state, state.residual), state.case.positions
     transformation = abs(dense(scene.transformation))
-    distances = np.abs(state.positions - state.positions.mean(axis=0)).reshape(-1)
+    distances = np.abs(positions - positions.mean(axis=0)).reshape(-1)
     bulk = transformation @ (abs(dense(scene.stiffness)) @ (transformation.T @ distances))
     reach = np.array(conditioning.reach)
     reach[: scene.interface.n_nodes] += np.hypot(*bulk.reshape(-1, 2).T)

@@ -13,6 +13,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.straight import bent_end_cases, tilted_cases
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.linear_gaps import (
     directions,
@@ -90,8 +91,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     formulation, undecided = subject.for_case(case), ""
     if error and not formulation.n_multipliers(case.interface):
         reach = COORDINATE_ROUNDING * case.largest_coordinate
-        pairing = formulation.pair(case.interface, case.z)
-        undecided = explain_by_kink(case, formulation, pairing, reach, {"forces": error})
+        undecided = explain_by_kink(FrozenState.at(formulation, case), reach, {"forces": error})
     return Measurement(check_all(values, tolerance), undecided, broken)
 
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 from scipy.sparse import csgraph, csr_array
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property, Verdict, judge
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.any_state import prepare_state, random_directions
-from contactverif_properties.shared.block_derivatives import groups_of
+from contactverif_properties.shared.any_state import freeze_state, random_directions
+from contactverif_properties.shared.block_derivatives import differences_by_complex_step, groups_of
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 
 # Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
@@ -86,27 +88,24 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
     fails.
     """
-    formulation, case = prepare_state(case, subject)
-    shortest = case.shortest_segment
-    pairing = formulation.pair(case.interface, case.z)
-    tangent = dense(formulation.tangent(case.interface, pairing, case.z))
+    state = freeze_state(case, subject)
+    case, shortest = state.case, state.case.shortest_segment
     directions = first_directions(case, N_DIRECTIONS)
-    undecided, broken = _check_pairing(case, formulation, pairing, directions[0])
-    differences = Differences(formulation, case, pairing, tangent)
+    undecided, broken = _check_pairing(state, directions[0])
 
     def measure_over(length: float) -> tuple[Measurement, float]:
-        comparison = differences.compare(directions, length)
+        comparison = compare(state, directions, length)
         more = defect_directions(directions, comparison.defects)
         if len(more):
-            comparison = comparison.join(differences.compare(more, length))
+            comparison = comparison.join(compare(state, more, length))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
         tolerances = {CENTRAL: 30 * conditioning ** (2 / 3), TAYLOR: SLOPE, COMPLEX: 1e-11 + 64 * conditioning}
         values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
             values[TAYLOR] = comparison.slope
-        if subject.traits.abilities.takes_complex and not formulation.decides_anew(pairing):
-            values[COMPLEX], complex_finding = differences.compare_complex_step(
-                np.vstack([directions, more]), comparison.turns
+        if subject.traits.abilities.takes_complex and not state.formulation.decides_anew(state.pairing):
+            values[COMPLEX], complex_finding = compare_complex_step(
+                state, np.vstack([directions, more]), comparison.turns
             )
             if values[COMPLEX] > tolerances[COMPLEX]:
                 finding = complex_finding
@@ -134,7 +133,7 @@ class Comparison:
     error: float  # The largest error against the best central difference, over the size of the derivative at its node.
     # The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
     slope: float
-    bending: float  # The length over which the residual is seen to bend, see `Differences.compare`.
+    bending: float  # The length over which the residual is seen to bend, see `compare`.
     defects: FloatArray  # (n_directions, n_unknowns) The tangent times each direction, minus the central difference.
     finding: Finding | None  # The row of the largest error.
     # (n_unknowns,) The change of the derivative in each row over a length ℓ, from the third derivative.
@@ -148,98 +147,89 @@ class Comparison:
         return replace(worse, slope=slope, bending=bending, turns=turns)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Differences:
-    """The residual around a state, and the tangent that it is compared with."""
+def compare(state: FrozenState, directions: FloatArray, length: float) -> Comparison:
+    """Compare derivatives along directions with central differences and Taylor remainders, all in one batch.
 
-    formulation: CheckedFormulation  # The formulation that is judged.
-    case: Case  # The state x.
-    pairing: Pairing | None  # The frozen pairing.
-    tangent: FloatArray  # (n_unknowns, n_unknowns) The tangent K.
+    The length over which the residual bends is the root of its size over its third derivative, from the central
+    differences of two steps. The tangent plays no part in it.
 
-    def compare(self, directions: FloatArray, length: float) -> Comparison:
-        """Compare derivatives along directions with central differences and Taylor remainders, all in one batch.
+    Parameters
+    ----------
+    state : FrozenState
+        The state x, and the tangent K that is judged.
+    directions : FloatArray, shape (n_directions, n_unknowns)
+        The directions d.
+    length : float
+        The length over which the residual is taken to bend; steps are shares of it.
+    """
+    case, reach = state.case, state.case.largest_coordinate
+    derivative = directions @ state.tangent.T  # (n_directions, n_unknowns)
+    central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
+    taylor = np.array(TAYLOR_STEPS) * length
+    steps = np.concatenate([central, -central, taylor])
+    batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
+    states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
+    forces = state.residual_at(states)
+    here, moved = forces[-1], forces[:-1].reshape(batch.shape)
 
-        The length over which the residual bends is the root of its size over its third derivative, from the central
-        differences of two steps. The tangent plays no part in it.
+    n = len(central)
+    slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
+    size = max(np.abs(derivative).max(), np.abs(slopes).max())
+    if size == 0:
+        return Comparison(0.0, np.inf, np.inf, 0 * derivative, None, 0 * case.z)
+    errors = np.abs(slopes - derivative)  # (n_steps, n_directions, n_unknowns)
+    best = errors.max(axis=2).argmin(axis=0)
+    closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
+    third = np.abs(slopes[0] - slopes[1]).max(axis=0) / (central[0] ** 2 - central[1] ** 2)  # Third derivative / 6.
+    turns = third * case.shortest_segment**2
+    sizes = _row_sizes(state, np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
+    error, finding = _worst_row(case, errors.min(axis=0), sizes, derivative, closest)
+    forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
+    remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
+    floor = 1e3 * UNIT_ROUNDOFF * reach * size
+    slope = taylor_slope(remainders, steps[forward], floor)
+    if slope < SLOPE:  # If the best difference as derivative gives no better slope, the residual is not smooth.
+        smooth = np.abs(moved[forward] - here - steps[forward, None, None] * closest).max(axis=2)
+        if taylor_slope(smooth, steps[forward], floor) < SLOPE:
+            slope = np.inf
+    bending = float(np.sqrt(size / third.max())) if third.any() else np.inf
+    return Comparison(error, slope, bending, derivative - closest, finding, turns)
 
-        Parameters
-        ----------
-        directions : FloatArray, shape (n_directions, n_unknowns)
-            The directions d.
-        length : float
-            The length over which the residual is taken to bend; steps are shares of it.
-        """
-        case, reach = self.case, self.case.largest_coordinate
-        derivative = directions @ self.tangent.T  # (n_directions, n_unknowns)
-        central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
-        taylor = np.array(TAYLOR_STEPS) * length
-        steps = np.concatenate([central, -central, taylor])
-        batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
-        states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
-        forces = self.formulation.residual(case.interface, self.pairing, states)
-        here, moved = forces[-1], forces[:-1].reshape(batch.shape)
 
-        n = len(central)
-        slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
-        size = max(np.abs(derivative).max(), np.abs(slopes).max())
-        if size == 0:
-            return Comparison(0.0, np.inf, np.inf, 0 * derivative, None, 0 * case.z)
-        errors = np.abs(slopes - derivative)  # (n_steps, n_directions, n_unknowns)
-        best = errors.max(axis=2).argmin(axis=0)
-        closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
-        third = np.abs(slopes[0] - slopes[1]).max(axis=0) / (central[0] ** 2 - central[1] ** 2)  # Third derivative / 6.
-        turns = third * case.shortest_segment**2
-        sizes = self._sizes(np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
-        error, finding = self._worst_row(errors.min(axis=0), sizes, derivative, closest)
-        forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
-        remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
-        floor = 1e3 * UNIT_ROUNDOFF * reach * size
-        slope = taylor_slope(remainders, steps[forward], floor)
-        if slope < SLOPE:  # If the best difference as derivative gives no better slope, the residual is not smooth.
-            smooth = np.abs(moved[forward] - here - steps[forward, None, None] * closest).max(axis=2)
-            if taylor_slope(smooth, steps[forward], floor) < SLOPE:
-                slope = np.inf
-        bending = float(np.sqrt(size / third.max())) if third.any() else np.inf
-        return Comparison(error, slope, bending, derivative - closest, finding, turns)
+def compare_complex_step(state: FrozenState, directions: FloatArray, turns: FloatArray) -> tuple[float, Finding]:
+    """Return the largest difference of a complex step from the derivative, likewise, and its row."""
+    derivative, exact = directions @ state.tangent.T, differences_by_complex_step(state, directions)
+    sizes = _row_sizes(state, np.maximum(np.abs(exact).max(axis=0), np.abs(derivative).max(axis=0)), turns)
+    return _worst_row(state.case, np.abs(exact - derivative), sizes, derivative, exact)
 
-    def compare_complex_step(self, directions: FloatArray, turns: FloatArray) -> tuple[float, Finding]:
-        """Return the largest difference of Im R(x + ihd)/h from the derivative, likewise, and its row.
 
-        The step h is so small that h² vanishes.
-        """
-        case, h = self.case, self.case.shortest_segment * 2.0**-100
-        derivative = directions @ self.tangent.T
-        exact = self.formulation.residual(case.interface, self.pairing, case.z + 1j * h * directions).imag / h
-        sizes = self._sizes(np.maximum(np.abs(exact).max(axis=0), np.abs(derivative).max(axis=0)), turns)
-        return self._worst_row(np.abs(exact - derivative), sizes, derivative, exact)
+def _row_sizes(state: FrozenState, derivatives: FloatArray, turns: FloatArray) -> FloatArray:
+    """Return the size (n_unknowns,) of the derivative at the node of each row.
 
-    def _sizes(self, derivatives: FloatArray, turns: FloatArray) -> FloatArray:
-        """Return the size (n_unknowns,) of the derivative at the node of each row.
+    It is the largest of these derivatives (n_unknowns,) there, or their change over ℓ, `turns` (n_unknowns,), or
+    the largest block of the tangent in a column that the node feels: what cancels in a row is rounded like that.
+    """
+    groups = groups_of(state.case)
+    blocks = groups.largest(state.tangent)
+    around = np.where(blocks > 0, groups.surroundings(blocks), 0.0).max(axis=1)
+    at_nodes = np.zeros(groups.count)
+    np.maximum.at(at_nodes, groups.of_unknowns, np.maximum(derivatives, turns))
+    sizes: FloatArray = np.maximum(at_nodes, around)[groups.of_unknowns]
+    return sizes
 
-        It is the largest of these derivatives (n_unknowns,) there, or their change over ℓ, `turns` (n_unknowns,), or
-        the largest block of the tangent in a column that the node feels: what cancels in a row is rounded like that.
-        """
-        groups = groups_of(self.case)
-        blocks = groups.largest(self.tangent)
-        around = np.where(blocks > 0, groups.surroundings(blocks), 0.0).max(axis=1)
-        at_nodes = np.zeros(groups.count)
-        np.maximum.at(at_nodes, groups.of_unknowns, np.maximum(derivatives, turns))
-        sizes: FloatArray = np.maximum(at_nodes, around)[groups.of_unknowns]
-        return sizes
 
-    def _worst_row(
-        self, errors: FloatArray, sizes: FloatArray, derivative: FloatArray, difference: FloatArray
-    ) -> tuple[float, Finding]:
-        """Return the largest error over the size of its row, and that row."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            relative = np.where(errors > 0, errors / sizes, 0.0)
-        number, row = divmod(int(relative.argmax()), relative.shape[1])
-        place = f"row {row} ({groups_of(self.case).describe(row)})"
-        found, right = (derivative[number, row],), (difference[number, row],)
-        return float(relative[number, row]), Finding(
-            place, found, right, "N m-1", found_name="tangent times direction", right_name="derivative"
-        )
+def _worst_row(
+    case: Case, errors: FloatArray, sizes: FloatArray, derivative: FloatArray, difference: FloatArray
+) -> tuple[float, Finding]:
+    """Return the largest error over the size of its row, and that row."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.where(errors > 0, errors / sizes, 0.0)
+    number, row = divmod(int(relative.argmax()), relative.shape[1])
+    place = f"row {row} ({groups_of(case).describe(row)})"
+    found, right = (derivative[number, row],), (difference[number, row],)
+    return float(relative[number, row]), Finding(
+        place, found, right, "N m-1", found_name="tangent times direction", right_name="derivative"
+    )
 
 
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
@@ -270,42 +260,34 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
     return float(best[decided].min(initial=np.inf))
 
 
-def _check_pairing(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, direction: FloatArray
-) -> tuple[str, str]:
+def _check_pairing(state: FrozenState, direction: FloatArray) -> tuple[str, str]:
     """Return why the pairing makes a failure undecided, and how it breaks the contract; both empty if it does neither.
 
     A pairing that is another one at every place, however near, holds numbers and not decisions, and on such a pairing
     no difference shows a missing term. A pairing that changes here and there, as ties by roundoff do, is no breach.
     """
-    shortest = case.shortest_segment
+    case, shortest = state.case, state.case.shortest_segment
     step = CENTRAL_STEPS[-1] * shortest * (UNIT_ROUNDOFF * case.largest_coordinate / shortest) ** (1 / 3)
-    if pairing is not None and _is_same_around(formulation, case, pairing, step * direction):
+
+    def pair(shifts: Iterable[float]) -> list[Pairing | None]:
+        return [state.formulation.pair(case.interface, case.z + shift * step * direction) for shift in shifts]
+
+    if state.pairing is not None and pair((1, -1)) == [state.pairing] * 2:
         return "", ""
-    undecided = find_kink(case, formulation, pairing, 4 * step, direction)
-    if undecided or pairing is None:
+    undecided = find_kink(state, 4 * step, direction)
+    if undecided or state.pairing is None:
         return undecided, ""
-    if all(_is_steady(formulation, case, sign * 2.0**-10 * step * direction) for sign in (1, -1)):
+    beside = [pair(sign * 2.0**-10 * np.arange(1, 4)) for sign in (1, -1)]
+    if all(first == second == third for first, second, third in beside):
         return "a kink: the pairing changes here, and is steady on either side", ""
-    if all(_is_restless(formulation, case, scale * step * direction) for scale in (1, 2.0**-5, 2.0**-10)):
+    around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
+    if all(map(_all_differ, around)):
         return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""
 
 
-def _is_same_around(formulation: CheckedFormulation, case: Case, pairing: Pairing, shift: FloatArray) -> bool:
-    """Return whether the states at both ends of the shift have this pairing."""
-    return all(formulation.pair(case.interface, case.z + sign * shift) == pairing for sign in (1, -1))
-
-
-def _is_steady(formulation: CheckedFormulation, case: Case, shift: FloatArray) -> bool:
-    """Return whether the pairing stays the same from one small shift to the next, as it does beside a kink."""
-    beside = [formulation.pair(case.interface, case.z + times * shift) for times in (1, 2, 3)]
-    return beside[0] == beside[1] == beside[2]
-
-
-def _is_restless(formulation: CheckedFormulation, case: Case, shift: FloatArray) -> bool:
-    """Return whether no two of some neighbouring states, on either side, have the same pairing."""
-    pairings = [formulation.pair(case.interface, case.z + times * shift) for times in range(-2, 4)]
+def _all_differ(pairings: Sequence[Pairing | None]) -> bool:
+    """Return whether no two of some pairings are alike."""
     return all(first != second for first, second in combinations(pairings, 2))
 
 

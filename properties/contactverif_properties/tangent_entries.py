@@ -19,7 +19,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.long_states import long_states
 from contactverif.strategies import smooth_cases
-from contactverif_properties.shared.block_derivatives import STEPS, single_moves
+from contactverif_properties.shared.block_derivatives import STEPS, differences_on_both_sides, single_moves, step
 from contactverif_properties.shared.tangent_blocks import (
     BLOCK,
     COMPLEX_BLOCK,
@@ -221,11 +221,11 @@ class _Sides:
     @classmethod
     def of_column(cls, judge: BlockJudge, column: int) -> _Sides:
         """Return all rows of the columns of a node or multiplier."""
-        columns, differences = np.flatnonzero(judge.groups.of_unknowns == column), judge.differences
+        columns, case = np.flatnonzero(judge.groups.of_unknowns == column), judge.state.case
         dtype = np.float64 if judge.by_complex_step else judge.dtype
-        ahead, behind = differences.on_both_sides(single_moves(columns, judge.groups.size).directions(), dtype)
-        step = differences.step(dtype) / differences.case.shortest_segment
-        return cls(ahead, behind, judge.tangent[:, columns].T, step)
+        directions = single_moves(columns, judge.groups.size).directions()
+        ahead, behind = differences_on_both_sides(judge.state, directions, dtype)
+        return cls(ahead, behind, judge.tangent[:, columns].T, step(case, dtype) / case.shortest_segment)
 
     def in_row(self, judge: BlockJudge, row: int) -> _Sides:
         """Return the rows of a node or multiplier alone."""

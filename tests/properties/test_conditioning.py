@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import Subject
-from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.any_state import freeze_state
 from contactverif_properties.shared.conditioning import (
     count_tangent_roundings,
     difference_quotient,
     measure_conditioning,
 )
+from contactverif_properties.shared.frozen_state import FrozenState
 
 
 def bent_case() -> Case:
@@ -28,44 +28,36 @@ def bent_case() -> Case:
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-ppt-balanced", "mortar", "mortar-lm", "vts-ppt-lm"])
 def test_the_difference_quotient_is_the_tangent_of_an_exact_formulation(name: str) -> None:
-    formulation, case = prepare_state(bent_case(), load_subject(name))
-    pairing = formulation.pair(case.interface, case.z)
-    quotient = difference_quotient(case, formulation, pairing)
-    tangent = dense(formulation.tangent(case.interface, pairing, case.z))
-    assert np.abs(quotient - tangent).max() <= 1e-6 * np.abs(tangent).max()
+    state = freeze_state(bent_case(), load_subject(name))
+    error = np.abs(difference_quotient(state) - state.tangent)
+    assert error.max() <= 1e-6 * np.abs(state.tangent).max()
 
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-ppt-balanced", "mortar", "mortar-lm", "vts-ppt-lm"])
 def test_roundings_of_the_input_count_as_few_roundings(name: str) -> None:
-    formulation, case = prepare_state(bent_case(), load_subject(name))
-    interface = case.interface
-    pairing = formulation.pair(interface, case.z)
-    forces = formulation.residual(interface, pairing, case.z)
-    conditioning = measure_conditioning(case, formulation, pairing, forces)
-    centre = np.concatenate([np.tile(case.positions.mean(axis=0), interface.n_nodes), 0 * case.multipliers])
+    state = freeze_state(bent_case(), load_subject(name))
+    case, forces = state.case, state.residual
+    conditioning = measure_conditioning(state, forces)
+    centre = np.concatenate([np.tile(case.positions.mean(axis=0), case.interface.n_nodes), 0 * case.multipliers])
     random, size = np.random.default_rng(0), 2.0**-30  # Larger than 2⁻⁵³, so that only the input is rounded.
     worst = 0.0
     for _ in range(20):
         moved = case.z + size * random.uniform(-1, 1, len(case.z)) * (case.z - centre)
-        worst = max(worst, conditioning.count_roundings(formulation.residual(interface, pairing, moved) - forces))
+        worst = max(worst, conditioning.count_roundings(state.residual_at(moved) - forces))
     assert 0.02 <= worst * 2.0**-53 / size <= 1.01
 
 
 def test_the_three_numbers_of_a_row_belong_together() -> None:
-    formulation, case = prepare_state(bent_case(), load_subject("mortar-lm"))
-    pairing = formulation.pair(case.interface, case.z)
-    forces = formulation.residual(case.interface, pairing, case.z)
-    row = measure_conditioning(case, formulation, pairing, forces).worst_row(forces * 1e-9)
+    state = freeze_state(bent_case(), load_subject("mortar-lm"))
+    row = measure_conditioning(state, state.residual).worst_row(state.residual * 1e-9)
     assert row.condition >= 1
     assert row.error == pytest.approx(row.roundings * 2.0**-53 * row.condition)
 
 
 def test_an_error_of_one_constraint_row_counts_over_that_row() -> None:
-    formulation, case = prepare_state(bent_case(), load_subject("mortar-lm"))
-    pairing = formulation.pair(case.interface, case.z)
-    forces = formulation.residual(case.interface, pairing, case.z)
-    conditioning = measure_conditioning(case, formulation, pairing, forces)
-    error = np.zeros_like(forces)
+    state = freeze_state(bent_case(), load_subject("mortar-lm"))
+    conditioning = measure_conditioning(state, state.residual)
+    error = np.zeros_like(state.residual)
     error[-2] = 2.0**-53 * conditioning.reach[-2]
     assert conditioning.count_roundings(error) == pytest.approx(1.0)
     assert conditioning.count_roundings(0 * error) == 0.0
@@ -74,11 +66,10 @@ def test_an_error_of_one_constraint_row_counts_over_that_row() -> None:
 def test_nothing_in_contact_counts_as_no_rounding_and_any_force_there_as_infinitely_many() -> None:
     case = bent_case()
     opened = Case(case.interface, case.z + np.tile([0.0, 9.0] * 4 + [0.0, 0.0] * 4, 1), 100.0)
-    formulation, _ = prepare_state(opened, load_subject("nts-ar"))
-    pairing = formulation.pair(opened.interface, opened.z)
-    forces = formulation.residual(opened.interface, pairing, opened.z)
+    state = freeze_state(opened, load_subject("nts-ar"))
+    forces = state.residual
     assert not forces.any()
-    conditioning = measure_conditioning(opened, formulation, pairing, forces)
+    conditioning = measure_conditioning(state, forces)
     assert conditioning.count_roundings(forces) == 0.0
     assert conditioning.count_roundings(forces + 1e-300) == np.inf
 
@@ -92,11 +83,9 @@ def test_a_plugin_without_a_pairing_is_measured_too() -> None:
             return forces
 
     case = bent_case()
-    formulation = Subject("floor", lambda *, penalty: Floor()).for_case(case)
-    forces = formulation.residual(case.interface, None, case.z)
-    quotient = difference_quotient(case, formulation, None)
-    assert quotient[1, 1] == pytest.approx(3.0)
-    assert measure_conditioning(case, formulation, None, forces).floor[0] == pytest.approx(0.09)
+    state = FrozenState(Subject("floor", lambda *, penalty: Floor()).for_case(case), case, None)
+    assert difference_quotient(state)[1, 1] == pytest.approx(3.0)
+    assert measure_conditioning(state, state.residual).floor[0] == pytest.approx(0.09)
 
 
 def test_tangents_are_compared_in_units_of_the_turn_of_the_shortest_segment() -> None:

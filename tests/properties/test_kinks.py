@@ -11,6 +11,7 @@ from scipy import sparse
 
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import (
     explain_by_kink,
     find_kink,
@@ -46,8 +47,12 @@ class Springs(Handmade):
         return forces
 
 
+def at(plugin: Any, state: Case) -> FrozenState:
+    return FrozenState(subject(plugin).for_case(state), state, None)
+
+
 def kink(plugin: Any, state: Case, reach: float = REACH) -> str:
-    return find_kink(state, subject(plugin).for_case(state), None, reach, np.ones(state.z.size))
+    return find_kink(at(plugin, state), reach, np.ones(state.z.size))
 
 
 def test_a_point_over_a_master_node_is_at_a_kink() -> None:
@@ -99,12 +104,10 @@ def test_nothing_in_contact_is_no_kink() -> None:
 
 
 def test_a_jump_is_seen_from_both_sides() -> None:
-    state = over_a_node(0.0)
-    directions = np.ones((1, state.z.size))
-    assert measure_jump(state, subject(Springs).for_case(state), REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
-    beside = over_a_node(1 / 7)
-    assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[0] < 1e-5
-    assert measure_jump(beside, subject(Springs).for_case(beside), REACH, directions)[1] < 1e-5
+    state, beside = at(Springs, over_a_node(0.0)), at(Springs, over_a_node(1 / 7))
+    directions = np.ones((1, state.case.z.size))
+    assert measure_jump(state, REACH, directions)[0] == pytest.approx(0.25, rel=1e-4)
+    assert max(measure_jump(beside, REACH, directions)) < 1e-5
 
 
 class Sided(Springs):
@@ -120,9 +123,8 @@ class Sided(Springs):
 
 
 def test_a_jump_of_the_derivative_counts_too() -> None:
-    state = over_a_node(0.0)
-    directions = np.ones((1, state.z.size))
-    assert measure_jump(state, subject(Sided).for_case(state), REACH, directions)[1] == pytest.approx(2.0)
+    state = at(Sided, over_a_node(0.0))
+    assert measure_jump(state, REACH, np.ones((1, state.case.z.size)))[1] == pytest.approx(2.0)
 
 
 def test_a_smooth_derivative_changes_by_its_own_slope() -> None:
@@ -132,11 +134,9 @@ def test_a_smooth_derivative_changes_by_its_own_slope() -> None:
             forces[1] = 400 * z[1] ** 2
             return forces
 
-    state = over_a_node(1 / 7)
-    directions = np.ones((1, state.z.size))
+    state = at(Stiffening, over_a_node(1 / 7))
     reach = 2.0**-40  # So short that the error of a difference hides it.
-    formulation = subject(Stiffening).for_case(state)
-    assert measure_jump(state, formulation, reach, directions)[1] == pytest.approx(800 * reach, rel=1e-3)
+    assert measure_jump(state, reach, np.ones((1, state.case.z.size)))[1] == pytest.approx(800 * reach, rel=1e-3)
 
 
 def test_a_tangent_that_jumps_everywhere_excuses_nothing() -> None:
@@ -144,13 +144,10 @@ def test_a_tangent_that_jumps_everywhere_excuses_nothing() -> None:
         def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
             return np.eye(z.size) * np.sin(1e9 * z.sum())
 
-    state = over_a_node(1 / 7)
-    directions = np.ones((1, state.z.size))
-    formulation = subject(Restless).for_case(state)
-    assert measure_jump(state, formulation, REACH, directions)[1] == 0
-    assert (
-        explain_by_kink(state, formulation, formulation.pair(state.interface, state.z), REACH, {"tangent": 1e-3}) == ""
-    )
+    case = over_a_node(1 / 7)
+    state = FrozenState.at(subject(Restless).for_case(case), case)
+    assert measure_jump(state, REACH, np.ones((1, case.z.size)))[1] == 0
+    assert explain_by_kink(state, REACH, {"tangent": 1e-3}) == ""
 
 
 def test_sparse_and_dense_tangents_are_the_same() -> None:
@@ -169,16 +166,14 @@ class Dropping(Springs):
 
 
 def test_a_choice_between_the_sides_of_a_kink_is_excused() -> None:
-    state = over_a_node(0.0)
-    formulation = subject(Springs).for_case(state)
-    assert is_like_its_surroundings(state, formulation, REACH)
-    assert explain_by_kink(state, formulation, None, REACH, {"forces": 0.1}).startswith("a kink")
+    state = at(Springs, over_a_node(0.0))
+    assert is_like_its_surroundings(state, REACH)
+    assert explain_by_kink(state, REACH, {"forces": 0.1}).startswith("a kink")
 
 
 def test_a_force_that_is_missing_at_a_kink_and_on_neither_side_is_not() -> None:
-    state = over_a_node(0.0)
-    formulation = subject(Dropping).for_case(state)
-    assert measure_jump(state, formulation, REACH, np.ones((1, state.z.size)))[0] == pytest.approx(0.125, rel=1e-4)
-    assert not is_like_its_surroundings(state, formulation, REACH)
-    assert explain_by_kink(state, formulation, None, REACH, {"forces": 0.1}) == ""
-    assert is_like_its_surroundings(over_a_node(1 / 7), formulation, REACH)
+    state = at(Dropping, over_a_node(0.0))
+    assert measure_jump(state, REACH, np.ones((1, state.case.z.size)))[0] == pytest.approx(0.125, rel=1e-4)
+    assert not is_like_its_surroundings(state, REACH)
+    assert explain_by_kink(state, REACH, {"forces": 0.1}) == ""
+    assert is_like_its_surroundings(at(Dropping, over_a_node(1 / 7)), REACH)

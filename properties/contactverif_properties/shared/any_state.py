@@ -17,9 +17,9 @@ from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import general_cases, tie_cases
+from contactverif_properties.shared.frozen_state import FrozenState
 
 SMALLEST, LARGEST = 0.125, 0.25  # The range of random multipliers over the shortest segment.
 
@@ -54,20 +54,16 @@ def move_state(case: Case, shift: FloatArray) -> Case:
     return replace(case, interface=interface, z=np.concatenate([positions, case.multipliers]))
 
 
-def forces_of_any_state(case: Case, subject: Subject) -> tuple[Case, FloatArray]:
-    """Return the case as the formulation is asked about it (`prepare_state`), and the residual (n_nodes, 2) there."""
-    formulation, state = prepare_state(case, subject)
-    pairing = formulation.pair(state.interface, state.z)
-    forces = formulation.residual(state.interface, pairing, state.z)
-    return state, forces[: state.interface.n_unknowns].reshape(-1, 2)
+def freeze_state(case: Case, subject: Subject) -> FrozenState:
+    """Return what `prepare_state` does, with the pairing of the state."""
+    return FrozenState.at(*prepare_state(case, subject))
 
 
-def ask_forces_and_tangents(
-    formulation: CheckedFormulation, *states: tuple[Interface, Pairing | None, FloatArray]
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the residuals (n,) and the tangents (n, n) in states z (n,) with their meshes and frozen pairings."""
+def ask_forces_and_tangents(*states: FrozenState) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return the residuals (n,) and the tangents (n, n), if there are any, of one formulation in some states."""
+    formulation = states[0].formulation
     methods = ["residual", *(["tangent"] if "tangent" in formulation.provides else [])]
-    answers = formulation.answers([(method, *state) for method in methods for state in states])
+    answers = formulation.answers([state.call(method) for method in methods for state in states])
     return answers[: len(states)], [dense(tangent) for tangent in answers[len(states) :]]
 
 

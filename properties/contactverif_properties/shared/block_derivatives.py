@@ -21,8 +21,7 @@ from scipy import sparse
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation
+from contactverif_properties.shared.frozen_state import FrozenState
 
 STEPS = (8.0, 1.0, 0.125)  # Steps over the one at which truncation and roundoff are equal.
 MOST_SINGLE = 48  # Up to so many nodes and multipliers, unknowns move one by one.
@@ -160,41 +159,30 @@ def _colours(contacts: sparse.csr_array) -> list[list[int]]:
     return [np.flatnonzero(colour == number).tolist() for number in range(int(colour.max()) + 1)]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Differences:
-    """The residual at a state, and its differences along directions."""
+def roundoff(case: Case, dtype: type) -> float:
+    """Return u S/ℓ in a precision; u is 2⁻⁵³ for doubles."""
+    unit = UNIT_ROUNDOFF if dtype is np.float64 else float(np.finfo(dtype).eps) / 2
+    return unit * case.largest_coordinate / case.shortest_segment
 
-    formulation: CheckedFormulation  # The formulation.
-    case: Case  # The state x, with its multipliers if any.
-    pairing: Pairing | None  # The pairing, which stays frozen.
 
-    def roundoff(self, dtype: type) -> float:
-        """Return u S/ℓ in a precision."""
-        return self.unit(dtype) * self.case.largest_coordinate / self.case.shortest_segment
+def step(case: Case, dtype: type) -> float:
+    """Return the step h = ℓ (u S/ℓ)^(1/3), a length, at which truncation and roundoff are equal."""
+    return case.shortest_segment * float(np.cbrt(roundoff(case, dtype)))
 
-    def unit(self, dtype: type) -> float:
-        """Return the unit roundoff u of a precision; 2⁻⁵³ for doubles."""
-        return UNIT_ROUNDOFF if dtype is np.float64 else float(np.finfo(dtype).eps) / 2
 
-    def step(self, dtype: type) -> float:
-        """Return the step h = ℓ (u S/ℓ)^(1/3), a length, at which truncation and roundoff are equal."""
-        return self.case.shortest_segment * float(np.cbrt(self.roundoff(dtype)))
+def differences_by_complex_step(state: FrozenState, directions: FloatArray) -> FloatArray:
+    """Return Im R(x + ihd)/h (n_directions, size) along directions d (n_directions, size) at a state x."""
+    h = state.case.shortest_segment * COMPLEX_STEP
+    forces = state.residual_at(state.case.z + 1j * h * directions)
+    return np.asarray(forces.imag / h, dtype=np.float64)
 
-    def by_complex_step(self, directions: FloatArray) -> FloatArray:
-        """Return Im R(x + ihd)/h (n_directions, size) along directions d (n_directions, size)."""
-        h = self.case.shortest_segment * COMPLEX_STEP
-        forces = self._residual(self.case.z + 1j * h * directions)
-        return np.asarray(forces.imag / h, dtype=np.float64)
 
-    def on_both_sides(self, directions: FloatArray, dtype: type) -> tuple[FloatArray, FloatArray]:
-        """Return the differences ahead and behind, each (n_steps, n_directions, size), for the steps in STEPS."""
-        steps = self.step(dtype) * np.array(STEPS, dtype=dtype)[:, None, None]
-        z: Array = self.case.z.astype(dtype)
-        states = np.stack([z + steps * directions, z - steps * directions])
-        forces = self._residual(states.reshape(-1, z.size)).reshape(states.shape)
-        here = self._residual(z[None])[0]
-        ahead, behind = (forces[0] - here) / steps, (here - forces[1]) / steps
-        return ahead.astype(np.float64), behind.astype(np.float64)
-
-    def _residual(self, states: Array) -> Array:
-        return self.formulation.residual(self.case.interface, self.pairing, states)
+def differences_on_both_sides(state: FrozenState, directions: FloatArray, dtype: type) -> tuple[FloatArray, FloatArray]:
+    """Return the differences ahead and behind, each (n_steps, n_directions, size), for the steps in STEPS."""
+    steps = step(state.case, dtype) * np.array(STEPS, dtype=dtype)[:, None, None]
+    z: Array = state.case.z.astype(dtype)
+    states = np.stack([z + steps * directions, z - steps * directions])
+    forces = state.residual_at(states.reshape(-1, z.size)).reshape(states.shape)
+    here = state.residual_at(z[None])[0]
+    ahead, behind = (forces[0] - here) / steps, (here - forces[1]) / steps
+    return ahead.astype(np.float64), behind.astype(np.float64)

@@ -29,9 +29,8 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation
 from contactverif_properties.shared.any_state import random_directions
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import ratio
 
 # The names of the details. `contactverif_reports` draws them.
@@ -98,15 +97,13 @@ class WorstRow:
     condition: float
 
 
-def measure_conditioning(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, forces: Array
-) -> Conditioning:
-    """Measure what roundings of the input may change in each row of a residual (n_unknowns + n_multipliers,).
+def measure_conditioning(state: FrozenState, forces: Array) -> Conditioning:
+    """Measure what roundings of the input may change in each row of the residual (n_unknowns + n_multipliers,).
 
-    The state is one near the origin, with its multipliers if any. The formulation is called once, on a frozen pairing,
-    with a batch of two states for each unknown.
+    The state is one near the origin, with its multipliers if any. The formulation is called once, on the frozen
+    pairing, with a batch of two states for each unknown.
     """
-    return conditioning_of(case, difference_quotient(case, formulation, pairing), forces)
+    return conditioning_of(state.case, difference_quotient(state), forces)
 
 
 def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Conditioning:
@@ -118,20 +115,20 @@ def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Condit
     return Conditioning(_block_norms(derivative, n_nodes) @ inputs + floor, floor)
 
 
-def difference_quotient(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
+def difference_quotient(state: FrozenState) -> FloatArray:
     """Return the central difference quotient (n, n) of the residual at a state on a frozen pairing, rows by columns.
 
     The step of a position is ℓ (u X/ℓ)^(1/3), at which truncation and roundoff are equal, about (u X/ℓ)^(2/3) relative.
     That of a multiplier is the largest multiplier, since the residual is affine in them.
     """
-    n = case.interface.n_unknowns
+    case = state.case
     shortest = case.shortest_segment
     largest = float(np.abs(case.positions).max())
     step = shortest * (UNIT_ROUNDOFF * max(largest / shortest, 1.0)) ** (1 / 3)
     steps = np.full(len(case.z), step)
-    steps[n:] = np.abs(case.multipliers).max(initial=0.0) or 1.0
+    steps[case.interface.n_unknowns :] = np.abs(case.multipliers).max(initial=0.0) or 1.0
     moves = np.diag(steps)
-    answers = formulation.residual(case.interface, pairing, case.z + np.stack([moves, -moves]))
+    answers = state.residual_at(case.z + np.stack([moves, -moves]))
     columns: FloatArray = (answers[0] - answers[1]) / (2 * steps[:, None])
     return columns.T
 
@@ -146,17 +143,16 @@ def count_tangent_roundings(case: Case, tangent: FloatArray, other: FloatArray, 
     return ratio(float(np.abs(other - tangent).max()), UNIT_ROUNDOFF * slope * case.diameter)
 
 
-def measure_tangent_slope(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, tangent: FloatArray
-) -> float:
+def measure_tangent_slope(state: FrozenState, tangent: FloatArray) -> float:
     """Return the largest change of an entry of the tangent over a small motion of the nodes, over its length.
 
     The tangent of a law that is not linear is small at a small gap, and its change is not: that of a pressure ε̂ g² is
     2 ε̂ g, which a rounding of the gap changes by 2 ε̂ u D.
     """
+    case, (method, interface, pairing, z) = state.case, state.call("tangent")
     step = TANGENT_STEP * case.shortest_segment
-    moves = step * random_directions(case.seed, N_TANGENT_DIRECTIONS, case.z.size)
-    moved = formulation.answers([("tangent", case.interface, pairing, case.z + move) for move in moves])
+    moves = step * random_directions(case.seed, N_TANGENT_DIRECTIONS, z.size)
+    moved = state.formulation.answers([(method, interface, pairing, z + move) for move in moves])
     return max(float(np.abs(dense(there) - tangent).max()) for there in moved) / step
 
 

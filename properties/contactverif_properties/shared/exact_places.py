@@ -20,12 +20,12 @@ from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_points import ExactPoints, Lattice, View, closest_view, run_against, slave_normal_view
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projections import KINDS, projection_states, projections_by_kind
-from contactverif_properties.shared.any_state import any_cases, prepare_state
+from contactverif_properties.shared.any_state import any_cases, freeze_state
 from contactverif_properties.shared.passes import Pass, split_passes
 from contactverif_properties.shared.roundoff import rounding_distance
 
@@ -46,7 +46,6 @@ FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ
 class Reported:
     """The answers of a formulation in a state."""
 
-    formulation: CheckedFormulation
     state: Case  # With multipliers, if the formulation has any.
     forces: FloatArray  # The position rows of the residual, of shape (n_nodes, 2).
     points: ContactPoints
@@ -55,13 +54,9 @@ class Reported:
     @classmethod
     def from_case(cls, case: Case, subject: Subject) -> Reported:
         """Ask a formulation about a case without multipliers."""
-        formulation, state = prepare_state(case, subject)
-        pairing = formulation.pair(state.interface, state.z)
-        forces, points = formulation.answers(
-            [(method, state.interface, pairing, state.z) for method in ("residual", "contact_points")]
-        )
-        positions = forces[: state.interface.n_unknowns].reshape(-1, 2)
-        return cls(formulation, state, positions, points, subject.traits)
+        frozen = freeze_state(case, subject)
+        forces, points = frozen.formulation.answers([frozen.call("residual"), frozen.call("contact_points")])
+        return cls(frozen.case, forces[: case.interface.n_unknowns].reshape(-1, 2), points, subject.traits)
 
     @property
     def passes(self) -> Iterator[Pass]:

@@ -13,15 +13,15 @@ slave node stands over a master node, and there only, is no choice.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation
 from contactverif.oracle import kink_margin
 from contactverif_properties.shared.any_state import random_directions
-from contactverif_properties.shared.passes import split_passes
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
@@ -31,24 +31,22 @@ DIFFERENCE_ERROR = 30.0
 N_RARE = 4  # Answers that are larger, or smaller, than all but so many of those around are no side of the kink.
 
 
-def explain_by_kink(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, errors: dict[str, float]
-) -> str:
+def explain_by_kink(state: FrozenState, reach: float, errors: dict[str, float]) -> str:
     """Return why a failure may be the fault of a kink, or an empty string.
 
     The coordinates are rounded by `reach`, a length. `errors` are the largest of an entry of the "forces" or the
     "tangent", for each of the two that failed.
     """
-    directions = random_directions(case.seed, N_DIRECTIONS, case.z.size)
-    reason = find_kink(case, formulation, pairing, reach, directions[0])
+    reason = find_kink(state, reach)
     if not reason:
-        jumps = dict(zip(("forces", "tangent"), measure_jump(case, formulation, reach, directions), strict=True))
+        directions = random_directions(state.case.seed, N_DIRECTIONS, state.case.z.size)
+        jumps = dict(zip(("forces", "tangent"), measure_jump(state, reach, directions), strict=True))
         if all(4 * jumps[part] >= error for part, error in errors.items()):
             reason = "a kink: moving the nodes by roundoff changes the answer as much"
-    return reason if reason and is_like_its_surroundings(case, formulation, reach) else ""
+    return reason if reason and is_like_its_surroundings(state, reach) else ""
 
 
-def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach: float) -> bool:
+def is_like_its_surroundings(state: FrozenState, reach: float) -> bool:
     """Return whether the forces of a state are among those of the states around it, as a choice at a kink is.
 
     The nodes are moved by `reach` forth and back, so that every kink is crossed both ways, and half of the moves or
@@ -56,70 +54,63 @@ def is_like_its_surroundings(case: Case, formulation: CheckedFormulation, reach:
     is between the least and the largest of them, or outside by no more than their difference: where several decisions
     meet in one node, not all of their combinations are drawn.
     """
-    here = _forces(case, formulation, case.z)
+    case = state.case
+    here = _forces(state, case.z)
     moves = reach * random_directions(case.seed, N_AROUND, case.z.size)
-    around = np.array([_forces(case, formulation, case.z + move) for move in (*moves, *-moves)])
+    around = np.array([_forces(state, case.z + move) for move in (*moves, *-moves)])
     low, high = np.sort(around, axis=0)[[N_RARE, -1 - N_RARE]]
     rounding = 8 * UNIT_ROUNDOFF * case.n_segments * max(np.abs(low).max(), np.abs(high).max())
     outside = np.maximum(low - here, here - high)
     return bool((outside <= high - low + rounding).all())
 
 
-def measure_jump(
-    case: Case, formulation: CheckedFormulation, reach: float, directions: FloatArray
-) -> tuple[float, float]:
+def measure_jump(state: FrozenState, reach: float, directions: FloatArray) -> tuple[float, float]:
     """Return how much a force, and an entry of the derivative, change when the nodes move by `reach`, forth or back.
 
     Each state has a new pairing. The directions (n, n_unknowns) have the largest entry ±1. The second change is less
     what differences may be wrong by; or it is that of a smooth answer, if that is larger.
     """
-    force, slope = _answers(case, formulation, case.z)
-    others = [
-        _answers(case, formulation, case.z + sign * reach * direction) for direction in directions for sign in (1, -1)
-    ]
+    z = state.case.z
+    places = [z, *(z + sign * reach * direction for direction in directions for sign in (1, -1))]
+    (force, slope), *others = (_differentiate(_pair_at(state, place), place) for place in places)
     slope_change = max(float(np.abs(other_slope - slope).max()) for _, other_slope in others)
-    noise = DIFFERENCE_ERROR * _rounding_share(case) ** (2 / 3) * float(np.abs(slope).max())
+    noise = DIFFERENCE_ERROR * _rounding_share(state.case) ** (2 / 3) * float(np.abs(slope).max())
     return (
         max(float(np.abs(other_force - force).max()) for other_force, _ in others),
-        max(slope_change - noise, reach * _measure_curvature(case, formulation, directions)),
+        max(slope_change - noise, reach * _measure_curvature(state, directions)),
     )
 
 
-def _measure_curvature(case: Case, formulation: CheckedFormulation, directions: FloatArray) -> float:
+def _measure_curvature(state: FrozenState, directions: FloatArray) -> float:
     """Return by how much an entry of the derivative changes a length of the way, on the pairing of the state.
 
     A segment that is seen nearly edge-on turns the tangent by many times uX/ℓ, and no jump shows it: so small a change
     is lost in the error of differences. A longer way shows it, as long as the answer is smooth.
     """
-    pairing = formulation.pair(case.interface, case.z)
-    way = case.shortest_segment * _rounding_share(case) ** (1 / 6)
+    z, share = state.case.z, _rounding_share(state.case)
+    frozen, way = _pair_at(state, z), state.case.shortest_segment * share ** (1 / 6)
     curvature = 0.0
     for direction in directions:
-        back, forth = (
-            _differentiate(case, formulation, pairing, case.z + sign * way * direction)[1] for sign in (-1, 1)
-        )
-        noise = DIFFERENCE_ERROR * _rounding_share(case) ** (2 / 3) * float(np.abs(forth).max() + np.abs(back).max())
+        back, forth = (_differentiate(frozen, z + sign * way * direction)[1] for sign in (-1, 1))
+        noise = DIFFERENCE_ERROR * share ** (2 / 3) * float(np.abs(forth).max() + np.abs(back).max())
         curvature = max(curvature, (float(np.abs(forth - back).max()) - noise) / (2 * way))
     return curvature
 
 
-def _forces(case: Case, formulation: CheckedFormulation, z: FloatArray) -> FloatArray:
-    forces: FloatArray = formulation.residual(case.interface, formulation.pair(case.interface, z), z)
-    return forces
+def _pair_at(state: FrozenState, z: FloatArray) -> FrozenState:
+    """Return the state on the pairing at z (n,)."""
+    return replace(state, pairing=state.formulation.pair(state.case.interface, z))
 
 
-def _answers(case: Case, formulation: CheckedFormulation, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return forces at z with its own pairing, and their derivative on that pairing by central differences."""
-    return _differentiate(case, formulation, formulation.pair(case.interface, z), z)
+def _forces(state: FrozenState, z: FloatArray) -> FloatArray:
+    return _pair_at(state, z).residual_at(z)
 
 
-def _differentiate(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, z: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return forces at z on a pairing, and their derivative by central differences."""
-    step = case.shortest_segment * _rounding_share(case) ** (1 / 3)
+def _differentiate(state: FrozenState, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return forces at z on the pairing of a state, and their derivative by central differences."""
+    step = state.case.shortest_segment * _rounding_share(state.case) ** (1 / 3)
     moves = step * np.eye(z.size)
-    forces = formulation.residual(case.interface, pairing, np.concatenate([z[None], z + moves, z - moves]))
+    forces = state.residual_at(np.concatenate([z[None], z + moves, z - moves]))
     slope: FloatArray = (forces[1 : 1 + z.size] - forces[1 + z.size :]).T / (2 * step)
     return forces[0], slope
 
@@ -129,25 +120,23 @@ def _rounding_share(case: Case) -> float:
     return UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
 
 
-def explain_by_rounded_decision(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> str:
+def explain_by_rounded_decision(state: FrozenState) -> str:
     """Return why rounding the positions relative to one another may turn a decision around, or an empty string.
 
     Each coordinate may move by 64 u D, whatever its distance from the origin. How much the forces change is not asked:
     where errors are counted in roundings, that would excuse a hundred of them.
     """
-    direction = random_directions(case.seed, 1, case.z.size)[0]
-    return find_kink(case, formulation, pairing, COORDINATE_ROUNDING * case.diameter, direction)
+    return find_kink(state, COORDINATE_ROUNDING * state.case.diameter)
 
 
-def find_kink(
-    case: Case, formulation: CheckedFormulation, pairing: Pairing | None, reach: float, direction: FloatArray
-) -> str:
+def find_kink(state: FrozenState, reach: float, direction: FloatArray | None = None) -> str:
     """Return why a decision may change if each coordinate moves by `reach` at most, a length, or an empty string.
 
-    Where the formulation has no contact points, one-sided differences along the direction (n_unknowns,) are looked at.
+    Where the formulation has no contact points, one-sided differences along a direction (n_unknowns,) are looked at. It
+    is random by the seed of the case, unless it is given.
     """
-    if "contact_points" in formulation.provides:
-        points = formulation.contact_points(case.interface, pairing, case.z)
+    case = state.case
+    if state.has_points:
         margin = min(
             kink_margin(
                 each.interface,
@@ -157,15 +146,15 @@ def find_kink(
                 each.points.area_from,
                 each.points.area_to,
             )
-            for each in split_passes(case, points)
+            for each in state.passes
         )
         if margin <= np.sqrt(2) * reach:  # The reach is of a coordinate, the margin of a node.
             return f"a kink: a decision hangs on {margin:.2g}, no more than nodes may move"
         return ""
-    here, ahead, behind = (
-        formulation.residual(case.interface, formulation.pair(case.interface, z), z)
-        for z in (case.z, case.z + reach * direction, case.z - reach * direction)
-    )
+    if direction is None:
+        (direction,) = random_directions(case.seed, 1, case.z.size)
+    move = reach * direction
+    here, ahead, behind = (_forces(state, z) for z in (case.z, case.z + move, case.z - move))
     bend = np.abs(ahead - 2 * here + behind).max()
     slope = np.abs(ahead - behind).max() / 2
     # A smooth function bends by slope × reach/ℓ and by what roundoff does; a kink bends by as much as the slope itself.

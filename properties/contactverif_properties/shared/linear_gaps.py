@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif_properties.shared.uniform_pressure import forces_of_multiplier
+from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state
 
 ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.
 
@@ -30,7 +30,7 @@ def knows_linear_total(traits: Traits) -> bool:
 
 def slave_forces(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_slave_nodes, 2) that push the slave; multipliers are all `uniform_multiplier`."""
-    forces = forces_of_multiplier(case, subject.for_case(case), uniform_multiplier(case))[2]
+    forces = pushing_forces(uniform_state(case, subject, uniform_multiplier(case)))
     return forces[: case.interface.n_slave_nodes]
 
 

@@ -15,12 +15,11 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.oracle import default_points, nearest_segments
 from contactverif_properties.shared.any_state import ask_forces_and_tangents
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.passes import split_passes
 from contactverif_properties.shared.roundoff import (
     COORDINATE_ROUNDING,
     SEGMENT_REASON,
@@ -34,18 +33,6 @@ TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
 SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
 BITS = "entries with other bits"
 TIE = "a tie: a point in the normal cone of a vertex is as near to one segment as to another"
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """The answer of a formulation in one state."""
-
-    case: Case  # The state, with uniform multipliers if the formulation has any.
-    formulation: CheckedFormulation  # The formulation that answered.
-    pairing: Pairing | None  # Its pairing there.
-    forces: FloatArray  # (n_nodes, 2) The position rows of the residual.
-    # (n_unknowns, n_unknowns) The rows and columns of positions; None where the plugin has no tangent.
-    tangent: FloatArray | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,21 +52,17 @@ def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
     )
 
 
-def _answers(states: Sequence[Case], subject: Subject) -> list[Answer]:
-    """Return the answers in some states, with the numeric penalty and the uniform multiplier of the first one."""
-    penalty, multiplier = subject.penalty(states[0]), SHARE * states[0].shortest_segment
-    answers = []
-    for case in states:
-        formulation = subject.with_penalty(penalty)
-        n, count = case.interface.n_unknowns, formulation.n_multipliers(case.interface)
-        if count:
-            formulation = subject.with_penalty(1.0)
-        state = case.with_multipliers(np.full(count, multiplier)) if count else case
-        pairing = formulation.pair(state.interface, state.z)
-        (forces,), tangents = ask_forces_and_tangents(formulation, (state.interface, pairing, state.z))
-        tangent = tangents[0][:n, :n] if tangents else None
-        answers.append(Answer(state, formulation, pairing, forces[:n].reshape(-1, 2), tangent))
-    return answers
+def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tuple[FrozenState, FloatArray, FloatArray]:
+    """Return a state with uniform multipliers if there are any, its forces (n_nodes, 2) and tangent.
+
+    The tangent has the rows and columns of positions, and none where the plugin has no tangent.
+    """
+    formulation, n = subject.with_penalty(penalty), case.interface.n_unknowns
+    if formulation.n_multipliers(case.interface):
+        formulation = subject.with_penalty(1.0)
+    state = FrozenState.with_multiplier(formulation, case, multiplier)
+    (forces,), tangents = ask_forces_and_tangents(state)
+    return state, forces[:n].reshape(-1, 2), tangents[0][:n, :n] if tangents else np.empty((0, 0))
 
 
 class Change(NamedTuple):
@@ -92,21 +75,19 @@ class Change(NamedTuple):
 
 
 def judge_changes(
-    changes: Sequence[Change],
-    tolerance: float,
-    states: Iterable[tuple[Case, CheckedFormulation, Pairing | None, float]],
+    changes: Sequence[Change], tolerance: float, states: Iterable[FrozenState], largest: float | None = None
 ) -> tuple[tuple[CheckedNumber, ...], str]:
     """Return the largest changes over their sizes, and why a kink excuses those above the tolerance.
 
-    Each state comes with its pairing and its largest coordinate. Without states, nothing is excused.
+    Coordinates are rounded at the largest one of each state, or at a length. Without states, nothing is excused.
     """
     errors = [float(np.abs(each.change).max()) for each in changes]
     values = {each.quantity: ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
     pairs = zip(changes, errors, strict=True)
     failures = {each.part: error for each, error in pairs if values[each.quantity] > tolerance}
     excuses = (
-        explain_by_kink(case, formulation, pairing, COORDINATE_ROUNDING * largest, failures)
-        for case, formulation, pairing, largest in states
+        explain_by_kink(state, COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), failures)
+        for state in states
     )
     return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
 
@@ -124,49 +105,47 @@ def compare(
 
     The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
     """
-    first, second = _answers((case, other), subject)
-    size = max(sum_larger_forces(answer.case, answer.forces) for answer in (first, second))
-    changes = [Change("forces", quantities[0], second.forces[carry.nodes] - first.forces @ carry.matrix.T, size)]
-    if first.tangent is not None and second.tangent is not None:
+    penalty, multiplier = subject.penalty(case), SHARE * case.shortest_segment
+    (first, forces, tangent), (second, forces_there, tangent_there) = (
+        _ask(state, subject, penalty, multiplier) for state in (case, other)
+    )
+    size = max(sum_larger_forces(case, forces), sum_larger_forces(other, forces_there))
+    changes = [Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
+    if tangent.size:
         places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
-        change = second.tangent[np.ix_(places, places)] - turn @ first.tangent @ turn.T
-        size = float(max(np.abs(first.tangent).max(), np.abs(second.tangent).max()))
+        change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
+        size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
         changes.append(Change("tangent", quantities[1], change, size))
-    distance = max(rounding_distance(answer.case, subject.traits) for answer in (first, second))
-    tolerance = segment_tolerance(first.case, first.forces, distance)
-    states = [(each.case, each.formulation, each.pairing, each.case.largest_coordinate) for each in (first, second)]
-    numbers, undecided = judge_changes(changes, tolerance, states if explain else [])
+    distance = max(rounding_distance(state, subject.traits) for state in (case, other))
+    tolerance = segment_tolerance(case, forces, distance)
+    numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
     if explain and not undecided and any(number.value > number.tolerance for number in numbers):
         # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
         undecided = _find_tie(first) or _find_tie(second)
     details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
-    return Measurement(numbers, undecided, details=details, idle=not (first.forces.any() or second.forces.any()))
+    return Measurement(numbers, undecided, details=details, idle=not (forces.any() or forces_there.any()))
 
 
-def _find_tie(answer: Answer) -> str:
+def _find_tie(state: FrozenState) -> str:
     """Return why either of two segments is right for a point, or an empty string if none is tied.
 
     A point in the normal cone of a re-entrant vertex is equally near to both segments there, wherever it is. By the
     rule "the nearest segment" alone, a formulation may take the one with the lower number.
     """
-    if "contact_points" in answer.formulation.provides:
-        points = answer.formulation.contact_points(answer.case.interface, answer.pairing, answer.case.z)
-        passes = [
-            (each.interface, each.z, each.points.position[each.points.active])
-            for each in split_passes(answer.case, points)
-        ]
+    if state.has_points:
+        passes = [(each.interface, each.z, each.points.position[each.points.active]) for each in state.passes]
     else:
-        interface, positions = answer.case.interface, answer.case.positions
+        interface, positions = state.case.interface, state.case.positions
         segment, c, _, _ = default_points(interface)
         first, second = np.swapaxes(positions[interface.slave.segments[segment]], 0, 1)
         share = (1 + c[:, None]) / 2
-        passes = [(interface, answer.case.z, (1 - share) * first + share * second)]
+        passes = [(interface, state.case.z, (1 - share) * first + share * second)]
     for interface, z, places in passes:
         nodes = z[: interface.n_unknowns].reshape(-1, 2)
         for place in places[np.isfinite(places).all(axis=1)]:
             near = nearest_segments(nodes, interface.master.segments, (float(place[0]), float(place[1]))).segments
             open_point = all(segment.signed_squared_gap > 0 for segment in near)
-            if len(near) > 1 and (not open_point or answer.case.n_multipliers):  # Multipliers may push across a gap.
+            if len(near) > 1 and (not open_point or state.case.n_multipliers):  # Multipliers may push across a gap.
                 return TIE
     return ""

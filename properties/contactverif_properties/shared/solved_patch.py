@@ -15,13 +15,13 @@ from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
 from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import (
@@ -81,17 +81,16 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     exact = exact_unknowns(scene, pressure, penalty)
     trace, q = solve_patch(scene, formulation, exact, pressure / penalty)
     state = replace(case, z=scene.positions(q), penalty=penalty)
-    pairing, forces = contact_at(state, trace, formulation)
-    slave, master = force_errors(state, scene, forces, q, pressure)
+    contact = contact_at(state, trace, formulation)
+    slave, master = force_errors(contact, scene, q, pressure)
     values = {
         STRESS: stress_error(scene, scene.stresses(q), pressure),
         SLAVE_FORCES: slave,
         MASTER_FORCES: master,
         GAP: gap_error(state, pressure / penalty, pressure / penalty),
     }
-    if "contact_points" in formulation.provides:
-        points = formulation.contact_points(case.interface, pairing, state.z)
-        gap, reported = point_errors(case, points, penalty, pressure)
+    if contact.has_points:
+        gap, reported = point_errors(contact, penalty, pressure)
         values[GAP] = max(values[GAP], gap)
         if subject.traits.rules.penalty != "nodal":
             values[PRESSURE] = reported
@@ -147,9 +146,7 @@ class _SaddlePoint:
         state = replace(self.case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
         multipliers, sharpness = nearest_multipliers(state, scene, self.formulation, self.multipliers)
         state = state.with_multipliers(multipliers)
-        pairing = self.formulation.pair(state.interface, state.z)
-        forces = self.formulation.residual(state.interface, pairing, state.z)
-        slave, master = force_errors(state, scene, forces, q, pressure)
+        slave, master = force_errors(FrozenState.at(self.formulation, state), scene, q, pressure)
         values = {
             STRESS: stress_error(scene, scene.stresses(q), pressure),
             SLAVE_FORCES: slave,
@@ -191,12 +188,11 @@ def nearest_to_balance(trace: Trace) -> FloatArray:
     return iterate
 
 
-def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> tuple[Pairing | None, FloatArray]:
-    """Return pairing and residual of the formulation in a state; those of Newton's last iterate if it is that one."""
+def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> FrozenState:
+    """Return the formulation in a state, on the pairing of Newton's last iterate if it is that one."""
     if np.array_equal(state.z, trace.z):
-        return trace.pairing, trace.forces
-    pairing = formulation.pair(state.interface, state.z)
-    return pairing, formulation.residual(state.interface, pairing, state.z)
+        return FrozenState(formulation, state, trace.pairing)
+    return FrozenState.at(formulation, state)
 
 
 def forces_to_draw(case: Case) -> FloatArray:
@@ -204,15 +200,15 @@ def forces_to_draw(case: Case) -> FloatArray:
     return consistent_forces(case, pressure_of(case, case.penalty))
 
 
-def force_errors(case: Case, scene: Scene, forces: FloatArray, q: FloatArray, pressure: float) -> tuple[float, float]:
+def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> tuple[float, float]:
     """Return the largest error of a nodal force on the slave and on the master, over p L.
 
     Forces are judged twice: those that the bodies need to be in balance with the unknowns q (n_free,), and those that
-    the formulation gives (n_unknowns + n_multipliers,). They differ where the formulation found no balance, and at
+    the formulation gives. They differ where the formulation found no balance, and at
     rollers, which take what the bodies do not need.
     """
     by_bodies = scene.nodal_forces(q)
-    by_contact = -forces[: case.interface.n_unknowns].reshape(-1, 2)
+    by_contact, case = -state.forces, state.case
     first = 0
     for index in scene.bodies_in_reach:
         last = first + len(scene.bodies[index].contact_nodes)
@@ -241,13 +237,14 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
     return float(errors.max() / size)
 
 
-def point_errors(case: Case, points: ContactPoints, penalty: float, pressure: float) -> tuple[float, float]:
+def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[float, float]:
     """Return the largest error of a reported gap over p/ε̂, and of a reported pressure over p.
 
     Idle points do not count if they have no weight, no master segment, or lie beside the master. The error of the
     pressure is infinite if no point counts.
     """
-    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(case, points)
+    points = state.points
+    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(state.case, points)
     counted = (points.weight != 0) & in_contact
     gaps = np.where(counted, points.gap, -pressure / penalty)  # A gap is NaN where it is meaningless.
     gap = float(np.nanmax(np.abs(gaps * penalty / pressure + 1), initial=0.0))

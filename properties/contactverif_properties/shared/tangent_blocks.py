@@ -20,15 +20,18 @@ from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.subject import Subject
-from contactverif_properties.shared.any_state import prepare_state
+from contactverif_properties.shared.any_state import freeze_state
 from contactverif_properties.shared.block_derivatives import (
-    Differences,
     Groups,
     Moves,
+    differences_by_complex_step,
+    differences_on_both_sides,
     groups_of,
     plan_moves,
+    roundoff,
     single_moves,
 )
+from contactverif_properties.shared.frozen_state import FrozenState
 
 LARGEST, SURROUNDINGS = 30.0, 32.0  # Allowed errors of a difference, over (uS/ℓ)^(2/3) of a block and its surroundings.
 EXACT, ROUNDINGS = 1e-11, 1024.0  # Allowed errors of a complex step, of a block and over uS/ℓ of its surroundings.
@@ -74,7 +77,7 @@ class Comparison:
 class BlockJudge:
     """The tangent of a state, and how it is compared with the derivative of the residual."""
 
-    differences: Differences  # The residual at the state.
+    state: FrozenState
     tangent: FloatArray  # (size, size) The tangent K.
     pattern: BoolArray  # (size, size) The entries that the tangent has.
     groups: Groups  # Nodes and multipliers.
@@ -88,8 +91,8 @@ class BlockJudge:
     def answers(self, moves: Moves) -> FloatArray:
         """Return the derivatives (n_steps, n_moves, size) along the moves; by a complex step there is one."""
         if self.by_complex_step:
-            return self.differences.by_complex_step(moves.directions())[None]
-        ahead, behind = self.differences.on_both_sides(moves.directions(), self.dtype)
+            return differences_by_complex_step(self.state, moves.directions())[None]
+        ahead, behind = differences_on_both_sides(self.state, moves.directions(), self.dtype)
         return (ahead + behind) / 2
 
     def compare(self, derivatives: FloatArray) -> Comparison:
@@ -107,17 +110,17 @@ class BlockJudge:
 
     def tolerate(self, largest: FloatArray, surroundings: FloatArray, bending: FloatArray) -> FloatArray:
         """Return the tolerance of blocks, given the lengths over ℓ over which they bend; arrays of one shape."""
-        rounding = ROUNDINGS * self.differences.roundoff(np.float64) / bending * surroundings
+        rounding = ROUNDINGS * roundoff(self.state.case, np.float64) / bending * surroundings
         if self.by_complex_step:
             return EXACT * largest + rounding
-        accuracy = (self.differences.roundoff(self.dtype) / bending) ** (2 / 3)
+        accuracy = (roundoff(self.state.case, self.dtype) / bending) ** (2 / 3)
         return accuracy * (LARGEST * largest + SURROUNDINGS * surroundings) + rounding
 
 
 def judge_of(case: Case, subject: Subject) -> BlockJudge:
     """Return the judge of a formulation with a tangent at a state."""
-    formulation, case = prepare_state(case, subject)
-    pairing = formulation.pair(case.interface, case.z)
+    state = freeze_state(case, subject)
+    formulation, case, pairing = state.formulation, state.case, state.pairing
     tangent = formulation.tangent(case.interface, pairing, case.z)
     dtype: type = np.float64
     if formulation.decides_anew(pairing):  # No smaller step is exact where decisions may change with it.
@@ -126,9 +129,7 @@ def judge_of(case: Case, subject: Subject) -> BlockJudge:
         dtype = np.complex128
     elif subject.traits.abilities.takes_longdouble:
         dtype = np.longdouble
-    return BlockJudge(
-        Differences(formulation, case, pairing), dense(tangent), pattern_of(tangent), groups_of(case), dtype
-    )
+    return BlockJudge(state, dense(tangent), pattern_of(tangent), groups_of(case), dtype)
 
 
 def pattern_of(tangent: Any) -> BoolArray:
@@ -151,7 +152,7 @@ def scatter(answers: FloatArray, moves: Moves) -> FloatArray:
 
 def compare_blocks(judge: BlockJudge) -> Comparison:
     """Compare all blocks; on a long interface, what looks wrong is measured again, one unknown at a time."""
-    moves = plan_moves(judge.differences.case, judge.pattern)
+    moves = plan_moves(judge.state.case, judge.pattern)
     answers = judge.answers(moves)
     derivatives = scatter(answers, moves)
     comparison = judge.compare(derivatives)

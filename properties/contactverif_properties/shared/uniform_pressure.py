@@ -7,11 +7,11 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import gap_tolerance
 
 
@@ -42,26 +42,18 @@ def forces_of_penetration(case: Case) -> FloatArray:
     return consistent_forces(case, case.penalty * case.parameter("penetration"))
 
 
-def forces_of_multiplier(
-    case: Case, formulation: CheckedFormulation, multiplier: float
-) -> tuple[Case, Pairing | None, FloatArray]:
-    """Return the state with all multipliers alike, its pairing, and the forces (n_nodes, 2) that push the nodes.
-
-    Where there are multipliers, the forces are those of the multipliers alone.
-    """
-    interface = case.interface
-    state = case.with_multipliers(np.full(formulation.n_multipliers(interface), multiplier))
-    pairing = formulation.pair(interface, state.z)
-    if state.n_multipliers:
-        forces = unit_forces(state, formulation, pairing) @ state.multipliers
-    else:
-        forces = formulation.residual(interface, pairing, state.z)
-    return state, pairing, -forces.reshape(-1, 2)
+def uniform_state(case: Case, subject: Subject, pressure: float | None = None) -> FrozenState:
+    """Return the formulation in the state of a case; multipliers, if any, are all the pressure, ε̂ |g| by default."""
+    if pressure is None:
+        pressure = case.penalty * case.parameter("penetration")
+    return FrozenState.with_multiplier(subject.for_case(case), case, pressure)
 
 
-def uniform_forces(case: Case, subject: Subject) -> FloatArray:
-    """Return the forces (n_nodes, 2) that push the nodes; multipliers, if any, are all ε̂ |g|."""
-    return forces_of_multiplier(case, subject.for_case(case), case.penalty * case.parameter("penetration"))[2]
+def pushing_forces(state: FrozenState) -> FloatArray:
+    """Return the forces (n_nodes, 2) that push the nodes; if there are multipliers, those of the multipliers alone."""
+    if state.case.n_multipliers:
+        return -(unit_forces(state) @ state.case.multipliers).reshape(-1, 2)
+    return -state.forces
 
 
 def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[FloatArray, float]:
@@ -72,20 +64,16 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
     the exact forces. The second number is the largest multiplier over the mean one, by which roundoff grows; it is 1
     without nodal multipliers.
     """
-    formulation = subject.for_case(case)
-    count = formulation.n_multipliers(case.interface)
-    if not count:
-        forces = -formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
-        return forces.reshape(-1, 2), 1.0
-    uniform = np.full(count, case.penalty * case.parameter("penetration"))
-    state = case.with_multipliers(uniform)
-    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    state = uniform_state(case, subject)
+    if not state.case.n_multipliers:
+        return -state.forces, 1.0
+    transfer = -unit_forces(state)
     if subject.traits.rules.penalty == "nodal":
         multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
         mean = float(np.abs(multipliers).mean())
         largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
         return (transfer @ multipliers).reshape(-1, 2), largest
-    nodal: FloatArray = (transfer @ uniform).reshape(-1, 2)
+    nodal: FloatArray = (transfer @ state.case.multipliers).reshape(-1, 2)
     n = case.interface.n_slave_nodes
     total, exact_total = nodal[:n].sum(axis=0), exact[:n].sum(axis=0)
     projection = float(total @ exact_total)
@@ -104,19 +92,20 @@ def transmission_error(case: Case, subject: Subject) -> tuple[float, float]:
     return error / size, gap_tolerance(case, case.parameter("penetration")) * largest
 
 
-def unit_forces(case: Case, formulation: CheckedFormulation, pairing: Pairing | None) -> FloatArray:
+def unit_forces(state: FrozenState) -> FloatArray:
     """Return what a unit of each multiplier adds to the position rows of the residual (n_unknowns, n_multipliers).
 
     On a frozen pairing the residual is affine in the multipliers. What it holds without any multiplier, as that of an
     augmented Lagrangian does, is subtracted. The formulation is asked with multipliers as large as those of the case,
     rounded to a power of two: roundoff would hide a unit beside a large penalty force.
     """
+    case = state.case
     n, count = case.interface.n_unknowns, case.n_multipliers
     largest = float(np.abs(case.multipliers).max(initial=0.0))
     size = 2.0 ** round(np.log2(largest)) if largest > 0 else 1.0
     multipliers = np.vstack([size * np.eye(count), np.zeros(count)])
     states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), multipliers])
-    forces = formulation.residual(case.interface, pairing, states)[:, :n]
+    forces = state.residual_at(states)[:, :n]
     columns: FloatArray = (forces[:-1] - forces[-1]).T / size
     return columns
 
@@ -127,9 +116,8 @@ def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
     They are the pressure itself where it gives the exact forces. Else they are the multipliers ≥ 0 that come nearest to
     those. A multiplier that transmits nothing, as that of a node that faces nothing, is 0.
     """
-    uniform = np.full(formulation.n_multipliers(case.interface), pressure)
-    state = case.with_multipliers(uniform)
-    transfer = -unit_forces(state, formulation, formulation.pair(case.interface, state.z))
+    state = FrozenState.with_multiplier(formulation, case, pressure)
+    uniform, transfer = state.case.multipliers.copy(), -unit_forces(state)
     exact = consistent_forces(case, pressure).reshape(-1)
     from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
 
@@ -153,8 +141,7 @@ def nearest_multipliers(
     wrong by roundoff leave the multipliers uncertain by roundoff over that number.
     """
     solution = case.multipliers
-    pairing = formulation.pair(case.interface, case.z)
-    loads = scene.transformation.T @ unit_forces(case, formulation, pairing)
+    loads = scene.transformation.T @ unit_forces(FrozenState.at(formulation, case))
     _, sizes, directions = linalg.svd(loads)
     rank = int((sizes > RANK_ROUNDOFF * max(loads.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
     free = directions[rank:]
