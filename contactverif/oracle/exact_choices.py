@@ -78,8 +78,7 @@ def seen_excess(
         middle = _middles(lattice, slave_segment, segments)
         in_middle = slave_normal_view(lattice, middle, segments)
         farther = np.minimum(farther, _farther_than_nearest(lattice, middle, slave_segment, segments, in_middle))
-    excess: FloatArray = np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
-    return excess
+    return np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
 
 
 def _farther_than_nearest(

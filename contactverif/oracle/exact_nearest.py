@@ -88,8 +88,7 @@ def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> Int
     off = towards - share[:, None] * along
     distance = np.hypot(off[:, 0], off[:, 1])
     doubt = _DOUBT * (np.hypot(towards[:, 0], towards[:, 1]) + np.sqrt(squared))
-    candidates: IntArray = np.flatnonzero(distance - doubt <= (distance + doubt).min())
-    return candidates
+    return np.flatnonzero(distance - doubt <= (distance + doubt).min())
 
 
 def _describe(near: Reach, nodes: list[int], area: int) -> NearSegment:

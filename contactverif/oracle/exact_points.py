@@ -153,8 +153,7 @@ def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray)
 def run_against(lattice: Lattice, points: ExactPoints, segments: IntArray) -> BoolArray:
     """Return whether master segments (n_points,) run against the slave segments of points, and so face them."""
     _, along = _arm_and_along(lattice, points, segments)
-    against: BoolArray = (_dot(along, points.along) < 0).astype(np.bool_)
-    return against
+    return (_dot(along, points.along) < 0).astype(np.bool_)
 
 
 def positions(lattice: Lattice, points: ExactPoints) -> Ratios:
@@ -176,8 +175,7 @@ def _lengths(lattice: Lattice, points: ExactPoints, arm: Integers, along: Intege
 def _sizes(vectors: Integers, scale: Any) -> FloatArray:
     """Return the lengths of integer vectors (n, 2) over a scale, as floats."""
     parts = Ratios(vectors, np.broadcast_to(np.asarray(scale, dtype=object), len(vectors))[:, None]).floats()
-    sizes: FloatArray = np.hypot(parts[:, 0], parts[:, 1])
-    return sizes
+    return np.hypot(parts[:, 0], parts[:, 1])
 
 
 def _dot(a: Integers, b: Integers) -> Integers:

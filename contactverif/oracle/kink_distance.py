@@ -95,8 +95,7 @@ class _Line:
 def _interpolate(carriers: FloatArray, c: FloatArray) -> FloatArray:
     """Return the points (n_points, dim) at c (n_points,) of segments with these end points (n_points, 2, dim)."""
     share = ((1 + c) / 2)[:, None]
-    points: FloatArray = (1 - share) * carriers[:, 0] + share * carriers[:, 1]
-    return points
+    return (1 - share) * carriers[:, 0] + share * carriers[:, 1]
 
 
 def _dots(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -106,8 +105,7 @@ def _dots(a: FloatArray, b: FloatArray) -> FloatArray:
 def _margin(difference: FloatArray, tangent: FloatArray, inverse_length: FloatArray) -> FloatArray:
     """Return the margin |d·t| / 3(1 + |d|/l) of a difference d, a tangent t and 1/l."""
     size = np.hypot(difference[..., 0], difference[..., 1])
-    margin: FloatArray = np.abs(_dots(difference, tangent)) / (3 * (1 + size * inverse_length))
-    return margin
+    return np.abs(_dots(difference, tangent)) / (3 * (1 + size * inverse_length))
 
 
 def _distances(line: _Line, points: FloatArray) -> tuple[FloatArray, IntArray]:

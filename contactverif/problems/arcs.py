@@ -61,8 +61,7 @@ class Arcs:
         """The force (2,) that pushes the slave: the integral of the pressure along its arc, towards its body."""
         first, last = map(radians, self.slave)
         outwards = np.array([sin(last) - sin(first), cos(first) - cos(last)]) * self.slave_radius
-        force: FloatArray = self.pressure * (-outwards if self.convex_slave else outwards)
-        return force
+        return self.pressure * (-outwards if self.convex_slave else outwards)
 
     def case(self, refine: int = 1, name: str = "") -> Case:
         """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike."""

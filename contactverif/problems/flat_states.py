@@ -281,8 +281,7 @@ def _touching(
 
 def _direction(angle: float) -> FloatArray:
     """Return the integer direction (2,) nearest to an angle in degrees, over a power of two; its length is near 1."""
-    direction: FloatArray = np.round(np.array([cos(radians(angle)), sin(radians(angle))]) * _FINENESS) / _FINENESS
-    return direction
+    return np.round(np.array([cos(radians(angle)), sin(radians(angle))]) * _FINENESS) / _FINENESS
 
 
 def _chains(length: int, count: int, first: int) -> list[tuple[int, int]]:

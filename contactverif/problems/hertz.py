@@ -43,8 +43,7 @@ def peak(force: float, radius: float, stiffness: float) -> float:
 def pressure(x: FloatArray, force: float, radius: float, stiffness: float) -> FloatArray:
     """Return the pressure p0 √(1 − x²/a²) at x from the middle, in the shape of x; 0 outside (Johnson, 4.44)."""
     inside = 1 - (np.asarray(x, dtype=np.float64) / half_width(force, radius, stiffness)) ** 2
-    pressures: FloatArray = peak(force, radius, stiffness) * np.sqrt(np.maximum(inside, 0.0))
-    return pressures
+    return peak(force, radius, stiffness) * np.sqrt(np.maximum(inside, 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +67,7 @@ class WinklerContact:
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure at x from the middle, in the shape of x; 0 outside."""
         t = np.asarray(x, dtype=np.float64) / self.half_width
-        pressures: FloatArray = np.where(np.abs(t) < 1, legendre.legval(np.clip(t, -1, 1), self.coefficients), 0.0)
-        return pressures
+        return np.where(np.abs(t) < 1, legendre.legval(np.clip(t, -1, 1), self.coefficients), 0.0)
 
 
 def solve_winkler_contact(

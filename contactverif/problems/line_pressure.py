@@ -72,8 +72,7 @@ class LinePressure:
         """Return the pressure at x from the middle, in the shape of x; 0 outside."""
         panel, t = self._place(x)
         values = np.einsum("...n,...n", self.coefficients[panel], legendre.legvander(t, self._n_terms - 1))
-        pressures: FloatArray = np.where(np.abs(x) < self.half_width, values, 0.0)
-        return pressures
+        return np.where(np.abs(x) < self.half_width, values, 0.0)
 
     def force_up_to(self, x: FloatArray) -> FloatArray:
         """Return the force ∫ p ds of the strip from −a to x, in the shape of x."""
@@ -120,13 +119,11 @@ class LinePressure:
 
     @cached_property
     def _middles(self) -> FloatArray:
-        middles: FloatArray = (self.edges[1:] + self.edges[:-1]) / 2
-        return middles
+        return (self.edges[1:] + self.edges[:-1]) / 2
 
     @cached_property
     def _halves(self) -> FloatArray:
-        halves: FloatArray = np.diff(self.edges) / 2
-        return halves
+        return np.diff(self.edges) / 2
 
     @cached_property
     def _primitives(self) -> FloatArray:

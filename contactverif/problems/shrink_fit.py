@@ -160,8 +160,7 @@ class ShrinkFit:
         """
         radius = np.asarray(radius, dtype=np.float64)
         modulus, ratio, (mean, deviation) = self._constants(ring, penalty)
-        displacement: FloatArray = ((1 - ratio) * mean * radius + (1 + ratio) * deviation / radius) / modulus
-        return displacement
+        return ((1 - ratio) * mean * radius + (1 + ratio) * deviation / radius) / modulus
 
     def stresses(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
         """Return the radial and the hoop stress (n, 2) of a ring at the radii (n,), positive in tension.

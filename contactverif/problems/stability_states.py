@@ -136,5 +136,4 @@ def _on_lattice(values: FloatArray, bits: int) -> FloatArray:
     """Return the nearest multiples of 5 · 2^-bits, at least one of them for what is not 0."""
     counts = np.round(values / HYPOTENUSE * 2.0**bits)
     counts = np.where((counts == 0) & (values != 0), np.sign(values), counts)
-    lattice: FloatArray = counts * (HYPOTENUSE * 2.0**-bits)
-    return lattice
+    return counts * (HYPOTENUSE * 2.0**-bits)

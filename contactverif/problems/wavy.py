@@ -84,8 +84,7 @@ class WavyProblem:
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure p̄ + p1 cos kx, force per length, in the shape of x."""
-        pressures: FloatArray = self.mean + self.wave * np.cos(self.wave_number * np.asarray(x))
-        return pressures
+        return self.mean + self.wave * np.cos(self.wave_number * np.asarray(x))
 
     def forces(self, interface: Interface, slave: int, positions: FloatArray) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes at positions (n_nodes, 2)."""

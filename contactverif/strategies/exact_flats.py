@@ -102,5 +102,4 @@ def _slave_and_master(
 def _places(places: list[float], offsets: list[int], over: int, fineness: int) -> FloatArray:
     """Return the places, each moved by up to 1/16 and rounded to a multiple of 2^-fineness."""
     moved = places + repeat_cyclically(offsets, len(places)) / over / 16
-    rounded: FloatArray = np.round(moved * 2.0**fineness) * 2.0**-fineness
-    return rounded
+    return np.round(moved * 2.0**fineness) * 2.0**-fineness

@@ -41,8 +41,7 @@ class Panel:
 
 def on_lattice(values: FloatArray) -> FloatArray:
     """Return the nearest multiples of 2^-20."""
-    rounded: FloatArray = np.round(values * 2.0**20) * 2.0**-20
-    return rounded
+    return np.round(values * 2.0**20) * 2.0**-20
 
 
 def shortest(points: FloatArray) -> float:

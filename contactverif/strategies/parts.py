@@ -101,8 +101,7 @@ class Motion:
         cos, sin = self.cos_sin
         x, y = points.astype(np.longdouble).T
         moved = np.column_stack([cos * x - sin * y + self.shift[0], sin * x + cos * y + self.shift[1]])
-        rounded: FloatArray = (moved * self.scale).astype(np.float64)
-        return rounded
+        return (moved * self.scale).astype(np.float64)
 
 
 REST = Motion()

@@ -118,8 +118,7 @@ def _turn_onto_lattice(points: FloatArray, degrees: int) -> FloatArray:
 
 def _onto_lattice(points: FloatArray, exponent: int) -> FloatArray:
     """Return the points, each coordinate rounded to a multiple of 2^exponent."""
-    rounded: FloatArray = np.round(points * 2.0**-exponent) * 2.0**exponent
-    return rounded
+    return np.round(points * 2.0**-exponent) * 2.0**exponent
 
 
 def _given_cases(interface: Interface) -> SearchStrategy[Case]:

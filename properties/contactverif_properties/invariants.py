@@ -61,8 +61,7 @@ def exchange_roles(case: Case) -> tuple[Case, Carry]:
 
 def reflect(points: FloatArray) -> FloatArray:
     """Return the points (n, 2), mirrored; no zero becomes −0."""
-    mirrored: FloatArray = points * [-1.0, 1.0] + 0.0
-    return mirrored
+    return points * [-1.0, 1.0] + 0.0
 
 
 _define = partial(Property.define, family="invariants", promise=lambda traits: True)

@@ -151,8 +151,7 @@ def _position_errors(each: Pass, far: float) -> FloatArray:
 
 def _size(errors: FloatArray, active: BoolArray) -> FloatArray:
     """Return |errors|; 0 in place of NaN where a point is idle."""
-    sizes: FloatArray = np.where(np.isnan(errors) & ~active, 0.0, np.abs(errors))
-    return sizes
+    return np.where(np.isnan(errors) & ~active, 0.0, np.abs(errors))
 
 
 LARGE_UNIT = 2.0**-32
@@ -223,8 +222,7 @@ def _count(reported: Reported) -> tuple[int, int]:
 
 def _without_place(points: ContactPoints) -> BoolArray:
     """Return which points are active but cannot be: without a place, or without a master segment for a gap there."""
-    homeless: BoolArray = points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))
-    return homeless
+    return points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))
 
 
 def _decide(places: Places, rule: str | None) -> tuple[BoolArray, BoolArray]:

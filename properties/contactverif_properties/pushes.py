@@ -85,8 +85,7 @@ def nodes_far_from_contact(case: Case) -> BoolArray:
     interface, along = case.interface, case.parameters["along"]
     slave = along[: interface.n_slave_nodes]
     longest = max(float(np.abs(np.diff(along[side.segments])).max()) for side in (interface.slave, interface.master))
-    distant: BoolArray = (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
-    return distant
+    return (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
 
 
 def _slave_places(case: Case) -> FloatArray:
@@ -343,8 +342,7 @@ def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: F
 def _pull_past_ends(points: ContactPoints) -> FloatArray:
     """Return max(−ξ, ξ − 1, 0) |F| of each point (n_points,); 0 for weighted nodes, which have no foot."""
     past = np.maximum(0.0, np.maximum(-points.xi, points.xi - 1.0))
-    pulls: FloatArray = np.where(points.weighted | np.isnan(past), 0.0, past * np.abs(points.pressure * points.weight))
-    return pulls
+    return np.where(points.weighted | np.isnan(past), 0.0, past * np.abs(points.pressure * points.weight))
 
 
 def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:

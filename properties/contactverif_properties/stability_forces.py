@@ -313,10 +313,8 @@ class ExactMotion:
 
     def turn(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (n, 2) after the rotation, each component rounded like a sum of two products."""
-        turned: FloatArray = (vectors @ self._matrix.T) / self._hypotenuse
-        return turned
+        return (vectors @ self._matrix.T) / self._hypotenuse
 
     def turn_back(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (n, 2) before the rotation."""
-        turned: FloatArray = (vectors @ self._matrix) / self._hypotenuse
-        return turned
+        return (vectors @ self._matrix) / self._hypotenuse

@@ -94,8 +94,7 @@ class _TurnedSystem:
         nodes = self.system.scene.interface.nodes
         displacements = self.system.state(u).reshape(-1, 2) - nodes
         z = (self.interface.nodes + self.motion.turn(displacements)).reshape(-1)
-        forces: FloatArray = self.system.formulation.residual(self.interface, self.pairing, z)
-        return forces
+        return self.system.formulation.residual(self.interface, self.pairing, z)
 
     def residual(self, u: FloatArray) -> FloatArray:
         """Return the residual (n_free,) of bodies and contact at the unknowns u (n_free,)."""
@@ -218,8 +217,7 @@ def _matrix(system: System, pairing: Pairing | None, u: FloatArray) -> FloatArra
     """
     contact = dense(system.formulation.tangent(system.scene.interface, pairing, system.state(u)))
     transformation = dense(system.transformation)
-    matrix: FloatArray = dense(system.stiffness) + transformation.T @ contact @ transformation
-    return matrix
+    return dense(system.stiffness) + transformation.T @ contact @ transformation
 
 
 def _conditioning(state: FrozenState, scene: Scene) -> Conditioning:

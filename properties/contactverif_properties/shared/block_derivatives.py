@@ -56,8 +56,7 @@ class Groups:
         entries, behind = np.abs(matrix), 2 * self.n_nodes
         rows = np.concatenate([np.maximum(entries[:behind:2], entries[1:behind:2]), entries[behind:]])
         columns = np.maximum(rows[:, :behind:2], rows[:, 1:behind:2])
-        largest: FloatArray = np.concatenate([columns, rows[:, behind:]], axis=1)
-        return largest
+        return np.concatenate([columns, rows[:, behind:]], axis=1)
 
     def surroundings(self, blocks: FloatArray) -> FloatArray:
         """Return for each block the largest block of its row or its column, all (count, count).

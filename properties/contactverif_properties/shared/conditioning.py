@@ -173,16 +173,14 @@ def _distances(case: Case) -> FloatArray:
 def _row_sizes(rows: Array, n_nodes: int) -> FloatArray:
     """Return |R_a| of each node and |row| of each constraint row, (n_nodes + n_multipliers,)."""
     forces = np.hypot(*np.asarray(rows[: 2 * n_nodes], dtype=np.float64).reshape(n_nodes, 2).T)
-    sizes: FloatArray = np.concatenate([forces, np.abs(rows[2 * n_nodes :]).astype(np.float64)])
-    return sizes
+    return np.concatenate([forces, np.abs(rows[2 * n_nodes :]).astype(np.float64)])
 
 
 def _block_norms(matrix: FloatArray, n_nodes: int) -> FloatArray:
     """Return the Frobenius norms of the blocks of a matrix, (n_nodes + n_multipliers,) in rows and in columns."""
     n = 2 * n_nodes
     rows = np.vstack([np.hypot(matrix[0:n:2], matrix[1:n:2]), matrix[n:]])
-    norms: FloatArray = np.hstack([np.hypot(rows[:, 0:n:2], rows[:, 1:n:2]), np.abs(rows[:, n:])])
-    return norms
+    return np.hstack([np.hypot(rows[:, 0:n:2], rows[:, 1:n:2]), np.abs(rows[:, n:])])
 
 
 def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool) -> Measurement:

@@ -110,8 +110,7 @@ class Places:
 
 def name_places(points: ContactPoints) -> BoolArray:
     """Return which points (n_points,) name a place on their surface."""
-    named: BoolArray = (points.slave_segment >= 0) & np.isfinite(points.c)
-    return named
+    return (points.slave_segment >= 0) & np.isfinite(points.c)
 
 
 @random_source("contactverif_properties.shared.exact_places.projected_cases")

@@ -24,8 +24,7 @@ def normal_of(case: Case) -> FloatArray:
 def push_apart(case: Case, weights: FloatArray, pressure: float) -> FloatArray:
     """Return the forces (n_nodes, 2) of a pressure over weights (n_nodes,), which push the two bodies apart."""
     sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
-    forces: FloatArray = pressure * (sides * weights)[:, None] * normal_of(case)
-    return forces
+    return pressure * (sides * weights)[:, None] * normal_of(case)
 
 
 def consistent_forces(case: Case, pressure: float) -> FloatArray:
