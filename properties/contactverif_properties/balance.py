@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
@@ -38,13 +40,10 @@ WORK = Quantity(
 )
 
 
-@Property.define(
-    id="balance.force",
-    family="balance",
-    quantities=(FORCE_IMBALANCE,),
-    cases=Cases.random(any_cases),
-    promise=lambda traits: traits.promises.conserves_force,
-)
+_define = partial(Property.define, family="balance", cases=Cases.random(any_cases))
+
+
+@_define(id="balance.force", quantities=(FORCE_IMBALANCE,), promise=lambda traits: traits.promises.conserves_force)
 def force_balance(case: Case, subject: Subject) -> Measurement:
     """The forces on slave and master add up to zero on tilts, kinks and curves.
 
@@ -65,13 +64,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     return _judge(FORCE_IMBALANCE, float(np.linalg.norm(state.forces.sum(axis=0))), 1.0, state, subject.traits)
 
 
-@Property.define(
-    id="balance.moment",
-    family="balance",
-    quantities=(MOMENT_IMBALANCE,),
-    cases=Cases.random(any_cases),
-    promise=lambda traits: traits.promises.conserves_moment,
-)
+@_define(id="balance.moment", quantities=(MOMENT_IMBALANCE,), promise=lambda traits: traits.promises.conserves_moment)
 def moment_balance(case: Case, subject: Subject) -> Measurement:
     """The moments of the forces on slave and master add up to zero on tilts, kinks and curves.
 

@@ -5,6 +5,7 @@ The problems state their bounds, beside what right and wrong formulations measur
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
@@ -14,7 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measure, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
@@ -23,7 +24,7 @@ from contactverif.problems.hertz_box import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies, Study
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
 from contactverif_properties.patch_flat import refuse_unknown_total
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unknown_pressure
 from contactverif_properties.shared.passes import nearest_sum
 from contactverif_properties.shared.uniform_pressure import uniform_state
 
@@ -79,17 +80,21 @@ def exact_forces(studies: Studies, case: Case) -> FloatArray:
     return study.pose(study.meshes[0], Traits()).exact_forces(case)
 
 
-@Property.define(
-    id="accuracy.wavy",
-    family="accuracy",
-    quantities=WAVY_STUDIES.quantities,
-    cases=Cases.from_list(WAVY_STUDIES.cases),
-    promise=lambda traits: traits.promises.converges,
-    applicable=refuse_dependent_multipliers,
-    series=dict.fromkeys(WAVY_STUDIES.series, "1"),
-    bodies=True,
-    exact=partial(exact_forces, WAVY_STUDIES),
-)
+def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
+    """Return the function that defines a property which asks studies on finer and finer meshes."""
+    return partial(
+        Property.define,
+        family="accuracy",
+        quantities=studies.quantities,
+        cases=Cases.from_list(studies.cases),
+        applicable=refuse_dependent_multipliers,
+        series=dict.fromkeys(studies.series, "1"),
+        bodies=True,
+        exact=partial(exact_forces, studies),
+    )
+
+
+@_define(WAVY_STUDIES)(id="accuracy.wavy", promise=lambda traits: traits.promises.converges)
 def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
     """Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.
 
@@ -137,17 +142,7 @@ def promise_without_locking(traits: Traits) -> bool | None:
     return True if traits.promises.converges and traits.promises.locks is False else None
 
 
-@Property.define(
-    id="accuracy.wavy-curved",
-    family="accuracy",
-    quantities=CURVED_STUDIES.quantities,
-    cases=Cases.from_list(CURVED_STUDIES.cases),
-    promise=promise_without_locking,
-    applicable=refuse_dependent_multipliers,
-    series=dict.fromkeys(CURVED_STUDIES.series, "1"),
-    bodies=True,
-    exact=partial(exact_forces, CURVED_STUDIES),
-)
+@_define(CURVED_STUDIES)(id="accuracy.wavy-curved", promise=promise_without_locking)
 def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     """Wavy bodies converge to the exact solution on a curved interface too, at a high penalty as well.
 
@@ -172,16 +167,8 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     return measure_convergence(CURVED_STUDIES, case, subject)
 
 
-@Property.define(
-    id="accuracy.hertz",
-    family="accuracy",
-    quantities=HERTZ_STUDIES.quantities,
-    cases=Cases.from_list(HERTZ_STUDIES.cases),
-    promise=lambda traits: traits.promises.converges,
-    applicable=lambda traits: refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits),
-    series=dict.fromkeys(HERTZ_STUDIES.series, "1"),
-    bodies=True,
-    exact=partial(exact_forces, HERTZ_STUDIES),
+@_define(HERTZ_STUDIES)(
+    id="accuracy.hertz", promise=lambda traits: traits.promises.converges, applicable=refuse_unknown_pressure
 )
 def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
     """Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy import linalg
@@ -35,12 +36,13 @@ TURNED_FORCES = Quantity("error of the forces after a rotation", SEGMENT_TOLERAN
 TURNED_TANGENT = Quantity("error of the tangent after a rotation", SEGMENT_TOLERANCE, SEGMENT_REASON)
 
 
-@Property.define(
+_define = partial(Property.define, family="invariants", promise=lambda traits: True)
+
+
+@_define(
     id="scaling",
-    family="invariants",
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
-    promise=lambda traits: True,
     applicable=refuse_unstated_penalty,
 )
 def scaling(case: Case, subject: Subject) -> Measurement:
@@ -90,12 +92,10 @@ def turn_state(case: Case) -> tuple[Case, FloatArray]:
     return replace(case, z=np.concatenate([positions.reshape(-1), case.multipliers])), rotation
 
 
-@Property.define(
+@_define(
     id="objectivity",
-    family="invariants",
     quantities=(TURNED_FORCES, TURNED_TANGENT),
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: True,
     usual_undecided=0.003,
 )
 def objectivity(case: Case, subject: Subject) -> Measurement:

@@ -29,7 +29,7 @@ from contactverif.problems.hard_corner_states import (
     free_end_states,
     steep_slave_states,
 )
-from contactverif_properties.hard_flat import knows_total
+from contactverif_properties.shared.applicability import knows_total
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
 from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state

@@ -20,6 +20,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import deep_states, node_hit_states, offset_states, search_states
+from contactverif_properties.shared.applicability import knows_total
 from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
 from contactverif_properties.shared.uniform_pressure import (
     forces_of_gap,
@@ -37,11 +38,6 @@ ALONG = replace(
 )
 FLAT_QUANTITIES = (ALONG, TOTAL, NODAL)
 VACUOUS = "the gap is smaller than the rounding of positions that far from the origin"
-
-
-def knows_total(traits: Traits) -> bool:
-    """Return whether the traits say what the total force of a uniform penetration is."""
-    return traits.rules.penalty == "distributed" and traits.rules.area is not None
 
 
 def promise_flat_forces(traits: Traits) -> bool | None:

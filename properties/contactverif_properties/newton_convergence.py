@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, inf, log, log2
 from typing import Any
 
@@ -24,7 +25,7 @@ from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.shared.any_state import random_directions
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers
+from contactverif_properties.shared.applicability import promise_exact_tangent, refuse_dependent_multipliers
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import (
@@ -67,18 +68,19 @@ def history(trace: Trace) -> dict[str, FloatArray]:
     return dict(zip(SERIES, columns, strict=True))
 
 
-@Property.define(
-    id="newton.history",
+_define = partial(
+    Property.define,
     family="newton",
-    quantities=(FINAL_ITERATIONS,),
     cases=Cases.random(solid_cases),
-    series=SERIES,
-    promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
+    promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
     applicable=refuse_dependent_multipliers,
     bodies=True,
     usual_undecided=0.004,
 )
+
+
+@_define(id="newton.history", quantities=(FINAL_ITERATIONS,), series=SERIES)
 def newton_history(case: Case, subject: Subject) -> Measurement:
     """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
 
@@ -159,17 +161,7 @@ def _allowed_iterations(trace: Trace, begin: int) -> int:
     return ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
 
 
-@Property.define(
-    id="newton.order",
-    family="newton",
-    quantities=(ORDER,),
-    cases=Cases.random(solid_cases),
-    promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
-    needs=frozenset({"tangent"}),
-    applicable=refuse_dependent_multipliers,
-    bodies=True,
-    usual_undecided=0.004,
-)
+@_define(id="newton.order", quantities=(ORDER,))
 def newton_order(case: Case, subject: Subject) -> Measurement:
     """One Newton step from near a solution ends at a distance of second order.
 

@@ -13,7 +13,6 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
 from contactverif.mechanics.changed_scenes import change_units
 from contactverif.mechanics.linear import Step, scale_factors
 from contactverif.mechanics.newton import solve
@@ -21,7 +20,7 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.applicability import refuse_unknown_pressure
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
 from contactverif_properties.shared.newton_solution import is_untouched, solution_details
@@ -38,18 +37,13 @@ STEPS = Quantity(
 )
 
 
-def refuse(traits: Traits) -> str:
-    """Return why the question makes no sense for a formulation, or an empty string."""
-    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
-
-
 @Property.define(
     id="newton.units",
     family="newton",
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
     promise=lambda traits: True,
-    applicable=refuse,
+    applicable=refuse_unknown_pressure,
     bodies=True,
 )
 def newton_units(case: Case, subject: Subject) -> Measurement:

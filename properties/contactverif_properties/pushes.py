@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
@@ -95,14 +96,10 @@ def _slave_places(case: Case) -> FloatArray:
     return places
 
 
-@Property.define(
-    id="unilateral",
-    family="invariants",
-    quantities=(OPEN, DISTANT, PULL_OF_POINT),
-    cases=Cases.by_kind(pushing_cases),
-    kinds=(FLAT, ANY_SHAPE),
-    promise=lambda traits: True,
-)
+_define = partial(Property.define, family="invariants", cases=Cases.by_kind(pushing_cases), kinds=(FLAT, ANY_SHAPE))
+
+
+@_define(id="unilateral", quantities=(OPEN, DISTANT, PULL_OF_POINT), promise=lambda traits: True)
 def unilateral(case: Case, subject: Subject) -> Measurement:
     """Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.
 
@@ -205,12 +202,9 @@ def _move_by_roundoff(case: Case) -> Iterator[Case]:
         yield replace(case, z=case.z + reach * direction)
 
 
-@Property.define(
+@_define(
     id="nodal-push",
-    family="invariants",
     quantities=(PULL_OF_NODE,),
-    cases=Cases.by_kind(pushing_cases),
-    kinds=(FLAT, ANY_SHAPE),
     promise=lambda traits: traits.promises.nodes_push,
     usual_undecided=0.002,
 )

@@ -21,6 +21,7 @@ from contactverif.problems.stability_states import stability_states
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties.shared.any_state import ask_forces_and_tangents, freeze_state, move_state
+from contactverif_properties.shared.applicability import knows_total
 from contactverif_properties.shared.conditioning import (
     MOST_ROUNDINGS,
     Conditioning,
@@ -97,7 +98,7 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
 
 def refuse_unknown_forces(traits: Traits) -> str:
     """Return why no exact force is known, or an empty string if one is."""
-    if knows_forces(traits) or knows_total(traits) or traits.abilities.takes_longdouble:
+    if knows_forces(traits) or knows_total_of_springs(traits) or traits.abilities.takes_longdouble:
         return ""
     return "no exact force is known: the traits promise no patch test, no area and no long double"
 
@@ -173,7 +174,7 @@ def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Q
     """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
     if knows_forces(traits):
         return {FORCES_THERE: _error_of_patch(case, forces)}
-    if not knows_total(traits):
+    if not knows_total_of_springs(traits):
         return {}
     n_slave, exact = 2 * case.interface.n_slave_nodes, exact_forces(case)
     totals = [
@@ -234,13 +235,9 @@ def knows_forces(traits: Traits) -> bool:
     return traits.promises.patch.flat is True
 
 
-def knows_total(traits: Traits) -> bool:
+def knows_total_of_springs(traits: Traits) -> bool:
     """Return whether the traits say what the total force of springs is."""
-    return (
-        traits.rules.enforcement == "penalty"
-        and traits.rules.penalty == "distributed"
-        and traits.rules.area is not None
-    )
+    return traits.rules.enforcement == "penalty" and knows_total(traits)
 
 
 def move_swept(case: Case) -> Case:

@@ -23,7 +23,7 @@ from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif.problems.stability_states import stability_scenes
 from contactverif.problems.wave_blocks import SOFT, WaveAnswer, matching_answer, wave_blocks, wave_cases
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.shared.applicability import refuse_unknown_pressure, refuse_unstated_penalty
 from contactverif_properties.shared.conditioning import (
     Conditioning,
     forces_quantity,
@@ -287,11 +287,6 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerances), details=details, series=series)
 
 
-def refuse_undefined_pressure(traits: Traits) -> str:
-    """Return why springs or multipliers have no pressure that is known, or an empty string."""
-    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
-
-
 def promise_smoothness(traits: Traits) -> bool | None:
     """Return whether the formulation promises not to lock; None if it promises nothing."""
     return None if traits.promises.locks is None else not traits.promises.locks
@@ -304,7 +299,7 @@ def promise_smoothness(traits: Traits) -> bool | None:
     needs=frozenset({"pair"}),
     cases=Cases.from_list(wave_cases),
     promise=promise_smoothness,
-    applicable=refuse_undefined_pressure,
+    applicable=refuse_unknown_pressure,
     bodies=True,
 )
 def locking(case: Case, subject: Subject) -> Measurement:

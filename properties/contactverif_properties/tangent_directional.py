@@ -19,6 +19,7 @@ from contactverif.contract.property import Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import freeze_state, random_directions
+from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import differences_by_complex_step, groups_of
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
@@ -56,7 +57,7 @@ COMPLEX = Quantity(
     family="tangent",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),
-    promise=lambda traits: None if traits.promises.tangent is None else traits.promises.tangent == "exact",
+    promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
 )
 def tangent_directional(case: Case, subject: Subject) -> Measurement:

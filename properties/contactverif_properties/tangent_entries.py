@@ -7,6 +7,7 @@ are seen in differences of the residual; the tangent has no part in it. One excu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Finding, Measurement
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
 from contactverif.problems.long_states import long_states
 from contactverif.strategies import smooth_cases
+from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import STEPS, differences_on_both_sides, single_moves, step
 from contactverif_properties.shared.tangent_blocks import (
     BLOCK,
@@ -33,20 +34,16 @@ from contactverif_properties.shared.tangent_blocks import (
     judge_of,
 )
 
-
-def promise_exact_tangent(traits: Traits) -> bool | None:
-    """Return whether the traits promise an exact tangent; None if they say nothing about it."""
-    return None if traits.promises.tangent is None else traits.promises.tangent == "exact"
-
-
-@Property.define(
-    id="tangent.sparsity",
+_define = partial(
+    Property.define,
     family="tangent",
     quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
-    cases=Cases.random(smooth_cases),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
 )
+
+
+@_define(id="tangent.sparsity", cases=Cases.random(smooth_cases))
 def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.
 
@@ -76,14 +73,7 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     return measure_blocks(case, subject)
 
 
-@Property.define(
-    id="tangent.long",
-    family="tangent",
-    quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
-    cases=Cases.from_list(long_states),
-    promise=promise_exact_tangent,
-    needs=frozenset({"tangent"}),
-)
+@_define(id="tangent.long", cases=Cases.from_list(long_states))
 def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
 

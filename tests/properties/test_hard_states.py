@@ -24,7 +24,8 @@ from contactverif.problems.flat_states import (
     touching_states,
 )
 from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
-from contactverif_properties.hard_flat import exact_forces, knows_total
+from contactverif_properties.hard_flat import exact_forces
+from contactverif_properties.shared.applicability import knows_total
 
 TURNS = (UPRIGHT, TURNED, STEEP)
 FLAT_STATES = [*offset_states(), *deep_states(), *node_hit_states(), *search_states(), *tiny_segment_states()]

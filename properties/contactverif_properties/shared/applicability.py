@@ -1,6 +1,6 @@
-"""Reasons why a question makes no sense for a formulation, from its traits alone.
+"""Questions that the traits of a formulation decide alone: its promise, and why another question makes no sense for it.
 
-Each function returns an empty string where the question can be asked, and else a reason that is printed in the table.
+A reason is printed in the table; it is an empty string where the question can be asked.
 """
 
 from __future__ import annotations
@@ -18,7 +18,22 @@ def refuse_dependent_multipliers(traits: Traits) -> str:
     return "the multipliers are not independent, so there need be no solution, nor one alone" if dependent else ""
 
 
+def promise_exact_tangent(traits: Traits) -> bool | None:
+    """Return whether the traits promise an exact tangent; None if they say nothing about it."""
+    return None if traits.promises.tangent is None else traits.promises.tangent == "exact"
+
+
 def refuse_unstated_penalty(traits: Traits) -> str:
     """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
     known = traits.rules.penalty is not None
     return "" if known else "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
+
+
+def refuse_unknown_pressure(traits: Traits) -> str:
+    """Return why springs or multipliers have no pressure that is known, or an empty string."""
+    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
+
+
+def knows_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of a uniform penetration is."""
+    return traits.rules.penalty == "distributed" and traits.rules.area is not None
