@@ -14,7 +14,7 @@ import typer
 
 from contactverif.cli.output_files import MARKDOWN, PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import IsolationOptions, complete_formulation
+from contactverif.cli.shared_options import EveryFormulation, IsolationOptions, formulation_argument, output_option
 from contactverif.cli.verify_command import select_names
 from contactverif.contract.errors import MisuseError
 
@@ -32,13 +32,9 @@ def bench(
     *,
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            help="Formulations, with options; or one file of a bench, FILE.nc, to show it again.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
-        ),
+        formulation_argument("Formulations, with options; or one file of a bench, FILE.nc, to show it again."),
     ] = None,
-    all_: Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")] = False,
+    all_: EveryFormulation = False,
     scene: Annotated[
         list[str] | None,
         typer.Option(help="Only this scene: a problem such as wavy, or random. Repeatable.", metavar="NAME"),
@@ -52,11 +48,7 @@ def bench(
     ] = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--out",
-            help="Write the results: FILE.nc all repeats, FILE.html or FILE.md a page. Repeatable.",
-            metavar="FILE",
-        ),
+        output_option("Write the results: FILE.nc all repeats, FILE.html or FILE.md a page. Repeatable."),
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Draw the figures into this folder.", metavar="FOLDER")] = None,
     jobs: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, complete_formulation
+from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, formulation_argument
 from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
@@ -22,10 +22,7 @@ _SEED = 0  # The seed if there is none: all shards must have the same.
 
 def campaign(
     *,
-    names: Annotated[
-        list[str],
-        typer.Argument(help="Formulations, as in verify.", metavar="NAME", autocompletion=complete_formulation),
-    ],
+    names: Annotated[list[str], formulation_argument("Formulations, as in verify.")],
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
     shard: Annotated[str, typer.Option(help="The shard: its number from 1, and the number of all.", metavar="I/N")],
@@ -79,8 +76,8 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
     from contactverif.run.run import judge_share
     from contactverif.run.run_journal import Journal
 
-    loaded, properties = job.load()
-    items = [*loaded, *properties]
+    plugins = job.load()
+    items = [*plugins.subjects, *plugins.questions]
     for item in items:
         if isinstance(item, NotLoaded):
             typer.echo(f"contactverif: {name_line(item.formulation)} does not load: {one_line(item.reason)}", err=True)

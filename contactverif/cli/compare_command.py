@@ -11,12 +11,14 @@ import typer
 
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles
 from contactverif.cli.shared_options import (
+    RESULT_FILES,
     IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
     WorkerOptions,
-    complete_formulation,
+    formulation_argument,
+    formulation_option,
 )
 from contactverif.cli.verify_job import COMPARE, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
@@ -24,24 +26,11 @@ from contactverif.contract.errors import MisuseError
 
 def compare(
     *,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help="Formulations; or two reports, OLD.nc NEW.nc.", metavar="NAME", autocompletion=complete_formulation
-        ),
-    ] = None,
-    against: Annotated[
-        list[str] | None,
-        typer.Option(help="The one formulation to compare with.", metavar="NAME", autocompletion=complete_formulation),
-    ] = None,
+    names: Annotated[list[str] | None, formulation_argument("Formulations; or two reports, OLD.nc NEW.nc.")] = None,
+    against: Annotated[list[str] | None, formulation_option("The one formulation to compare with.")] = None,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
-        ),
-    ] = None,
+    out: Annotated[list[Path] | None, RESULT_FILES] = None,
     pictures: Annotated[
         Path | None, typer.Option(help="Draw the meshes on which they differ into this folder.", metavar="FOLDER")
     ] = None,
@@ -107,11 +96,9 @@ def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
     if resume is None and not any(typed.names[:1]):
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
     job = new_job(typed, command=COMPARE) if resume is None else resumed_job(resume, typed, COMPARE)
-    from contactverif.cli.formulation_comparison import compare_formulations, load_plan
+    from contactverif.cli.formulation_comparison import compare_formulations
 
-    reference, *candidates = job.options.names
-    plan = load_plan(candidates, reference, job.options.properties, job.options.isolation.limits())
-    return compare_formulations(plan, job)
+    return compare_formulations(job)
 
 
 def _compare_reports(reports: Sequence[Path], globs: Sequence[str], out: Sequence[Path] | None) -> bool:

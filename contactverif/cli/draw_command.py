@@ -9,7 +9,7 @@ import typer
 
 from contactverif.cli.output_files import PICTURES, SOLVED_SCENE, OutputFiles
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import CaseId, IsolationOptions, complete_formulation
+from contactverif.cli.shared_options import CaseId, IsolationOptions, formulation_option, output_option
 
 
 def draw(
@@ -24,21 +24,15 @@ def draw(
     ] = None,
     formulation: Annotated[
         list[str] | None,
-        typer.Option(
+        formulation_option(
+            "Solve with this formulation. Repeatable. For a counterexample, by default the one that failed.",
             "--formulation",
             "-f",
-            help="Solve with this formulation. Repeatable. For a counterexample, by default the one that failed.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
         ),
     ] = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--out",
-            help="Draw to FILE.png or FILE.svg, or write the solved scene for ParaView to FILE.vtu. Repeatable.",
-            metavar="FILE",
-        ),
+        output_option("Draw to FILE.png or FILE.svg, or write the solved scene for ParaView to FILE.vtu. Repeatable."),
     ] = None,
     isolation: IsolationOptions,
 ) -> None:

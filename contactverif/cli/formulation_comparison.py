@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,16 +12,14 @@ from contactverif.cli.counterexample_output import draw_outcome
 from contactverif.cli.output_files import PAGE, REPORT, PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
-from contactverif.cli.verify_job import VerifyJob
+from contactverif.cli.verify_job import Plugins, VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
-from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
 from contactverif.run.judge import forces_on
-from contactverif.run.registry import formulation_names, load_formulation, load_properties
+from contactverif.run.registry import formulation_names, load_formulation, load_properties, the_formulation
 from contactverif.run.rows import find_gap
 from contactverif.run.scheduler import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison
@@ -33,61 +30,31 @@ from contactverif_reports.html.pages import write_page
 from contactverif_reports.netcdf.write import write
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ComparisonPlan:
-    """A reference, its candidates and the properties by which they are compared."""
-
-    reference: Subject
-    candidates: Sequence[Subject | NotLoaded]
-    properties: Sequence[Property | NotLoaded]
-
-    @property
-    def subjects(self) -> dict[str, Subject]:
-        """{name: formulation} of the reference and of all candidates that load."""
-        return {item.name: item for item in (self.reference, *self.candidates) if isinstance(item, Subject)}
-
-    def question(self, differing: Differing) -> Property:
-        """Return the property on which two of them differ."""
-        return next(item for item in self.properties if isinstance(item, Property) and item.id == differing.info.id)
-
-
-def load_plan(
-    names: Sequence[str], reference_name: str, globs: Sequence[str], limits: Limits | None = None
-) -> ComparisonPlan:
-    """Load the formulations and the properties."""
+def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
+    """Load the reference, which is the first formulation, and all other formulations and the properties."""
+    reference_name, *names = job.options.names
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
-    properties = load_properties(globs)
+    limits, properties = job.options.isolation.limits(), load_properties(job.options.properties)
     try:
-        reference = load_formulation(reference_name, limits)
+        reference = the_formulation(reference_name, limits)
     except MisuseError as error:
         raise MisuseError("--against", error.found, error.needed) from None
-    if isinstance(reference, NotLoaded):
-        raise MisuseError("--against", f"{reference_name}, which does not load ({reference.reason})", "one that loads")
-    return ComparisonPlan(reference, [load_formulation(name, limits) for name in names], properties)
+    return reference, Plugins([reference, *(load_formulation(name, limits) for name in names)], properties)
 
 
-def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
+def compare_formulations(job: VerifyJob) -> int:
     """Run all properties, show the tables and write the files; return the exit status."""
+    reference, plugins = _load(job)
     with watch_for_stops(job), job.journal() as journal:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            study = run_comparison(
-                plan.reference,
-                plan.candidates,
-                plan.properties,
-                profile=job.profile,
-                interface=job.interface,
-                scene=job.scene,
-                shrink=job.options.sampling.shrink or "new",
-                progress=bar.show_progress,
-                executor=executor,
-                journal=journal,
-            )
-        gap = partial(find_gap, study.run, [plan.reference, *plan.candidates], plan.properties, job.sampling)
-        end = end_run(job, journal, gap, _writers(study, plan), promises_kept=study.comparison.promises_kept)
+            options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
+            study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
+        gap = partial(find_gap, study.run, plugins.subjects, plugins.questions, job.sampling)
+        end = end_run(job, journal, gap, _writers(study, plugins), promises_kept=study.comparison.promises_kept)
     show(SideBySide(study))
-    _show_meshes(study, plan, job.pictures, on_a_page=PAGE in end.files.paths)
+    _show_meshes(study, plugins, job.pictures, on_a_page=PAGE in end.files.paths)
     show_what_plugins_printed()
     end.files.announce()
     show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
@@ -96,23 +63,30 @@ def compare_formulations(plan: ComparisonPlan, job: VerifyJob) -> int:
     return end.status
 
 
-def _writers(study: Study, plan: ComparisonPlan) -> dict[str, Callable[[Path], None]]:
+def _writers(study: Study, plugins: Plugins) -> dict[str, Callable[[Path], None]]:
     """Return the functions that write the report and the page."""
 
     def write_html(path: Path) -> None:
-        drawings = [_page_drawing(differing, plan) for differing in study.differing]
+        drawings = [_page_drawing(differing, *_both(differing, study, plugins)) for differing in study.differing]
         write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
 
     return {REPORT: partial(write, study.run), PAGE: write_html}
 
 
-def _show_meshes(study: Study, plan: ComparisonPlan, folder: PictureFolder | None, *, on_a_page: bool) -> None:
+def _both(differing: Differing, study: Study, plugins: Plugins) -> tuple[Property, Subject, Subject]:
+    """Return the property on which a candidate and the reference differ, and these two."""
+    names = differing.formulation, study.comparison.reference
+    candidate, reference = map(plugins.subject, names)
+    return plugins.question(differing.info.id), candidate, reference
+
+
+def _show_meshes(study: Study, plugins: Plugins, folder: PictureFolder | None, *, on_a_page: bool) -> None:
     """Print the meshes that tell most, and draw all of them into the folder, if there is one."""
     for place, differing in enumerate(study.differing):
         if place < MOST_MESHES:
-            show_as_it_is(mesh_text(differing, plan.reference.name))
+            show_as_it_is(mesh_text(differing, study.comparison.reference))
         if folder is not None:
-            for name in _draw_pictures(differing, plan, folder):
+            for name in _draw_pictures(differing, *_both(differing, study, plugins), folder):
                 say(f"    picture: {folder.name / name}")
     rest = study.differing[MOST_MESHES:]
     if rest and folder is None and not on_a_page:
@@ -120,19 +94,18 @@ def _show_meshes(study: Study, plan: ComparisonPlan, folder: PictureFolder | Non
         show(f"\nThey also differ on {ids}: --out FILE.html or --pictures FOLDER draws those meshes.")
 
 
-def _page_drawing(differing: Differing, plan: ComparisonPlan) -> Drawing:
+def _page_drawing(differing: Differing, question: Property, candidate: Subject, reference: Subject) -> Drawing:
     """Return what the page's picture of a case needs: its scene solved by both, or the forces of both."""
-    candidate, reference = plan.subjects[differing.formulation], plan.reference
     if has_bodies(differing.case):
         return Drawing(solved=solve_scene(differing.case, [candidate, reference]))
-    exact_forces = plan.question(differing).exact
-    exact = None if exact_forces is None else exact_forces(differing.case)
+    exact = None if question.exact is None else question.exact(differing.case)
     return Drawing(forces_on(differing.case, candidate), forces_on(differing.case, reference), exact)
 
 
-def _draw_pictures(differing: Differing, plan: ComparisonPlan, folder: PictureFolder) -> list[str]:
+def _draw_pictures(
+    differing: Differing, question: Property, candidate: Subject, reference: Subject, folder: PictureFolder
+) -> list[str]:
     """Draw the bodies as both solve them, or the case with the forces of each; return the files' names."""
-    candidate, reference = plan.subjects[differing.formulation], plan.reference
     if has_bodies(differing.case):
         from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
 
@@ -144,6 +117,6 @@ def _draw_pictures(differing: Differing, plan: ComparisonPlan, folder: PictureFo
     names = []
     for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
         name = f"{case_id(subject.name, differing.info.id)}.png"
-        draw_outcome(subject, plan.question(differing), outcome, folder.path / name, argument="--pictures")
+        draw_outcome(subject, question, outcome, folder.path / name, argument="--pictures")
         names.append(name)
     return names

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.campaign_command import CAMPAIGN
-from contactverif.cli.shared_options import SHRINK_HELP
+from contactverif.cli.shared_options import RESULT_FILES, SHRINK_HELP
 from contactverif.cli.verify_command import run_job
 from contactverif.cli.verify_job import new_job, options_of
 from contactverif.run.profiles import Shrink
@@ -20,12 +20,7 @@ _FOLDER = "FOLDER"
 
 def merge(
     folder: Annotated[Path, typer.Argument(help="The folder that campaign --out made.", metavar=_FOLDER)],
-    out: Annotated[
-        list[Path],
-        typer.Option(
-            "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
-        ),
-    ],
+    out: Annotated[list[Path], RESULT_FILES],
     shrink: Annotated[Shrink | None, typer.Option(help=SHRINK_HELP)] = None,
 ) -> None:
     """Make the report of a campaign: that of one verify with the same seed.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.output_files import PICTURES, OutputFiles
-from contactverif.cli.shared_options import CaseId, IsolationOptions, ReportPath, complete_formulation
+from contactverif.cli.shared_options import CaseId, IsolationOptions, ReportPath, formulation_option, output_option
 
 
 def replay(
@@ -16,17 +16,9 @@ def replay(
     report: ReportPath,
     case: CaseId = None,
     formulation: Annotated[
-        str | None,
-        typer.Option(
-            help="Judge this formulation instead of the one that failed.",
-            metavar="NAME",
-            autocompletion=complete_formulation,
-        ),
+        str | None, formulation_option("Judge this formulation instead of the one that failed.")
     ] = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option("--out", help="Draw the case to FILE.png or FILE.svg. Repeatable.", metavar="FILE"),
-    ] = None,
+    out: Annotated[list[Path] | None, output_option("Draw the case to FILE.png or FILE.svg. Repeatable.")] = None,
     isolation: IsolationOptions,
 ) -> None:
     """Judge one stored counterexample again; without --case, list the ids.

@@ -5,18 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from contactverif.cli.output_files import PAGE, OutputFiles
-from contactverif.cli.shared_options import ReportPath
+from contactverif.cli.shared_options import ReportPath, output_option
 
 
 def report(
     path: ReportPath,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option("--out", help="Write FILE.html: tables, distributions, pictures.", metavar="FILE"),
-    ] = None,
+    out: Annotated[list[Path] | None, output_option("Write FILE.html: tables, distributions, pictures.")] = None,
 ) -> None:
     """Show a stored report: its table here, or all of it as a page.
 

@@ -56,14 +56,27 @@ def complete_property(incomplete: str) -> list[str]:
     return [property_id for property_id in property_ids() if property_id.startswith(incomplete)]
 
 
+def formulation_argument(words: str) -> Any:
+    """Return the argument of a command that takes formulations, with its help in words."""
+    return typer.Argument(help=words, metavar="NAME", autocompletion=complete_formulation)
+
+
+def formulation_option(words: str, *flags: str) -> Any:
+    """Return an option that names a formulation; typer makes the flag of its name, unless some are given."""
+    return typer.Option(*flags, help=words, metavar="NAME", autocompletion=complete_formulation)
+
+
+def output_option(words: str) -> Any:
+    """Return the option for the files that a command writes, with its help in words."""
+    return typer.Option("--out", help=words, metavar="FILE")
+
+
 FormulationNames = Annotated[
     list[str] | None,
-    typer.Argument(
-        help="Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.",
-        metavar="NAME",
-        autocompletion=complete_formulation,
-    ),
+    formulation_argument("Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference."),
 ]
+EveryFormulation = Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")]
+RESULT_FILES = output_option("Write the results: FILE.nc a report, FILE.html a page. Repeatable.")
 PropertyGlobs = Annotated[
     list[str] | None,
     typer.Option(

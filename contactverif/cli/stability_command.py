@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from contactverif.cli.output_files import MARKDOWN, PICTURES, REPORT, OutputFiles
-from contactverif.cli.shared_options import FormulationNames, IsolationOptions
+from contactverif.cli.shared_options import EveryFormulation, FormulationNames, IsolationOptions, output_option
 from contactverif.cli.verify_command import select_names
 
 if TYPE_CHECKING:
@@ -26,13 +26,11 @@ _MOST_IDS = 3  # Cases of a formulation whose command is printed.
 def stability(
     *,
     names: FormulationNames = None,
-    all_: Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")] = False,
+    all_: EveryFormulation = False,
     out: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--out",
-            help="Write the results: FILE.nc the numbers, FILE.svg or FILE.png the figure, FILE.md a page. Repeatable.",
-            metavar="FILE",
+        output_option(
+            "Write the results: FILE.nc the numbers, FILE.svg or FILE.png the figure, FILE.md a page. Repeatable."
         ),
     ] = None,
     isolation: IsolationOptions,

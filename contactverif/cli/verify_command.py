@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -15,6 +15,7 @@ import typer
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
 from contactverif.cli.run_endings import End, end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
 from contactverif.cli.shared_options import (
+    RESULT_FILES,
     FormulationNames,
     IsolationOptions,
     PlaceOptions,
@@ -26,10 +27,8 @@ from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, resum
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
-    from contactverif.contract.counterexample import Counterexample
-    from contactverif.contract.property import Property
-    from contactverif.contract.result import NotLoaded, Run
-    from contactverif.contract.subject import Subject
+    from contactverif.cli.verify_job import Plugins
+    from contactverif.contract.result import Run
     from contactverif.isolation.limits import Limits
 
 
@@ -39,12 +38,7 @@ def verify(
     all_: Annotated[bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")] = False,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--out", help="Write the results: FILE.nc a report, FILE.html a page. Repeatable.", metavar="FILE"
-        ),
-    ] = None,
+    out: Annotated[list[Path] | None, RESULT_FILES] = None,
     pictures: Annotated[
         Path | None, typer.Option(help="Draw each counterexample into this folder.", metavar="FOLDER")
     ] = None,
@@ -107,36 +101,20 @@ def run_job(job: VerifyJob) -> int:
 
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            subjects, questions = job.load()
+            plugins = job.load()
             journal = stack.enter_context(job.journal())  # A plugin that ends us while it is loaded leaves no file.
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
-            result = run(
-                subjects,
-                questions,
-                profile=job.profile,
-                interface=job.interface,
-                scene=job.scene,
-                known=job.known,
-                shrink=job.options.sampling.shrink or "new",
-                progress=bar.show_progress,
-                executor=executor,
-                journal=journal,
-            )
-        gap = partial(find_gap, result, subjects, questions, job.sampling)
+            options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
+            result = run(plugins.subjects, plugins.questions, **options)
+        gap = partial(find_gap, result, plugins.subjects, plugins.questions, job.sampling)
         end = end_run(job, journal, gap, _writers(result, job.files), promises_kept=result.promises_kept)
-    _show_results(result, subjects, questions, end, job.pictures)
+    _show_results(result, plugins, end, job.pictures)
     if not end.complete:
         say_how_to_go_on(job)
     return end.status
 
 
-def _show_results(
-    result: Run,
-    subjects: Sequence[Subject | NotLoaded],
-    questions: Sequence[Property | NotLoaded],
-    end: End,
-    folder: PictureFolder | None,
-) -> None:
+def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder | None) -> None:
     """Show the table, the counterexamples, the names of the files, and the last line."""
     from contactverif.cli.console import show
     from contactverif.cli.counterexample_output import how_to_keep
@@ -145,7 +123,7 @@ def _show_results(
     show(RunTable(result))
     if remark := result.provenance.get("drawing"):
         show(f"{remark}.")
-    _show_counterexamples(result, subjects, questions, end.files, folder)
+    _show_counterexamples(result, plugins, end.files, folder)
     show_what_plugins_printed()
     end.files.announce()
     if REPORT not in end.files.names and (advice := how_to_keep(result)) is not None:
@@ -170,40 +148,19 @@ def _writers(result: Run, files: OutputFiles) -> dict[str, Callable[[Path], None
     return {REPORT: write_report, PAGE: write_html}
 
 
-def _show_counterexamples(
-    result: Run,
-    subjects: Sequence[Subject | NotLoaded],
-    questions: Sequence[Property | NotLoaded],
-    files: OutputFiles,
-    folder: PictureFolder | None,
-) -> None:
+def _show_counterexamples(result: Run, plugins: Plugins, files: OutputFiles, folder: PictureFolder | None) -> None:
     """Print a mesh of each failure, and draw it if the user named a folder."""
-    from contactverif.cli.console import show_as_it_is
-    from contactverif.cli.counterexample_output import counterexample_text, failing_examples
+    from contactverif.cli.console import say, show_as_it_is
+    from contactverif.cli.counterexample_output import counterexample_text, draw_outcome, failing_examples
+    from contactverif.contract.counterexample import case_id
 
     for example in failing_examples(result):
         show_as_it_is(counterexample_text(example, files.names.get(REPORT)))
         if folder is not None:
-            _draw_counterexample(example, subjects, questions, folder)
-
-
-def _draw_counterexample(
-    example: Counterexample,
-    subjects: Sequence[Subject | NotLoaded],
-    questions: Sequence[Property | NotLoaded],
-    folder: PictureFolder,
-) -> None:
-    from contactverif.cli.console import say
-    from contactverif.cli.counterexample_output import draw_outcome
-    from contactverif.contract.counterexample import case_id
-    from contactverif.contract.property import Property
-    from contactverif.contract.subject import Subject
-
-    subject = next(item for item in subjects if isinstance(item, Subject) and item.name == example.formulation)
-    question = next(item for item in questions if isinstance(item, Property) and item.id == example.property_id)
-    name = f"{case_id(example.formulation, example.property_id)}.png"
-    draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
-    say(f"    picture: {folder.name / name}")
+            subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
+            name = f"{case_id(subject.name, question.id)}.png"
+            draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
+            say(f"    picture: {folder.name / name}")
 
 
 def select_names(names: list[str], every: bool, limits: Limits | None = None) -> list[str]:

@@ -47,6 +47,26 @@ class VerifyOptions:
     isolation: IsolationOptions = field(default_factory=IsolationOptions)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Plugins:
+    """The formulations and the properties of a run, as they were loaded."""
+
+    subjects: Sequence[Subject | NotLoaded]
+    questions: Sequence[Property | NotLoaded]
+
+    def subject(self, name: str) -> Subject:
+        """Return a formulation that was loaded."""
+        from contactverif.contract.subject import Subject
+
+        return next(item for item in self.subjects if isinstance(item, Subject) and item.name == name)
+
+    def question(self, property_id: str) -> Property:
+        """Return a property that was loaded."""
+        from contactverif.contract.property import Property
+
+        return next(item for item in self.questions if isinstance(item, Property) and item.id == property_id)
+
+
 @dataclass(frozen=True, slots=True)
 class VerifyJob:
     """A run of `verify`, `compare` or `campaign` before it begins, or what `merge` makes of a campaign."""
@@ -63,13 +83,23 @@ class VerifyJob:
     again: str = ""  # The command line that goes on with the run, if it is not that command with `--resume`.
     command: str = VERIFY
 
-    def load(self) -> tuple[list[Subject | NotLoaded], tuple[Property | NotLoaded, ...]]:
+    def load(self) -> Plugins:
         """Load the formulations and the properties."""
         from contactverif.run.registry import load_formulation, load_properties
 
         limits = self.options.isolation.limits()
         questions = load_properties(self.options.properties)
-        return [load_formulation(name, limits) for name in self.options.names], questions
+        return Plugins([load_formulation(name, limits) for name in self.options.names], questions)
+
+    def run_options(self, **others: Any) -> dict[str, Any]:
+        """Return the options of a run, those of `contactverif.run.run.run`, and others beside them."""
+        return others | {
+            "profile": self.profile,
+            "interface": self.interface,
+            "scene": self.scene,
+            "known": self.known,
+            "shrink": self.options.sampling.shrink or "new",
+        }
 
     @property
     def jobs(self) -> int:
