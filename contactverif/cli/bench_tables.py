@@ -16,14 +16,9 @@ from contactverif_reports.bench.work_precision import REFERENCE, TARGETS, cost_r
 
 def targets_table(results: BenchResults, scene: str) -> Table:
     """Return the time to reach each error on a scene, in milliseconds, and the parts of the time."""
-    table = plain_table(f"{scene}: {results.label(scene)}")
-    table.padding = (0, 1, 0, 0)
-    table.add_column("formulation", overflow="fold")
-    for target in TARGETS:
-        table.add_column(f"ms to\n{target:g}", justify="right", no_wrap=True)
-    table.add_column(f"{REFERENCE}\n= 1", justify="right", no_wrap=True)
-    for heading in ("plugin\n%", "linear\n%", "failed"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    times = [f"ms to\n{target:g}" for target in TARGETS]
+    numbers = (*times, f"{REFERENCE}\n= 1", "plugin\n%", "linear\n%", "failed")
+    table = plain_table(f"{scene}: {results.label(scene)}", "formulation", numbers=numbers, dense=True)
     for name in results.formulations:
         table.add_row(name, *_cells(results, name, scene))
     return table
@@ -31,11 +26,8 @@ def targets_table(results: BenchResults, scene: str) -> Table:
 
 def slowdown_table(changes: Sequence[Slowdown]) -> Table:
     """Return the ratios to an earlier bench."""
-    table = plain_table("time over that of the earlier bench, in units of the yardstick")
-    table.padding = (0, 1, 0, 0)
-    table.add_column("formulation", overflow="fold")
-    for heading in ("runs", "ratio", "quartiles", ""):
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = "time over that of the earlier bench, in units of the yardstick"
+    table = plain_table(title, "formulation", numbers=("runs", "ratio", "quartiles", ""), dense=True)
     for change in changes:
         quartiles = f"{change.low:.2f} to {change.high:.2f}"
         word = Text("slower", style="magenta") if change.slower else Text("")

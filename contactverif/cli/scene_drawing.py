@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 
 from rich.table import Table
@@ -73,16 +74,14 @@ def _read_stored(report: Path | None, case_id: str | None) -> Counterexample:
 
 def solutions_table(scene: SolvedScene) -> Table:
     """Return a table of how Newton's method ended for each formulation, a line each."""
-    table = plain_table("")
-    columns = ["formulation", "end", "iterations", "residual"]
-    if any(solution.stress_error == solution.stress_error for solution in scene.solutions):
-        columns.append("stress error")
-    for column in columns:
-        table.add_column(column, justify="right" if column in columns[2:] else "left", no_wrap=True)
+    numbers = ["iterations", "residual"]
+    if not all(isnan(solution.stress_error) for solution in scene.solutions):
+        numbers.append("stress error")
+    table = plain_table(words=("formulation", "end"), numbers=numbers)
     for solution in scene.solutions:
-        error = f"{solution.stress_error:.2g}" if solution.stress_error == solution.stress_error else "–"
-        numbers = f"{solution.n_iterations}", f"{solution.residuals[-1]:.2g}", error
-        table.add_row(*[solution.formulation, solution.end, *numbers][: len(columns)])
+        error = "–" if isnan(solution.stress_error) else f"{solution.stress_error:.2g}"
+        cells = f"{solution.n_iterations}", f"{solution.residuals[-1]:.2g}", error
+        table.add_row(solution.formulation, solution.end, *cells[: len(numbers)])
     return table
 
 

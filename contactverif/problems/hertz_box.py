@@ -282,11 +282,8 @@ class HertzStudy:
 
     def pose(self, across: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
-        multipliers, penalty, role = (
-            traits.rules.enforcement == "multiplier",
-            self.penalty(across),
-            self.parabola_is_slave,
-        )
+        multipliers, role = traits.rules.enforcement == "multiplier", self.parabola_is_slave
+        penalty = self.penalty(across)
         law = None if multipliers else penalty
         scene = hertz_box(BOX, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
         start, pressure = None, BOX.pressure(law)

@@ -29,12 +29,7 @@ GAP_DECADES = range(-1, -13, -1)  # The gap is 10 to these powers.
 RATIO_DECADES = range(-1, -10, -1)
 OFFSET_DECADES = range(1, 10)
 STIFFNESS_DECADES = range(-2, 13)  # The ratio ε̂h/E of the solved scenes.
-PLAIN_GAP, SMALL_GAP, SMALL_RATIO, FAR = (
-    -2,
-    -6,
-    -6,
-    6,
-)  # Decades. What is not swept has the plain gap, ratio 1, offset 0.
+PLAIN_GAP, SMALL_GAP, SMALL_RATIO, FAR = -2, -6, -6, 6  # Decades. What is not swept: plain gap, ratio 1, offset 0.
 SWEEPS = ("gap", "ratio", "offset", "offset at a small gap", "all of it", "stiffness")  # The kinds of the cases.
 
 _MESHES = "ab"  # Each state comes on two meshes, named by a letter.

@@ -47,19 +47,14 @@ class Question:
     z: FloatArray  # (n_unknowns + n_multipliers,) The state.
 
 
-@dataclass(frozen=True, slots=True)
-class Changes:
-    """The number of entries that change, by what makes them change."""
+def count_changes(
+    first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]
+) -> tuple[float, dict[str, float]]:
+    """Ask two instances the same questions in different orders, and count the entries of the answers that differ.
 
-    repeated: float  # Entries of the residual that change when an instance is asked the same again.
-    residual: float  # Entries that change with the order of the questions.
-    tangent: float
-    contact_points: float
-    residual_and_tangent: float
-
-
-def count_changes(first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]) -> Changes:
-    """Ask two instances the same questions in different orders, and count the entries of the answers that differ."""
+    The first number is that of entries that change when an instance is asked the same again. The others, by method, are
+    those of entries that change with the order of the questions.
+    """
     with_pairings = len(questions) > 3
     calls, others = (
         [call for call in order + (of_pairings if with_pairings else ()) if call[0] in {"residual", *first.provides}]
@@ -69,10 +64,10 @@ def count_changes(first: CheckedFormulation, second: CheckedFormulation, questio
     repeated = 0.0
     for call, answer in _ask(first, calls, questions):
         repeated += _count_different(answer, answers.setdefault(call, answer))
-    changed = {"residual": 0.0, "tangent": 0.0, "contact_points": 0.0, BOTH: 0.0}
+    changed = dict.fromkeys(("residual", "tangent", "contact_points", BOTH), 0.0)
     for call, answer in _ask(second, others, questions):
         changed[call[0]] += _count_different(answer, answers[call])
-    return Changes(repeated, **changed)
+    return repeated, changed
 
 
 def _ask(

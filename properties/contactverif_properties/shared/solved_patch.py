@@ -6,7 +6,7 @@ formulation's own tangent plays no part. The question is whether the exact solut
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -82,13 +82,8 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     trace, q = solve_patch(scene, formulation, exact, pressure / penalty)
     state = replace(case, z=scene.positions(q), penalty=penalty)
     contact = contact_at(state, trace, formulation)
-    slave, master = force_errors(contact, scene, q, pressure)
-    values = {
-        STRESS: stress_error(scene, scene.stresses(q), pressure),
-        SLAVE_FORCES: slave,
-        MASTER_FORCES: master,
-        GAP: gap_error(state, pressure / penalty, pressure / penalty),
-    }
+    values = _errors(contact, scene, q, pressure)
+    values[GAP] = gap_error(state, pressure / penalty, pressure / penalty)
     if contact.has_points:
         gap, reported = point_errors(contact, penalty, pressure)
         values[GAP] = max(values[GAP], gap)
@@ -97,6 +92,13 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     roundoff = uniform_tolerances(state, scene, pressure)
     tolerances = _tolerances(case, penalty, roundoff.stress) | {PRESSURE: roundoff.pressure}
     return Measurement(check_all(values, tolerances), details=end_details(trace))
+
+
+def _errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> dict[Quantity, float]:
+    """Return the errors of stresses and forces in the state at the unknowns q (n_free,)."""
+    slave, master = force_errors(state, scene, q, pressure)
+    stress = stress_error(scene, scene.stresses(q), pressure)
+    return {STRESS: stress, SLAVE_FORCES: slave, MASTER_FORCES: master}
 
 
 def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, float]:
@@ -117,50 +119,30 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
     formulation = subject.for_interface(case.interface, penalty)
     exact = exact_unknowns(scene, pressure, np.inf)
     multipliers = exact_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
-    saddle = _SaddlePoint(case, scene, subject, formulation, penalty, pressure, multipliers)
-    exact_u = np.append(exact, multipliers)
-    trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
-    measurement = saddle.errors(u)
-    fails = any(number.value > number.tolerance for number in measurement.numbers)
-    if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
-        measurement = saddle.errors(exact_u)
-    return replace(measurement, details=end_details(trace))
 
-
-@dataclass(frozen=True, slots=True)
-class _SaddlePoint:
-    """A scene that a formulation with multipliers solves, and its exact solution."""
-
-    case: Case
-    scene: Scene
-    subject: Subject
-    formulation: CheckedFormulation
-    penalty: float
-    pressure: float
-    multipliers: FloatArray  # The exact ones, of shape (n_multipliers,).
-
-    def errors(self, u: FloatArray) -> Measurement:
+    def measure_errors(u: FloatArray) -> Measurement:
         """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
-        scene, pressure = self.scene, self.pressure
         q = u[: scene.n_free]
-        state = replace(self.case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
-        multipliers, sharpness = nearest_multipliers(state, scene, self.formulation, self.multipliers)
-        state = state.with_multipliers(multipliers)
-        slave, master = force_errors(FrozenState.at(self.formulation, state), scene, q, pressure)
-        values = {
-            STRESS: stress_error(scene, scene.stresses(q), pressure),
-            SLAVE_FORCES: slave,
-            MASTER_FORCES: master,
-            GAP: gap_error(state, 0.0, pressure / self.penalty),
-        }
+        state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
+        nearest, sharpness = nearest_multipliers(state, scene, formulation, multipliers)
+        state = state.with_multipliers(nearest)
+        values = _errors(FrozenState.at(formulation, state), scene, q, pressure)
+        values[GAP] = gap_error(state, 0.0, pressure / penalty)
         tolerance = uniform_tolerances(state, scene, pressure).stress
-        tolerances = _tolerances(self.case, self.penalty, tolerance)
-        if self.subject.traits.rules.penalty == "distributed":
-            loaded = self.multipliers != 0  # The multiplier of a node that faces nothing is 0.
-            errors = np.abs(multipliers[loaded] / pressure - 1)
-            values[MULTIPLIERS] = float(errors.max(initial=0.0))
+        tolerances = _tolerances(case, penalty, tolerance)
+        if subject.traits.rules.penalty == "distributed":
+            loaded = multipliers != 0  # The multiplier of a node that faces nothing is 0.
+            values[MULTIPLIERS] = float(np.abs(nearest[loaded] / pressure - 1).max(initial=0.0))
             tolerances[MULTIPLIERS] = tolerance / sharpness
         return Measurement(check_all(values, tolerances))
+
+    exact_u = np.append(exact, multipliers)
+    trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
+    measurement = measure_errors(u)
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
+    if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
+        measurement = measure_errors(exact_u)
+    return replace(measurement, details=end_details(trace))
 
 
 def solve_patch(
