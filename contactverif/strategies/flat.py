@@ -21,19 +21,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.oracle.flat_answers import is_of_class
-from contactverif.strategies import given_interface
+from contactverif.strategies import given_interface, parts
 from contactverif.strategies.panels import Panel, assemble_panels, shortest
-from contactverif.strategies.parts import (
-    SEVENTHS,
-    depth_units,
-    ends_of,
-    lengths,
-    motions,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shuffles,
-)
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
 
@@ -70,9 +59,9 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
 def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> Case:
     """Draw meshes and push the slave into the master by the same depth everywhere; the case is that of `flat_cases`."""
     sides = draw(panels)
-    quarters, unit = draw(_DEPTHS), draw(depth_units())
-    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
-    slide, shuffle = draw(_SLIDES), draw(shuffles())
+    quarters, unit = draw(_DEPTHS), draw(parts.depth_units())
+    motion, penalty, seed = draw(parts.motions()), draw(parts.penalties()), draw(parts.seeds())
+    slide, shuffle = draw(_SLIDES), draw(parts.shuffles())
     penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
     interface, z, along = assemble_panels([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
     parameters = {"penetration": np.array(penetration * motion.scale), "along": along, "direction": motion.direction}
@@ -83,7 +72,9 @@ def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> C
 def _panels() -> SearchStrategy[list[Sides]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang = st.integers(0, 3)
-    side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
+    side = st.builds(
+        _places, _REFINEMENTS, _REPEATS, parts.lengths(), parts.lengths(), overhang, overhang, parts.SEVENTHS
+    )
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
@@ -97,7 +88,7 @@ def _places(
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
     """
-    slave_x = ends_of([*slave] * repeats)
+    slave_x = parts.ends_of([*slave] * repeats)
     end = slave_x[-1] + right
     master_x = [-float(left)]
     for length in cycle(master) if refinement else master:
@@ -157,7 +148,7 @@ def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> S
 def _class_panels(midpoints: bool, least: int) -> SearchStrategy[list[Sides]]:
     middles, overhang = _CARRIES if midpoints else st.just([0]), st.integers(least, _FURTHEST)
     side = st.builds(
-        _class_places, _CLASS_REPEATS, lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
+        _class_places, _CLASS_REPEATS, parts.lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
     )
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
@@ -177,8 +168,8 @@ def _class_places(
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
     """
     segments = np.array([*slave] * repeats)
-    slave_x = ends_of([*slave] * repeats)
-    deal = partial(repeat_cyclically, count=len(slave_x))
+    slave_x = parts.ends_of([*slave] * repeats)
+    deal = partial(parts.repeat_cyclically, count=len(slave_x))
     nodes = slave_x[deal(at_nodes) == 1]
     nodes = nodes[(nodes > slave_x[0]) & (nodes < slave_x[-1])] if inner else nodes
     middles = (slave_x[:-1] + segments / 2)[deal(at_middles)[:-1] == 1]

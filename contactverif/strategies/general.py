@@ -21,22 +21,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.strategies import given_interface
+from contactverif.strategies import given_interface, parts
 from contactverif.strategies.contact import covered_start, extend_line, sink_below
 from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
-from contactverif.strategies.parts import (
-    OFFSETS,
-    depth_units,
-    depths,
-    ends_of,
-    lengths,
-    motions,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shifts,
-    shuffles,
-)
 from contactverif.strategies.rings import Ring, rings
 
 _ON = st.integers(0, 7)  # Zero means no offset.
@@ -59,10 +46,10 @@ def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 @st.composite
 def _general_cases(draw: DrawFn, smooth: bool) -> Case:
     makers: list[Broken | Ring] = draw(_panels(smooth))
-    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
+    motion, penalty, seed, shuffle = parts.draw_others(draw)
     # Drawn last, so that the offset shrinks last.
     offset_on = smooth or draw(_ON) > 0
-    offsets = draw(OFFSETS) if offset_on else [0]
+    offsets = draw(parts.OFFSETS) if offset_on else [0]
     if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
         # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
@@ -94,12 +81,12 @@ class Broken:
         if not self.upright:
             line = extend_line(line, self.slave, length / 8)
             start = covered_start(start, self.slave, line[-1, 0] - length / 8)
-        x = start + ends_of(self.slave)
+        x = start + parts.ends_of(self.slave)
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
-        shift = shifts(offsets, len(x))
-        depth = (repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
+        shift = parts.shifts(offsets, len(x))
+        depth = (parts.repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
         slave = np.column_stack([x, on_lattice(np.interp(x, *line.T)) + rise - depth])
@@ -125,16 +112,16 @@ class Broken:
 @cache
 def _broken_lines() -> SearchStrategy[Broken]:
     """Return flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
-    flat = lengths().map(lambda along: [(length, 0, 0) for length in along])
+    flat = parts.lengths().map(lambda along: [(length, 0, 0) for length in along])
     bent = st.lists(
         st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
     )
-    plain = lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
-    depth = st.one_of(depths(), depths(lowest=-6))
+    plain = parts.lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
+    depth = st.one_of(parts.depths(), parts.depths(lowest=-6))
     start = st.integers(-2, 2)
     return st.one_of(
-        st.builds(Broken, flat, st.just(0.0), lengths(), start, _TILTS, depth, depth_units()),
-        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, depth_units()),
+        st.builds(Broken, flat, st.just(0.0), parts.lengths(), start, _TILTS, depth, parts.depth_units()),
+        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, parts.depth_units()),
     )
 
 
@@ -155,7 +142,9 @@ def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
     """Return one or two panels; ledges, which are kinks, only if not smooth."""
     shapes: list[SearchStrategy[Broken | Ring]] = [_broken_lines(), _broken_lines(), _broken_lines(), rings(), rings()]
     if not smooth:
-        plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
-        shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
+        plain = parts.lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
+        shapes.append(
+            st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), parts.depths(), parts.depth_units())
+        )
     panel = st.one_of(*shapes)
     return st.one_of(st.lists(panel, min_size=1, max_size=1), st.lists(panel, min_size=1, max_size=2))

@@ -15,7 +15,7 @@ from math import ldexp
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import SearchStrategy
+from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
@@ -138,3 +138,8 @@ def ends_of(lengths: Iterable[float]) -> FloatArray:
 def shuffles() -> SearchStrategy[int]:
     """Return shuffles: every other mesh is numbered in walking order, 0; the others at random."""
     return st.one_of(st.just(0), st.integers(0, 255))
+
+
+def draw_others(draw: DrawFn) -> tuple[Motion, float, int, int]:
+    """Draw what a case needs besides its meshes: the motion, the penalty, the seed, and the shuffle of the numbers."""
+    return draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())

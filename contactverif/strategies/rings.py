@@ -11,20 +11,9 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.strategies import parts
 from contactverif.strategies.contact import radial_factor
 from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
-from contactverif.strategies.parts import (
-    OFFSETS,
-    depth_units,
-    depths,
-    ends_of,
-    motions,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shifts,
-    shuffles,
-)
 
 RADIUS = 4.0
 
@@ -48,10 +37,10 @@ class Ring:
         master = self._points(self.master, not self.inner_slave, warp)
         reference = self._points(self.slave, self.inner_slave, 1.0)
         length = min(shortest(master), shortest(reference))
-        depth = on_lattice(repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
+        depth = on_lattice(parts.repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
         depth = np.clip(depth, -RADIUS / 2, RADIUS / 2)  # neither a hole nor a disc shrinks to a point
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
-        shift = shifts(offsets, len(reference)) * length
+        shift = parts.shifts(offsets, len(reference)) * length
         slave = on_lattice(reference + outward * depth[:, None]) + shift
         least, closed = min(self.unit * length / 4, RADIUS / 16), self.degrees == 360
         edges = master[::-1] if self.inner_slave else master
@@ -60,7 +49,7 @@ class Ring:
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
         """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
-        shares = ends_of(weights) / sum(weights)
+        shares = parts.ends_of(weights) / sum(weights)
         angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
         points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
         return points if inner else points[::-1]
@@ -70,8 +59,8 @@ def rings() -> SearchStrategy[Ring]:
     """Return arcs of 60° to 180°, and closed rings."""
     weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
     degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
-    depth = st.one_of(depths(), depths(lowest=-6))
-    return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
+    depth = st.one_of(parts.depths(), parts.depths(lowest=-6))
+    return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, parts.depth_units())
 
 
 _RINGS = rings()
@@ -85,6 +74,6 @@ def closed_cases() -> SearchStrategy[Case]:
 @st.composite
 def _closed_cases(draw: DrawFn) -> Case:
     ring = replace(draw(_RINGS), degrees=360)
-    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
-    interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
+    motion, penalty, seed, shuffle = parts.draw_others(draw)
+    interface, z, _ = assemble_panels([ring(draw(parts.OFFSETS))], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)

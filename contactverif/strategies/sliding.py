@@ -15,7 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
-from contactverif.strategies.parts import ends_of, motions, penalties, repeat_cyclically, seeds, shuffles
+from contactverif.strategies.parts import draw_others, ends_of, repeat_cyclically
 
 _SLAVE = st.lists(st.sampled_from([1.0, 1.5, 2.0]), min_size=1, max_size=3)
 _MASTER = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=3)
@@ -43,7 +43,7 @@ def _sliding_cases(draw: DrawFn) -> Case:
     depth = repeat_cyclically(draw(_DEPTHS), len(x)) / 32
     # The slave follows the master as it lies in the middle of the way.
     slave = np.column_stack([x, on_lattice(np.interp(x + way / 2, *line.T)) - depth])
-    motion, penalty, seed, shuffle = draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
+    motion, penalty, seed, shuffle = draw_others(draw)
     chains = [Chain(slave)], [Chain(line[::-1])], [Chain(slave)]
     interface, order = assemble_chains(*chains, motion.scale, shuffle)
     nodes = np.vstack([slave, line[::-1]])

@@ -14,27 +14,18 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
+from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, freeze_state, random_directions
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
-from contactverif_properties.shared.roundoff import (
-    SEGMENT_REASON,
-    gap_tolerance,
-    mean_penetration,
-    ratio,
-    rounding_distance,
-    segment_tolerance,
-    stated_gap_quantity,
-    sum_slave_forces,
-)
 
-FORCE_IMBALANCE = stated_gap_quantity("force imbalance")
-MOMENT_IMBALANCE = stated_gap_quantity("moment imbalance")
+FORCE_IMBALANCE = roundoff.stated_gap_quantity("force imbalance")
+MOMENT_IMBALANCE = roundoff.stated_gap_quantity("moment imbalance")
 N_LOOPS = 3
 N_POINTS = 16  # Points on a loop: the error of the trapezoidal rule falls like (r/ℓ)^16.
 # The radius of a loop over the shortest segment. The smaller ones are for a kink within a larger loop.
 RADII = (2.0**-10, 2.0**-15, 2.0**-20)
-ASYMMETRY = Quantity("asymmetry of the tangent", "u(8Z/min(g, ℓ) + 4N)", SEGMENT_REASON)
+ASYMMETRY = Quantity("asymmetry of the tangent", "u(8Z/min(g, ℓ) + 4N)", roundoff.SEGMENT_REASON)
 WORK = Quantity(
     "work in a closed loop", "64 u Z/r", "Positions are rounded to uZ, and forces change with them over the radius r."
 )
@@ -87,8 +78,10 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
 def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState, traits: Traits) -> Measurement:
     """Return what remains of the forces, or of their moment, over Σ|R| of the slave times the arm."""
     case, forces = state.case, state.forces
-    tolerance = gap_tolerance(case, mean_penetration(case, forces), rounding_distance(case, traits))
-    imbalance = ratio(remainder, arm * sum_slave_forces(case, forces))
+    tolerance = roundoff.gap_tolerance(
+        case, roundoff.mean_penetration(case, forces), roundoff.rounding_distance(case, traits)
+    )
+    imbalance = roundoff.ratio(remainder, arm * roundoff.sum_slave_forces(case, forces))
     return Measurement([quantity.check(imbalance, tolerance)], idle=not forces.any())
 
 
@@ -122,12 +115,12 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
     """
     state = freeze_state(case, subject)
-    case, distance = state.case, rounding_distance(state.case, subject.traits)
+    case, distance = state.case, roundoff.rounding_distance(state.case, subject.traits)
     values, tolerances, undecided = {}, {}, ""
     if "tangent" in subject.provides:
         tangent = state.tangent
-        values[ASYMMETRY] = ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
-        tolerances[ASYMMETRY] = segment_tolerance(case, state.residual, distance)
+        values[ASYMMETRY] = roundoff.ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
+        tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance)
     if subject.traits.promises.tangent != "approximate":
         for share in RADII if state.pairing is None else RADII[:1]:
             radius = share * case.shortest_segment
@@ -158,4 +151,4 @@ def largest_work(state: FrozenState, radius: float) -> float:
     forces = forces - forces.mean(axis=1, keepdims=True)  # A constant force does no work in a loop.
     works = forces * steps
     work, throughput = np.abs(works.sum(axis=(1, 2))), np.abs(works).sum(axis=(1, 2))
-    return max(map(ratio, work.tolist(), throughput.tolist()))
+    return max(map(roundoff.ratio, work.tolist(), throughput.tolist()))

@@ -15,16 +15,10 @@ from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
+from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, freeze_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.roundoff import (
-    SEGMENT_REASON,
-    SEGMENT_TOLERANCE,
-    rounding_distance,
-    segment_tolerance,
-    sum_larger_forces,
-)
 from contactverif_properties.shared.same_answer import Change, judge_changes
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
@@ -32,8 +26,8 @@ SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
 SCALED_FORCES = Quantity("error of the forces in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
 SCALED_TANGENT = Quantity("error of the tangent in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
 LARGEST_EXPONENT = 60
-TURNED_FORCES = Quantity("error of the forces after a rotation", SEGMENT_TOLERANCE, SEGMENT_REASON)
-TURNED_TANGENT = Quantity("error of the tangent after a rotation", SEGMENT_TOLERANCE, SEGMENT_REASON)
+TURNED_FORCES = Quantity("error of the forces after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 
 
 _define = partial(Property.define, family="invariants", promise=lambda traits: True)
@@ -79,7 +73,7 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
         changes.append(Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max())))
-    tolerance = segment_tolerance(case, forces, rounding_distance(case, subject.traits))
+    tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
     return Measurement(*judge_changes(changes, tolerance, [state]), idle=not forces.any())
 
 
@@ -125,8 +119,8 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
 
     largest = max(case.largest_coordinate, case_there.largest_coordinate)
     one_pass = forces / _count_passes(state, subject)
-    tolerance = segment_tolerance(case, one_pass, largest)
-    size = sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
+    tolerance = roundoff.segment_tolerance(case, one_pass, largest)
+    size = roundoff.sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
     changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
     if tangents:
         tangent, tangent_there = tangents

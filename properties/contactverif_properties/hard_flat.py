@@ -20,16 +20,9 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import deep_states, node_hit_states, offset_states, search_states
+from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.applicability import knows_total
 from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
-from contactverif_properties.shared.uniform_pressure import (
-    forces_of_gap,
-    forces_of_penetration,
-    normal_of,
-    push_apart,
-    pushing_forces,
-    uniform_state,
-)
 
 TOTAL = stated_gap_quantity("error of the total force")
 NODAL = stated_gap_quantity("error of a nodal force")
@@ -52,15 +45,17 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     if tolerance >= 1:
         return Measurement(undecided=VACUOUS)
     exact = exact_forces(case)
-    slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
-    along, normal = case.parameters["direction"], normal_of(case)
+    slave = uniform_pressure.pushing_forces(uniform_pressure.uniform_state(case, subject))[
+        : case.interface.n_slave_nodes
+    ]
+    along, normal = case.parameters["direction"], uniform_pressure.normal_of(case)
     numbers = [ALONG.check(ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     if knows_total(traits):
         numbers.append(TOTAL.check(abs(push / whole - 1), tolerance))
     if traits.promises.patch.flat is not False:
-        forces, largest = forces_of_gap(case, subject, exact)
+        forces, largest = uniform_pressure.forces_of_gap(case, subject, exact)
         numbers.append(NODAL.check(float(np.linalg.norm(forces - exact, axis=1).max()) / whole, tolerance * largest))
     return Measurement(numbers, broken=broken)
 
@@ -68,8 +63,8 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
 def exact_forces(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) of the pressure ε̂ |g| that push the nodes of a flat state."""
     if "weights" not in case.parameters:  # There is no other surface than the flat one.
-        return forces_of_penetration(case)
-    return push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
+        return uniform_pressure.forces_of_penetration(case)
+    return uniform_pressure.push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
 
 
 _define = partial(

@@ -18,31 +18,16 @@ from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import has_bodies, scene_of
 from contactverif.mechanics.system import System
-from contactverif.problems.block_scenes import (
-    case_c,
-    contrast_scenes,
-    stiff_scenes,
-    tiny_segment_scenes,
-    unloaded_scenes,
-    vanishing_overlap_scenes,
-)
+from contactverif.problems import block_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.flat_states import tiny_segment_states
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_properties.hard_flat import FLAT_QUANTITIES, exact_forces, measure_flat
 from contactverif_properties.patch_solved import patch_dead_zone
+from contactverif_properties.shared import solved_patch
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
-from contactverif_properties.shared.solved_patch import (
-    GAP,
-    MULTIPLIERS,
-    PRESSURE,
-    QUANTITIES,
-    STRESS,
-    forces_to_draw,
-    measure_once,
-)
 from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
 
@@ -50,7 +35,7 @@ def measure_patch(case: Case, subject: Subject) -> Measurement:
     """Return the errors of a flat state (`measure_flat`), or of a solved scene (`measure_once`)."""
     if not has_bodies(case):
         return measure_flat(case, subject)
-    measurement, traits = measure_once(case, subject), subject.traits
+    measurement, traits = solved_patch.measure_once(case, subject), subject.traits
     if traits.promises.patch.flat and traits.promises.independent_multipliers is False:
         # Newton's method may release a redundant multiplier, and others carry its force: another solution.
         return replace(measurement, undecided="the multipliers are not independent, so the forces are not unique")
@@ -59,19 +44,19 @@ def measure_patch(case: Case, subject: Subject) -> Measurement:
 
 def patch_forces(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) of a state or a scene, for pictures."""
-    return forces_to_draw(case) if has_bodies(case) else exact_forces(case)
+    return solved_patch.forces_to_draw(case) if has_bodies(case) else exact_forces(case)
 
 
 _define = partial(Property.define, family="hard", bodies=True)
 _define_patch = partial(
     _define,
-    quantities=(*FLAT_QUANTITIES, *QUANTITIES, MULTIPLIERS),
+    quantities=(*FLAT_QUANTITIES, *solved_patch.QUANTITIES, solved_patch.MULTIPLIERS),
     promise=lambda traits: True if traits.promises.patch.flat else None,  # Which of the cases would fail is not stated.
     exact=patch_forces,
 )
 
 
-@_define_patch(id="hard.c", cases=Cases.from_list(case_c))
+@_define_patch(id="hard.c", cases=Cases.from_list(block_scenes.case_c))
 def hard_c(case: Case, subject: Subject) -> Measurement:
     """Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.
 
@@ -92,7 +77,7 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(id="hard.contrast", cases=Cases.from_list(contrast_scenes))
+@_define_patch(id="hard.contrast", cases=Cases.from_list(block_scenes.contrast_scenes))
 def hard_contrast(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.
 
@@ -110,7 +95,9 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(id="hard.short-segment", cases=Cases.from_list(lambda: tiny_segment_states() + tiny_segment_scenes()))
+@_define_patch(
+    id="hard.short-segment", cases=Cases.from_list(lambda: tiny_segment_states() + block_scenes.tiny_segment_scenes())
+)
 def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     """One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.
 
@@ -130,7 +117,7 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(id="hard.stiff", cases=Cases.from_list(stiff_scenes))
+@_define_patch(id="hard.stiff", cases=Cases.from_list(block_scenes.stiff_scenes))
 def hard_stiff(case: Case, subject: Subject) -> Measurement:
     """Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.
 
@@ -151,7 +138,7 @@ def hard_stiff(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-POINTWISE = (GAP.name, PRESSURE.name)
+POINTWISE = (solved_patch.GAP.name, solved_patch.PRESSURE.name)
 
 
 def _divide_by_share(quantity: Quantity) -> Quantity:
@@ -165,9 +152,9 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
 @_define(
     id="hard.dead-zone",
     quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
-    cases=Cases.from_list(vanishing_overlap_scenes),
+    cases=Cases.from_list(block_scenes.vanishing_overlap_scenes),
     promise=lambda traits: True if traits.promises.patch.overhang else None,
-    exact=forces_to_draw,
+    exact=solved_patch.forces_to_draw,
 )
 def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays exact where the master covers 1e-1 to 1e-12 of a slave segment.
@@ -192,7 +179,9 @@ def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
     rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure_of(case, case.penalty)
     more = rounding / covered_share(case)
     if subject.traits.rules.enforcement == "multiplier":
-        growth = 1 + more / measurement.tolerances[STRESS.name]  # The other tolerances are multiples of this one.
+        growth = (
+            1 + more / measurement.tolerances[solved_patch.STRESS.name]
+        )  # The other tolerances are multiples of this one.
         numbers = [replace(number, tolerance=growth * number.tolerance) for number in measurement.numbers]
     else:
         numbers = [
@@ -241,7 +230,7 @@ NO_FORCE = replace(NO_STRESS, name="force without a load")
 @_define(
     id="hard.zero-load",
     quantities=(NO_STRESS, NO_FORCE),
-    cases=Cases.from_list(unloaded_scenes),
+    cases=Cases.from_list(block_scenes.unloaded_scenes),
     promise=lambda traits: True,
     applicable=refuse_dependent_multipliers,
 )

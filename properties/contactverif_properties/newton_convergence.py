@@ -24,17 +24,11 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import solid_cases
+from contactverif_properties.shared import newton_solution
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.applicability import promise_exact_tangent, refuse_dependent_multipliers
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
-from contactverif_properties.shared.newton_solution import (
-    LOAD_STEPS,
-    find_solution,
-    is_untouched,
-    solution_details,
-    solution_floor,
-)
 
 NEAR = 1e-4  # The order shows once the residual is below this share of the first one.
 NOISE = 32.0  # Roundoffs of a residual that count as converged where nothing lower is reached.
@@ -101,12 +95,12 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     system = System(scene_of(case), subject.for_case(case))
     trace = solve(system.scene, system.formulation)
     undecided = _find_excuse(trace)
-    for load_steps in LOAD_STEPS:  # Smaller load steps overshoot less, so that the pairing may settle.
+    for load_steps in newton_solution.LOAD_STEPS:  # Smaller load steps overshoot less, so that the pairing may settle.
         if not undecided:
             break
         trace = solve(system.scene, system.formulation, load_steps=load_steps)
         undecided = _find_excuse(trace)
-    details, series = solution_details(trace), history(trace)
+    details, series = newton_solution.solution_details(trace), history(trace)
     if undecided:
         return Measurement(details=details, series=series, undecided=undecided)
     begin = _first_final_iterate(trace)
@@ -117,7 +111,7 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
         [FINAL_ITERATIONS.check(iterations, float(_allowed_iterations(trace, begin)))],
         details=details,
         series=series,
-        idle=is_untouched(trace),
+        idle=newton_solution.is_untouched(trace),
     )
 
 
@@ -185,8 +179,8 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
     """
     scene = scene_of(case)
     system = System(scene, subject.for_case(case))
-    trace = find_solution(system)
-    details = solution_details(trace)
+    trace = newton_solution.find_solution(system)
+    details = newton_solution.solution_details(trace)
     if not trace.converged:
         return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
     solution = trace.u[-1]
@@ -210,7 +204,7 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
         [] if linear else [ORDER.check(steps.order, QUADRATIC)],
         details=details,
         undecided=undecided,
-        idle=is_untouched(trace),
+        idle=newton_solution.is_untouched(trace),
     )
 
 
@@ -241,7 +235,7 @@ def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: 
     """
     solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
     units = scale_factors(matrix, system.scene.n_free)[1]
-    floor = solution_floor(system.scene, solution, units, condition)
+    floor = newton_solution.solution_floor(system.scene, solution, units, condition)
     fits, count = [], 0
     for direction in random_directions(case.seed, N_DIRECTIONS, system.size):
         before, after = [], []

@@ -23,19 +23,11 @@ from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
 from contactverif_properties.shared.solved_patch import point_errors
-from contactverif_properties.shared.uniform_pressure import (
-    consistent_forces,
-    forces_of_penetration,
-    push_apart,
-    pushing_forces,
-    transmission_error,
-    uniform_state,
-    unit_forces,
-)
 
 FORCE = gap_quantity("error of a nodal force")
 TOTAL = gap_quantity("error of the total force")
@@ -54,7 +46,7 @@ _define = partial(Property.define, family="patch")
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
     promise=lambda traits: traits.promises.patch.flat,
-    exact=forces_of_penetration,
+    exact=uniform_pressure.forces_of_penetration,
 )
 def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     """A uniform penetration of a flat interface gives the exact nodal forces on both sides.
@@ -77,7 +69,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
-    return Measurement([FORCE.check(*transmission_error(case, subject))])
+    return Measurement([FORCE.check(*uniform_pressure.transmission_error(case, subject))])
 
 
 def refuse_unknown_total(traits: Traits) -> str:
@@ -120,10 +112,10 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     formulation = subject.for_case(case)
     stretched = replace(case, interface=interface)
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
-    exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
+    exact = uniform_pressure.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
         exact = exact * stretch
-    error = float(np.linalg.norm(pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0) - exact))
+    error = float(np.linalg.norm(uniform_pressure.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0) - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
     undecided = ""
     if value > tolerance:
@@ -154,8 +146,8 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
 
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
-    numbers = [FORCE.check(*transmission_error(case, subject))]
-    state = uniform_state(case, subject)
+    numbers = [FORCE.check(*uniform_pressure.transmission_error(case, subject))]
+    state = uniform_pressure.uniform_state(case, subject)
     if state.has_points:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
@@ -202,7 +194,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
 _define_class = partial(
     _define,
     quantities=(FORCE, GAP, PRESSURE),
-    exact=forces_of_penetration,
+    exact=uniform_pressure.forces_of_penetration,
     usual_undecided=0.07,  # The share for NTS-AR without a tolerance past free ends; built-in formulations have 0.
 )
 
@@ -293,7 +285,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     spring = subject.penalty(case) * depth
     unbiased = bool(subject.traits.promises.unbiased)
     weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
-    exact = spring * push_apart(case, weights, 1.0)
+    exact = spring * uniform_pressure.push_apart(case, weights, 1.0)
     forces = -state.forces
     if unbiased:
         likeness = float((forces * exact).sum())
@@ -350,7 +342,7 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
         raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
     if case.name not in traits.evidence.published_forces:
         consistent = traits.promises.patch.flat and traits.rules.penalty == "distributed"
-        return consistent_forces(case, 1.0) if consistent else None
+        return uniform_pressure.consistent_forces(case, 1.0) if consistent else None
     slave, master = parse_forces(traits.evidence.published_forces[case.name])
     slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     if (len(slave), len(master)) != (len(slave_x), len(master_x)):
@@ -365,7 +357,7 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
 
 def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
-    state = uniform_state(case, subject, 1.0)
+    state = uniform_pressure.uniform_state(case, subject, 1.0)
     if state.case.n_multipliers:
-        return np.asarray(-unit_forces(state).sum(axis=1).reshape(-1, 2))
+        return np.asarray(-uniform_pressure.unit_forces(state).sum(axis=1).reshape(-1, 2))
     return -state.forces / (subject.penalty(case) * case.parameter("penetration"))

@@ -18,14 +18,7 @@ from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.strategies.solids import block_cases, dead_zone_cases, variant_cases
 from contactverif_properties.patch_flat import promise_normal, promise_single
-from contactverif_properties.shared.solved_patch import (
-    MULTIPLIERS,
-    QUANTITIES,
-    STRESS,
-    forces_to_draw,
-    measure_at_penalty,
-    measure_once,
-)
+from contactverif_properties.shared import solved_patch
 
 HIGH = 1e3  # The high penalty over the moderate penalty of a case.
 SLOPE = "slope over penalties (−1 if it locks)"
@@ -38,10 +31,10 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     penalty.
     """
     if subject.traits.rules.enforcement == "multiplier":
-        return measure_once(case, subject)
-    moderate = measure_at_penalty(case, subject, case.penalty)
-    high = measure_at_penalty(case, subject, HIGH * case.penalty)
-    errors = moderate.values[STRESS.name], high.values[STRESS.name]
+        return solved_patch.measure_once(case, subject)
+    moderate = solved_patch.measure_at_penalty(case, subject, case.penalty)
+    high = solved_patch.measure_at_penalty(case, subject, HIGH * case.penalty)
+    errors = moderate.values[solved_patch.STRESS.name], high.values[solved_patch.STRESS.name]
     slope = float(np.log(errors[1] / errors[0]) / np.log(HIGH)) if min(errors) > 0 else 0.0
     return Measurement(
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
@@ -74,8 +67,10 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
     return Cases.from_list(make, on_place=on_scene)
 
 
-_define = partial(Property.define, family="patch", bodies=True, exact=forces_to_draw)
-_define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_high, QUANTITIES), MULTIPLIERS))
+_define = partial(Property.define, family="patch", bodies=True, exact=solved_patch.forces_to_draw)
+_define_at_two_penalties = partial(
+    _define, quantities=(*solved_patch.QUANTITIES, *map(_at_high, solved_patch.QUANTITIES), solved_patch.MULTIPLIERS)
+)
 
 
 @_define_at_two_penalties(
@@ -157,7 +152,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.variants",
-    quantities=(*QUANTITIES, MULTIPLIERS),
+    quantities=(*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS),
     cases=Cases.random(variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
@@ -174,7 +169,7 @@ def patch_variants(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never, as in `patch.flat.solve`.
     """
-    return measure_once(case, subject)
+    return solved_patch.measure_once(case, subject)
 
 
 def _widen_tolerance(quantity: Quantity) -> Quantity:
@@ -185,7 +180,7 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
 
 @_define(
     id="patch.dead-zone",
-    quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
+    quantities=tuple(map(_widen_tolerance, (*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
     promise=lambda traits: traits.promises.patch.overhang,
 )
@@ -204,7 +199,7 @@ def patch_dead_zone(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never, as in `patch.flat.solve`.
     """
-    measurement = measure_once(case, subject)
+    measurement = solved_patch.measure_once(case, subject)
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     covered = min(slave.max(), master.max()) - max(slave.min(), master.min())
     ratio = float(np.ptp(slave) / covered)

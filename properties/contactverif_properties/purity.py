@@ -11,14 +11,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
+from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.interleaved_calls import (
-    BOTH,
-    Question,
-    compare_two_pairings,
-    count_changes,
-    renumber,
-)
 from contactverif_properties.shared.roundoff import ratio
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
@@ -96,13 +90,13 @@ def purity(case: Case, subject: Subject) -> Measurement:
     interface, z = state.interface, state.z
     distant = z + np.random.default_rng(state.seed).uniform(-1, 1, z.size) * state.shortest_segment / 4
     near = z + NEAR * (distant - z)
-    other, z_other = renumber(state, formulation)
+    other, z_other = interleaved_calls.renumber(state, formulation)
     before = _fingerprint(interface), _fingerprint(other)
 
     # Each state is asked with its own pairing, or with that of a state nearby: far from the state of a pairing, a right
     # formulation may have no answer (a quadratic without a root).
     places = ((interface, z), (interface, distant), (other, z_other), (interface, near))
-    questions = [Question(mesh, formulation.pair(mesh, u), u) for mesh, u in places]
+    questions = [interleaved_calls.Question(mesh, formulation.pair(mesh, u), u) for mesh, u in places]
     pairing, second = questions[0].pairing, subject.with_penalty(penalty)
     broken = []
     if formulation.pair(interface, z) != pairing:
@@ -111,12 +105,12 @@ def purity(case: Case, subject: Subject) -> Measurement:
         second.pair(question.interface, question.z) != question.pairing for question in (*questions[1:3], questions[1])
     ):
         broken.append("the pairing of a state depends on the state before it")
-    broken += compare_two_pairings(formulation, interface, z, distant)
+    broken += interleaved_calls.compare_two_pairings(formulation, interface, z, distant)
     if questions[3].pairing == pairing:
         questions = questions[:3]
     else:
-        questions.append(Question(interface, pairing, near))
-    repeated, changes = count_changes(formulation, second, questions)
+        questions.append(interleaved_calls.Question(interface, pairing, near))
+    repeated, changes = interleaved_calls.count_changes(formulation, second, questions)
 
     numbers = [
         REPEATED.check(repeated, 0.0),
@@ -148,7 +142,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
         difference = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
         of_tangents = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
         numbers += [
-            IN_ONE_CALL.check(changes[BOTH], 0.0),
+            IN_ONE_CALL.check(changes[interleaved_calls.BOTH], 0.0),
             ONE_RESIDUAL.check(difference, bound),
             ONE_TANGENT.check(of_tangents, bound_of_tangent),
         ]
@@ -159,7 +153,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
 
 
 def _compare_penalties(
-    formulation: CheckedFormulation, other: CheckedFormulation, question: Question, forces: Array
+    formulation: CheckedFormulation, other: CheckedFormulation, question: interleaved_calls.Question, forces: Array
 ) -> list[str]:
     """Return what is wrong, in words, where another instance has another penalty; `forces` are those of the first."""
     arguments = question.interface, question.pairing, question.z

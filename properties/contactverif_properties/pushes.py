@@ -20,16 +20,10 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases, general_cases
+from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.passes import Pass
-from contactverif_properties.shared.roundoff import (
-    COORDINATE_ROUNDING,
-    SEGMENT_REASON,
-    SEGMENT_TOLERANCE,
-    segment_tolerance,
-    sum_larger_forces,
-)
 from contactverif_properties.shared.uniform_pressure import unit_forces
 
 CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.
@@ -40,10 +34,10 @@ N_MOVES = 64  # So many moves that a slave of two nodes that hang at free ends i
 REASON = "An open contact is left out, not rounded away."
 OPEN = Quantity("force across an open gap", "0", REASON)
 DISTANT = Quantity("force far from the contact zone", "0", REASON)
-PULL_OF_POINT = Quantity("pull of a contact point", SEGMENT_TOLERANCE, SEGMENT_REASON)
+PULL_OF_POINT = Quantity("pull of a contact point", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
-PULL_OF_NODE = Quantity("pull of a node", SEGMENT_TOLERANCE, SEGMENT_REASON)
+PULL_OF_NODE = Quantity("pull of a node", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 
 
 @random_source("contactverif_properties.shared.openings.pushing_cases")
@@ -191,13 +185,13 @@ def _pull_of_points(state: FrozenState) -> tuple[dict[Quantity, float], dict[Qua
     pressure = state.points.pressure[np.isfinite(state.points.pressure)]
     largest, pull = (float(np.max(sign * pressure, initial=0.0)) for sign in (1, -1))
     value = pull / max(largest, pull) if pull else 0.0
-    tolerance = segment_tolerance(state.case, state.residual, state.case.largest_coordinate)
+    tolerance = roundoff.segment_tolerance(state.case, state.residual, state.case.largest_coordinate)
     return {PULL_OF_POINT: value}, {PULL_OF_POINT: tolerance}
 
 
 def _move_by_roundoff(case: Case) -> Iterator[Case]:
     """Yield the case with its nodes moved at random by what roundoff may do."""
-    reach = COORDINATE_ROUNDING * case.largest_coordinate
+    reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
     for direction in random_moves(case.seed, N_MOVES, case.z.size):
         yield replace(case, z=case.z + reach * direction)
 
@@ -242,14 +236,14 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     if case.n_multipliers:
         case = case.with_multipliers(release_some(case))
     state = FrozenState.at(formulation, case)
-    size = sum_larger_forces(case, state.forces)
+    size = roundoff.sum_larger_forces(case, state.forces)
     if not size:
         return Measurement([PULL_OF_NODE.check(0.0, 0.0)], idle=True)
     normals, allowance = allowed_pushes(state)
     pulls = np.array(
         [_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(-state.forces)]
     )
-    tolerance = segment_tolerance(case, state.forces, case.largest_coordinate)
+    tolerance = roundoff.segment_tolerance(case, state.forces, case.largest_coordinate)
     pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
     undecided = ""
     if pulled and pulled <= _nodes_round_corners(state):

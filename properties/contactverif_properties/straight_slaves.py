@@ -13,27 +13,14 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.straight import bent_end_cases, tilted_cases
+from contactverif_properties.shared import linear_gaps, roundoff
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.linear_gaps import (
-    directions,
-    exact_slave_forces,
-    knows_linear_total,
-    node_gaps,
-    slave_forces,
-)
-from contactverif_properties.shared.roundoff import (
-    COORDINATE_ROUNDING,
-    gap_tolerance,
-    ratio,
-    rounding_distance,
-    stated_gap_quantity,
-)
 from contactverif_properties.shared.same_answer import Carry, compare, same_answer_quantities
 
-OFF_NORMAL = stated_gap_quantity("part of the force off the normal")
-TOTAL = stated_gap_quantity("error of the total force")
-NODAL = stated_gap_quantity("error of a nodal force")
+OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
+TOTAL = roundoff.stated_gap_quantity("error of the total force")
+NODAL = roundoff.stated_gap_quantity("error of a nodal force")
 AFTER_A_BEND = same_answer_quantities("after a bend elsewhere")
 
 
@@ -45,7 +32,9 @@ def refuse_unknown_direction(traits: Traits) -> str:
 
 def _tolerance(case: Case, traits: Traits) -> float:
     """Return `STATED_GAP_TOLERANCE` as a number, for the mean penetration."""
-    return gap_tolerance(case, abs(float(node_gaps(case).mean())), rounding_distance(case, traits))
+    return roundoff.gap_tolerance(
+        case, abs(float(linear_gaps.node_gaps(case).mean())), roundoff.rounding_distance(case, traits)
+    )
 
 
 @Property.define(
@@ -76,21 +65,21 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
     """
-    traits, total = subject.traits, slave_forces(case, subject).sum(axis=0)
-    normal = directions(case)[0 if traits.rules.force_along == "master normal" else 1]
+    traits, total = subject.traits, linear_gaps.slave_forces(case, subject).sum(axis=0)
+    normal = linear_gaps.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
     push, across = float(total @ normal), abs(float(total[0] * normal[1] - total[1] * normal[0]))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
-    values = {OFF_NORMAL: ratio(across, float(np.linalg.norm(total)))}
+    values = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}
     errors = {OFF_NORMAL: across}
-    if knows_linear_total(traits):
-        exact = float(np.linalg.norm(exact_slave_forces(case, traits).sum(axis=0)))
+    if linear_gaps.knows_linear_total(traits):
+        exact = float(np.linalg.norm(linear_gaps.exact_slave_forces(case, traits).sum(axis=0)))
         errors[TOTAL] = abs(push - exact)
         values[TOTAL] = errors[TOTAL] / exact
     tolerance = _tolerance(case, traits)
     error = max((error for name, error in errors.items() if values[name] > tolerance), default=0.0)
     formulation, undecided = subject.for_case(case), ""
     if error and not formulation.n_multipliers(case.interface):
-        reach = COORDINATE_ROUNDING * case.largest_coordinate
+        reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
         undecided = explain_by_kink(FrozenState.at(formulation, case), reach, {"forces": error})
     return Measurement(check_all(values, tolerance), undecided, broken)
 
@@ -99,7 +88,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     """Return why no exact nodal force follows from the traits, or an empty string if one does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
-    if not knows_linear_total(traits):
+    if not linear_gaps.knows_linear_total(traits):
         return "the traits `penalty`, `area`, `gap` and `force_along` do not state all of the integral"
     return ""
 
@@ -127,7 +116,7 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never: the slave is in contact with all its length, and far from the ends of the master.
     """
-    exact, forces = exact_slave_forces(case, subject.traits), slave_forces(case, subject)
+    exact, forces = linear_gaps.exact_slave_forces(case, subject.traits), linear_gaps.slave_forces(case, subject)
     error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
     return Measurement([NODAL.check(error, _tolerance(case, subject.traits))], idle=not forces.any())
 

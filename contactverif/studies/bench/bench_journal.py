@@ -11,15 +11,7 @@ from pathlib import Path
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.journal import (
-    RecordFile,
-    begin_journal,
-    decode,
-    journal_folder,
-    read_header,
-    read_messages,
-    record_files,
-)
+from contactverif.run import journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord
 
@@ -53,19 +45,19 @@ class Journal:
     """The journal of one output file. `finished` has the records of the cells that are finished, by number."""
 
     def __init__(self, output: Path, header: Header) -> None:
-        folder = journal_folder(output)
+        folder = journal.journal_folder(output)
         self.finished: dict[int, CellRecord] = {}
         if not folder.exists():
-            begin_journal(folder, header, ())
-        elif read_header(folder, Header, "--out") != header:
+            journal.begin_journal(folder, header, ())
+        elif journal.read_header(folder, Header, "--out") != header:
             needed = "the same command and version, or another name, or no such folder"
             raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
-        for path in record_files(folder):
-            for _, message in read_messages(path):
-                cell = decode(message, _DECODER)
+        for path in journal.record_files(folder):
+            for _, message in journal.read_messages(path):
+                cell = journal.decode(message, _DECODER)
                 if cell is not None and cell.record.runs.keys() == {*header.formulations}:
                     self.finished[cell.number] = cell.record
-        self._file = RecordFile(folder)
+        self._file = journal.RecordFile(folder)
 
     def add(self, number: int, record: CellRecord) -> None:
         """Append the record of a cell that is finished."""

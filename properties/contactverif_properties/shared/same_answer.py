@@ -17,17 +17,10 @@ from contactverif.contract.case import Case
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.oracle import default_points, nearest_segments
+from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import ask_forces_and_tangents
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.roundoff import (
-    COORDINATE_ROUNDING,
-    SEGMENT_REASON,
-    ratio,
-    rounding_distance,
-    segment_tolerance,
-    sum_larger_forces,
-)
 
 TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
 SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
@@ -47,8 +40,8 @@ class Carry:
 def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
     """Return the quantities of `compare`, the changes of forces and tangent; `situation` ends their names."""
     return (
-        Quantity(f"change of the forces {situation}", TOLERANCE, SEGMENT_REASON),
-        Quantity(f"change of the tangent {situation}", TOLERANCE, SEGMENT_REASON),
+        Quantity(f"change of the forces {situation}", TOLERANCE, roundoff.SEGMENT_REASON),
+        Quantity(f"change of the tangent {situation}", TOLERANCE, roundoff.SEGMENT_REASON),
     )
 
 
@@ -82,11 +75,11 @@ def judge_changes(
     Coordinates are rounded at the largest one of each state, or at a length. Without states, nothing is excused.
     """
     errors = [float(np.abs(each.change).max()) for each in changes]
-    values = {each.quantity: ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
+    values = {each.quantity: roundoff.ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
     pairs = zip(changes, errors, strict=True)
     failures = {each.part: error for each, error in pairs if values[each.quantity] > tolerance}
     excuses = (
-        explain_by_kink(state, COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), failures)
+        explain_by_kink(state, roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), failures)
         for state in states
     )
     return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
@@ -109,7 +102,7 @@ def compare(
     (first, forces, tangent), (second, forces_there, tangent_there) = (
         _ask(state, subject, penalty, multiplier) for state in (case, other)
     )
-    size = max(sum_larger_forces(case, forces), sum_larger_forces(other, forces_there))
+    size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
     changes = [Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
     if tangent.size:
         places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
@@ -117,8 +110,8 @@ def compare(
         change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
         size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
         changes.append(Change("tangent", quantities[1], change, size))
-    distance = max(rounding_distance(state, subject.traits) for state in (case, other))
-    tolerance = segment_tolerance(case, forces, distance)
+    distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
+    tolerance = roundoff.segment_tolerance(case, forces, distance)
     numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
     if explain and not undecided and any(number.value > number.tolerance for number in numbers):
         # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
