@@ -387,15 +387,11 @@ HERTZ_STUDIES = Studies(
 )
 
 
-def _pose(across: int, stiffness: float, traits: Traits) -> ProblemInstance:
-    return HertzStudy(True, stiffness).pose(across, traits)
-
-
 HERTZ = Problem(
     label="Hertz' contact in boxes",
     unit="E/h",
     meshes=(COARSEST, 22, 30, 42),
     penalties=(1.0, 10.0, 100.0),
-    pose=_pose,
+    pose=lambda across, stiffness, traits: HertzStudy(True, stiffness).pose(across, traits),
     rank=2,
 )

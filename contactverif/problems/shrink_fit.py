@@ -308,15 +308,11 @@ class RingStudy:
 FIT = ShrinkFit(interference=1e-2)  # The interference is larger than the height of a facet.
 
 
-def _pose(refine: int, penalty: float, traits: Traits) -> ProblemInstance:
-    return RingStudy(FIT, "inner", penalty).pose(refine, traits)
-
-
 RINGS = Problem(
     label="two rings shrunk onto each other",
     unit="",
     meshes=(1, 2, 4, 6),
     penalties=(1e2, 1e3, 1e4),
-    pose=_pose,
+    pose=lambda refine, penalty, traits: RingStudy(FIT, "inner", penalty).pose(refine, traits),
     rank=3,
 )

@@ -336,15 +336,11 @@ CURVED_STUDIES = Studies(
 )
 
 
-def _pose(refine: int, stiffness: float, traits: Traits) -> ProblemInstance:
-    return WavyStudy(UPPER, stiffness).pose(refine, traits)
-
-
 WAVY = Problem(
     label="two wavy half-planes in full contact",
     unit="E/h",
     meshes=(1, 2, 3, 4, 6),
     penalties=(1.0, 30.0, 1e3),
-    pose=_pose,
+    pose=lambda refine, stiffness, traits: WavyStudy(UPPER, stiffness).pose(refine, traits),
     rank=1,
 )

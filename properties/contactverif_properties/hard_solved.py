@@ -19,7 +19,7 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import has_bodies, scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes
-from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.blocks import pressure_of
 from contactverif.problems.flat_states import tiny_segment_states
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_properties.hard_flat import FLAT_QUANTITIES, exact_forces, measure_flat
@@ -28,7 +28,7 @@ from contactverif_properties.shared import solved_patch
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
-from contactverif_properties.shared.uniform_pressure import exact_multipliers
+from contactverif_properties.shared.uniform_pressure import exact_solution
 
 
 def measure_patch(case: Case, subject: Subject) -> Measurement:
@@ -202,14 +202,8 @@ def covered_share(case: Case) -> float:
 
 def _rank(case: Case, subject: Subject) -> dict[str, float]:
     """Return the reciprocal condition and the lack of rank of the matrix at the exact solution."""
-    scene, formulation, multipliers = scene_of(case), subject.for_case(case), np.zeros(0)
-    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
-    pressure = pressure_of(case, penalty)
-    exact = exact_unknowns(scene, pressure, penalty)
-    if formulation.n_multipliers(case.interface):
-        state = replace(case, z=scene.positions(exact))
-        multipliers = exact_multipliers(state, subject, formulation, pressure)
-    system, u = System(scene, formulation, use_tangent=False), np.append(exact, multipliers)
+    scene, formulation = scene_of(case), subject.for_case(case)
+    system, u = System(scene, formulation, use_tangent=False), exact_solution(scene, case, subject, formulation)
     matrix = system.matrix(u, system.pair(u))[0]
     rows, columns = scale_factors(matrix, scene.n_free)
     sizes = linalg.svdvals(rows[:, None] * matrix * columns)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
@@ -16,11 +14,10 @@ from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
-from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.strategies.solids import block_cases, solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details, solution_floor
-from contactverif_properties.shared.uniform_pressure import exact_multipliers
+from contactverif_properties.shared.uniform_pressure import exact_solution
 
 SCALE_RATIO = 8.0  # The first scale c over the second one.
 TOLERANCE = "max(1e3 u/cond, 30 u X)/ℓ"
@@ -119,12 +116,8 @@ def multiplier_rank(case: Case, subject: Subject) -> Measurement:
     **Source.** Section 6.3 of Zavarise & De Lorenzis (2009) leaves the question open for VTS-PPT. With eight slave
     segments on two master segments, seven of its sixteen multipliers are redundant.
     """
-    scene, pressure = scene_of(case), pressure_of(case, np.inf)
-    formulation = subject.for_case(case)
-    exact = exact_unknowns(scene, pressure, np.inf)
-    state = replace(case, z=scene.positions(exact))
-    system = System(scene, formulation, use_tangent=False)
-    u = np.concatenate([exact, exact_multipliers(state, subject, formulation, pressure)])
+    scene, formulation = scene_of(case), subject.for_case(case)
+    system, u = System(scene, formulation, use_tangent=False), exact_solution(scene, case, subject, formulation)
     matrix, floor = system.matrix(u, system.pair(u))
     step = system.step(matrix, np.zeros(system.size), floor)
     details = {"multipliers": float(system.n_multipliers)}

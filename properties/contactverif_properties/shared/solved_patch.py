@@ -26,7 +26,7 @@ from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import (
     consistent_forces,
-    exact_multipliers,
+    exact_solution,
     nearest_multipliers,
     normal_of,
 )
@@ -64,7 +64,7 @@ QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE)
 def measure_once(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
     if subject.traits.rules.enforcement == "multiplier":
-        return measure_with_multipliers(case, subject, case.penalty)
+        return measure_with_multipliers(case, subject)
     return measure_at_penalty(case, subject, case.penalty)
 
 
@@ -107,7 +107,7 @@ def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, 
     return dict.fromkeys((STRESS, SLAVE_FORCES, MASTER_FORCES), tolerance) | {GAP: tolerance * factor}
 
 
-def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Measurement:
+def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case as a saddle point and return its errors against the solution without penetration.
 
     Where the exact solution is a solution of the formulation, to roundoff, it counts in place of one that Newton's
@@ -115,10 +115,10 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
     fact that the exact solution is one. The penalty ε̂ serves as the scale c, and as the measure of gaps. Multipliers
     are compared with p where they are pressures; where they are not unique, those nearest to the exact ones count.
     """
-    scene, pressure = scene_of(case), pressure_of(case, np.inf)
-    formulation = subject.for_interface(case.interface, penalty)
-    exact = exact_unknowns(scene, pressure, np.inf)
-    multipliers = exact_multipliers(replace(case, z=scene.positions(exact)), subject, formulation, pressure)
+    scene, pressure, penalty = scene_of(case), pressure_of(case, np.inf), case.penalty
+    formulation = subject.for_case(case)
+    exact = exact_solution(scene, case, subject, formulation)
+    multipliers = exact[scene.n_free :]
 
     def measure_errors(u: FloatArray) -> Measurement:
         """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
@@ -136,12 +136,11 @@ def measure_with_multipliers(case: Case, subject: Subject, penalty: float) -> Me
             tolerances[MULTIPLIERS] = tolerance / sharpness
         return Measurement(check_all(values, tolerances))
 
-    exact_u = np.append(exact, multipliers)
-    trace, u = solve_patch(scene, formulation, exact_u, pressure / penalty)
+    trace, u = solve_patch(scene, formulation, exact, pressure / penalty)
     measurement = measure_errors(u)
     fails = any(number.value > number.tolerance for number in measurement.numbers)
     if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
-        measurement = measure_errors(exact_u)
+        measurement = measure_errors(exact)
     return replace(measurement, details=end_details(trace))
 
 

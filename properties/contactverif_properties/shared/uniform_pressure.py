@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import linalg
 
@@ -11,6 +13,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights
+from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import gap_tolerance
 
@@ -127,6 +130,20 @@ def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
         if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):
             return uniform
     return nearest
+
+
+def exact_solution(scene: Scene, case: Case, subject: Subject, formulation: CheckedFormulation) -> FloatArray:
+    """Return the unknowns of the exact solution of a uniform scene, and the multipliers behind them if there are any.
+
+    Where multipliers enforce contact, nothing penetrates, whatever the penalty of the case.
+    """
+    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty)
+    exact = exact_unknowns(scene, pressure, penalty)
+    if not formulation.n_multipliers(case.interface):
+        return exact
+    state = replace(case, z=scene.positions(exact))
+    return np.append(exact, exact_multipliers(state, subject, formulation, pressure))
 
 
 def nearest_multipliers(

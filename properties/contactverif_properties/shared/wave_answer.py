@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns
 from contactverif.problems.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
+from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.uniform_pressure import exact_multipliers
 
 MOST_STEPS = 12
@@ -49,16 +49,20 @@ def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -
     after = None if before is None else solve_frozen(systems[1], before, pairing)
     if before is None or after is None:
         return None
-    n_free, states = uniform.n_free, (systems[0].state(before), systems[1].state(after))
+    n_free, case = uniform.n_free, uniform.case()
+    states = [
+        FrozenState(formulation, replace(case, z=system.state(u), n_multipliers=system.n_multipliers), pairing)
+        for system, u in zip(systems, (before, after), strict=True)
+    ]
     total = -float((uniform.bodies[0].load * uniform.displacements(before[:n_free])[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
     springs = abs(total) / (MEAN_PRESSURE**2 * LENGTH) - bodies
-    nodal = subject.traits.rules.penalty == "nodal" or "contact_points" not in formulation.provides
+    nodal = subject.traits.rules.penalty == "nodal" or not states[0].has_points
     return InterfaceAnswer(
         compliance=wave_work(uniform, wavy, before[:n_free], after[:n_free]),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),
-        force_range=_force_range(uniform.interface, formulation, pairing, states),
-        point_range=np.nan if nodal else _point_range(uniform.interface, formulation, pairing, states),
+        force_range=_force_range(*states),
+        point_range=np.nan if nodal else _point_range(*states),
     )
 
 
@@ -72,14 +76,8 @@ def _uniform_state(system: System, subject: Subject) -> FloatArray:
     return np.append(exact, exact_multipliers(state, subject, system.formulation, MEAN_PRESSURE))
 
 
-def _force_range(
-    interface: Interface,
-    formulation: CheckedFormulation,
-    pairing: Pairing | None,
-    states: tuple[FloatArray, FloatArray],
-) -> float:
-    before, after = (formulation.residual(interface, pairing, z)[: interface.n_unknowns] for z in states)
-    across = (after - before).reshape(-1, 2)[:, 1]
+def _force_range(before: FrozenState, after: FrozenState) -> float:
+    interface, across = before.case.interface, (after.forces - before.forces)[:, 1]
     sides = (
         (interface.slave, slice(0, interface.n_slave_nodes)),
         (interface.master, slice(interface.n_slave_nodes, None)),
@@ -88,16 +86,11 @@ def _force_range(
     return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / WAVE
 
 
-def _point_range(
-    interface: Interface,
-    formulation: CheckedFormulation,
-    pairing: Pairing | None,
-    states: tuple[FloatArray, FloatArray],
-) -> float:
-    before, after = (formulation.contact_points(interface, pairing, z) for z in states)
-    if before.pressure.shape != after.pressure.shape:
+def _point_range(before: FrozenState, after: FrozenState) -> float:
+    pressures = [state.points.pressure for state in (before, after)]
+    if pressures[0].shape != pressures[1].shape:
         return np.nan  # A formulation without a pairing may have other points.
-    change = after.pressure - before.pressure
+    change = pressures[1] - pressures[0]
     return float(np.ptp(change[np.isfinite(change)])) / WAVE
 
 
