@@ -7,7 +7,7 @@ from one body to the other.
 
 There are two writers of tangents. `cell_tangent` and `node_rows` add up twelve numbers a row in the frame of a slave
 that looks along its own normal (`cell_frame`). `shape_rows` takes any directions and half passes, in the global frame,
-at 0.64 of that speed. Tests hold both against sparse products (`tests/plugins/readable_mortar.py`).
+at 0.64 of that speed. Tests hold both against a complex step (`tests/plugins/test_every_formulation.py`).
 """
 
 from contactverif_mortar.chen_hisada_method import chen_hisada

@@ -22,7 +22,6 @@ import numpy as np
 from damage import BYTES, GOOD, Ending, Table, run_command
 
 Entry = tuple[tuple[str, ...], np.ndarray, dict[str, Any]]  # Dimensions, values and attributes of a variable.
-REALS = (np.nan, np.inf, -np.inf, 1e308, -1e300, 5e-324, 0.0, -1.0, 9.969209968386869e36)
 Tree = dict[str, tuple[dict[str, Entry], dict[str, Any]]]  # {group: (variables, attributes)}
 
 

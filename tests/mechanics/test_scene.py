@@ -435,34 +435,6 @@ def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
     )
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_a_far_chain_of_the_master_changes_no_bit(name: str) -> None:
-    """Stronger than a far body: here the formulation itself gets the far segments."""
-    subject = load_subject(name)
-    touching = 0
-    for seed in range(24):
-        interface, z = wavy_interface(seed, n_master=4 + seed % 9)
-        case = Case(interface, z, penalty=10.0)
-        formulation = subject.for_case(case)
-        more = with_a_far_chain(interface, n_far=1 + seed % 7)
-        pairs, forces, tangents = [], [], []
-        for each in (interface, more):
-            positions = each.nodes.reshape(-1)
-            pairing = formulation.pair(each, positions)
-            assert pairing is not None
-            pairs.append(bits(pairing))
-            forces.append(formulation.residual(each, pairing, positions))
-            tangents.append(formulation.tangent(each, pairing, positions).toarray())
-        assert pairs[0] == pairs[1]
-        assert forces[1][: z.size].tobytes() == forces[0].tobytes()
-        assert not forces[1][z.size :].any()
-        assert tangents[1][: z.size, : z.size].tobytes() == tangents[0].tobytes()
-        assert not tangents[1][z.size :].any()
-        assert not tangents[1][:, z.size :].any()
-        touching += int(np.abs(forces[0]).max() > 0)
-    assert touching == 24
-
-
 Counts = tuple[int, int]
 
 

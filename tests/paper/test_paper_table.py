@@ -14,10 +14,8 @@ from subjects import load_property, load_subject
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.property import Verdict
 from contactverif.mechanics import newton
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
-from contactverif.problems.blocks import two_blocks
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif.run.judge import judge_case
 
@@ -115,14 +113,3 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
     assert outcome.measurement is not None
     beyond = {key for key, value in outcome.measurement.values.items() if value > outcome.measurement.tolerances[key]}
     assert beyond == {"multiplier error"}
-
-
-def test_vts_ppt_with_eight_slave_on_two_master_segments_has_seven_multipliers_too_many() -> None:
-    grid = np.linspace(0, 8, 9)
-    scene = two_blocks(Rectangle(grid, [4, 8]), Rectangle([0, 4, 8], [0, 4]), penalty=10.0, pressure=1.0)
-    subject = load_subject("vts-ppt-lm")
-    question = load_property("multipliers.rank")
-    outcome = judge_case(question, scene.case(), subject)
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
-    assert outcome.measurement.values == {"redundant multipliers": 7.0}

@@ -12,7 +12,7 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from contactverif import Interface
 from contactverif.contract.interface import Surface
 from contactverif.geometry.projection import search_tree
-from contactverif_mortar import mortar, mortar_dual, sts
+from contactverif_mortar import sts
 from contactverif_mortar.cell_geometry import SlaveView
 from contactverif_mortar.cell_search import overlap
 from contactverif_mortar.integration_cells import GAP, WEIGHT, C, Cells, Quadrature
@@ -135,28 +135,6 @@ def test_what_faces_away_or_stands_edge_on_is_no_cell() -> None:
         interface = Interface.from_chains([[0.0, 0], [2, 0]], master)
         assert not len(cells_at(interface, interface.nodes)[0].slave)
         assert not contact_forces(sts(penalty=1.0), interface, interface.nodes.ravel()).any()
-
-
-@pytest.mark.parametrize("make", [sts, mortar, mortar_dual])
-def test_chains_far_away_change_nothing_bitwise(make: Any) -> None:
-    random = np.random.default_rng(2)
-    formulation = make(penalty=3.0)
-    for seed in range(20):
-        near, z = make_bent(seed)
-        x, n = z.reshape(-1, 2), near.n_slave_nodes
-        far = np.cumsum(random.uniform(1, 50, (30, 2)), axis=0)[::-1] + [500, 300]
-        whole = in_two_chains(x[:n], x[n:], far)
-        all_positions = np.vstack([x, far]).ravel()
-        first, other = formulation.pair(near, z), formulation.pair(whole, all_positions)
-        assert first == other
-        assert np.array_equal(
-            np.append(formulation.residual(near, first, z), np.zeros(60)),
-            formulation.residual(whole, other, all_positions),
-        )
-        assert np.array_equal(
-            formulation.tangent(near, first, z).toarray(),
-            formulation.tangent(whole, other, all_positions).toarray()[: z.size, : z.size],
-        )
 
 
 def test_a_corner_keeps_its_own_normals_and_a_facet_has_an_averaged_one() -> None:

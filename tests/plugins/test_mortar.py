@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,8 @@ import pytest
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 from contactverif import Interface
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.problems.catalogue import load_scene
-from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
+from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.integration_cells import WEIGHT, C, Cells, Quadrature
 from contactverif_mortar.weighted_gaps import UNCOVERED
@@ -145,16 +141,6 @@ def test_uniform_multipliers_give_the_consistent_forces(make: Callable[..., Any]
         assert np.abs(forces[:, 1]) == pytest.approx(uniform_pressure_weights(interface, z[::2]), abs=1e-14)
 
 
-@pytest.mark.parametrize("name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"])
-@pytest.mark.parametrize("make", [mortar_lm, mortar_dual_lm])
-def test_the_paper_s_scenes_have_uniform_multipliers(make: Callable[..., Any], name: str) -> None:
-    trace = solve(scene := load_scene(name), Subject("", make).with_penalty(scene.penalty))
-    assert trace.converged
-    assert trace.deficiency == 0
-    pressure = 1.0 if name.startswith("example") else 100.0
-    assert trace.multipliers == pytest.approx(pressure, rel=1e-10)
-
-
 def make_kinked(n_slave: int, n_master: int) -> Interface:
     """Two surfaces that lie on each other, with nodes of both at the kinks and none together in between."""
     corners = np.array([[0.0, 0.0], [2, 0], [4, 1], [6, 0.25], [8, 0.25]])
@@ -195,44 +181,6 @@ def test_averaged_normals_differ_on_bent_surfaces_and_not_on_flat_ones() -> None
         )
         differs += not np.allclose(first, other, rtol=1e-3)
     assert differs > 15
-
-
-@pytest.mark.parametrize(
-    "formulation",
-    [sts(penalty=8.0), mortar(penalty=8.0), mortar_dual(penalty=8.0), mortar(penalty=8.0, normals="averaged")],
-    ids=["sts", "mortar", "mortar_dual", "averaged"],
-)
-def test_forces_do_not_jump_while_a_slave_slides_over_bent_vertices(formulation: Any) -> None:
-    assert formulation.traits.promises.continuity in ("C0", None)  # None: with averaged normals not on coarse rings
-    changes, worst = 0, 0.0
-    for seed in range(4):
-        random = np.random.default_rng(seed)
-        upper, lower = (np.cumsum(random.uniform(0.5, 1.5, n)) for n in (5, 9))
-        slave = np.column_stack([upper, -0.3 + 0.06 * random.normal(size=5)])
-        master = np.column_stack([lower - 2.5, 0.08 * random.normal(size=9)])[::-1]
-        interface = Interface.from_chains(slave, master)
-        way = np.zeros(interface.n_unknowns)
-        way[:10:2], way[1:10:2] = 1.0, 0.03
-
-        def at(place: float, interface: Interface = interface, way: Any = way) -> tuple[Any, Any]:
-            z = interface.nodes.ravel() + place * way
-            pairing = formulation.pair(interface, z)
-            return pairing, formulation.residual(interface, pairing, z)
-
-        places = np.linspace(-1, 1, 101)
-        for low, high in pairwise(places.tolist()):
-            before, after = at(low), at(high)
-            if before[0] == after[0]:
-                continue
-            while low < (middle := (low + high) / 2) < high:
-                here = at(middle)
-                low, before, high, after = (
-                    (middle, here, high, after) if here[0] == before[0] else (low, before, middle, here)
-                )
-            changes += 1
-            worst = max(worst, np.abs(after[1] - before[1]).max() / np.abs(before[1]).max())
-    assert changes > 20
-    assert worst < 1e-13
 
 
 def test_a_node_that_is_covered_by_roundoff_alone_is_not() -> None:

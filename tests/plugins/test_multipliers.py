@@ -161,16 +161,6 @@ def error_of(trace: Trace) -> float:
 
 
 @pytest.mark.parametrize(
-    "scene_name", ["a1", "a2-uniform", "a2-graded", "b", "c", "c-prime", "example-1", "example-1bis"]
-)
-def test_vts_me_finds_the_uniform_stress_but_in_one_scene(scene_name: str) -> None:
-    trace = solve_scene("vts_me_lm", make_scene(scene_name, pressure=PRESSURE))
-    assert trace.converged
-    error = error_of(trace)
-    assert error > 1e-2 if scene_name == "example-1bis" else error < ROUNDOFF
-
-
-@pytest.mark.parametrize(
     ("name", "options", "deficiency"),
     [("vts_ppt_lm", {}, 7), ("vts_me_lm", {}, 7), ("vts_ppt_lm", {"n": 1}, 0), ("nts_lm", {}, 0)],
 )

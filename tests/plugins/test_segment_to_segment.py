@@ -1,4 +1,4 @@
-"""Segment-to-segment and all that integrates over the same cells: exact forces, contact points, the dead zone."""
+"""Segment-to-segment and all that integrates over the same cells: exact forces, and contact points."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 import contactverif_mortar
 from contactverif import Interface, MisuseError
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
 
@@ -106,35 +102,6 @@ def test_surfaces_that_touch_exactly_are_in_contact(name: str, options: dict[str
     interface, _ = make_flat([2, 2], [3, 1])
     n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
     assert formulation.pair(interface, np.append(interface.nodes, np.zeros(n)))["active"].all()
-
-
-SLAVE, MASTER = [-6, -4.4, -2.1, -0.3, 1.9, 4, 6], [-3.3, -1.6, 0.4, 2.2, 3.3]
-
-
-@pytest.mark.parametrize("degrees", [0, 17])
-@pytest.mark.parametrize("name", ["sts", "mortar", "mortar_dual", "mortar_lm", "mortar_dual_lm"])
-def test_the_dead_zone_is_passed(name: str, degrees: int) -> None:
-    """A slave that overhangs the master inside its segments, p on all that overhangs: the stress is uniform."""
-    stress = dead_zone(getattr(contactverif_mortar, name), degrees)
-    assert stress <= (3e-14 if degrees == 0 else 3e-13)  # turned, Newton ends within some roundoffs of 1e4 × positions
-
-
-def test_nodal_gaps_fail_in_the_dead_zone() -> None:
-    assert dead_zone(contactverif_mortar.chen_hisada, 0) > 0.1
-
-
-def dead_zone(make: Any, degrees: float) -> float:
-    axis = [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
-    placing = Placing((float(axis[0]), float(axis[1])))
-    slave = Rectangle(SLAVE, np.linspace(0, 4, 4), young=1e3, poisson=0.3)
-    master = Rectangle(MASTER, np.linspace(-4, 0, 4), young=1e3, poisson=0.3)
-    upper = block(slave, contact="bottom", pressure=1.0, contact_range=(-3.3, 3.3), placing=placing)
-    lower = block(master, contact="top", approach=0.0, placing=placing)
-    scene = Scene((upper, lower))
-    trace = solve(scene, Subject("", make).with_penalty(1e4))
-    assert trace.converged
-    exact = [-3 / 7, -1.0, 0.0]
-    return max(float(np.abs(stress - exact).max()) for stress in scene.stresses(trace.q[-1]))
 
 
 @pytest.mark.parametrize("name", ["sts", "mortar", "mortar_dual"])

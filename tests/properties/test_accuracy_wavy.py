@@ -29,10 +29,6 @@ def _case(question: Property, name: str) -> Case:
     return next(case for case in question.cases(None) if case.name == name)
 
 
-def _verdict(question: Property, name: str, subject: Subject) -> Verdict:
-    return judge_case(question, _case(question, name), subject).verdict
-
-
 @pytest.mark.parametrize(
     ("question", "names"), [(accuracy_wavy, NAMES + CONTRAST_NAMES), (accuracy_wavy_curved, CURVED_NAMES)]
 )

@@ -11,8 +11,6 @@ from strangers import SlaveNormalAtGaussPoints
 from subjects import load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
-import contactverif_mortar
-import contactverif_nts
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.property import Verdict
@@ -62,12 +60,6 @@ def test_a_stranger_that_pushes_along_the_slave_is_continuous(make: Callable[...
         assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
-@pytest.mark.parametrize("name", ["nts", "vts-g", "vts-ppt", "vts-ppt-balanced", "two-pass/nts-ar"])
-def test_forces_along_the_master_jump(name: str) -> None:
-    verdicts = [judge_case(continuity, case, load_subject(name)).verdict for case in cases(20)]
-    assert verdicts.count(Verdict.FAIL) >= 10
-
-
 def test_the_size_and_the_place_of_a_jump_are_found() -> None:
     """The middle node of the slave passes the roof at 2.25 after 0.39 of its way: its force turns by both slopes."""
     measurement = continuity.measure(named_case("sliding"), load_subject("nts"))
@@ -89,18 +81,3 @@ def test_jumps_of_a_function_are_told_from_its_slope() -> None:
     jumps = find_jumps(function, samples, 20, 2.0**-12)
     sizes = {round(place, 4): size for place, size in jumps if size > 1e-3}
     assert sizes == {0.77: pytest.approx(4e-2, rel=1e-2), 0.3: pytest.approx(2e-2, rel=1e-2)}
-
-
-@pytest.mark.parametrize(
-    ("make", "promise", "quantity"),
-    [
-        (contactverif_nts.vts_ppt_balanced, "C0", "jump of a force"),
-        (contactverif_mortar.sts, "C1", "jump of a slope"),
-        (contactverif_mortar.mortar, "C1", "jump of a slope"),
-    ],
-)
-def test_a_promise_of_too_much_smoothness_is_found_out(make: Callable[..., Any], promise: str, quantity: str) -> None:
-    boaster = with_promises(make, continuity=promise)
-    reasons = [outcome.reason for case in cases(25) if (outcome := judge_case(continuity, case, boaster)).reason]
-    assert reasons
-    assert all(quantity in reason for reason in reasons)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from handles import Handled, HidesNumbers, ReusesItsHandle, WrongTangent
-from subjects import load_property
+from handles import Handled
 
 import contactverif_mortar
 import contactverif_nts
@@ -33,15 +30,6 @@ def test_a_right_formulation_with_a_handle_is_not_accused(name: str) -> None:
     result = run([subject], load_properties(PROPERTIES), examples=5, seed=3)
     bad = (Verdict.FAIL, Verdict.CRASHED)
     assert not [(row.property_id, row.reason) for row in result.rows if row.verdict in bad and row.promise is not False]
-
-
-@pytest.mark.parametrize(
-    ("make", "property_id"),
-    [(WrongTangent, "tangent.directional"), (HidesNumbers, "tangent.directional"), (ReusesItsHandle, "purity")],
-)
-def test_what_is_wrong_behind_a_handle_is_found(make: Any, property_id: str) -> None:
-    result = run([Subject("wrong", make)], [load_property(property_id)], examples=8, seed=5)
-    assert [row.verdict for row in result.rows] == [Verdict.FAIL]
 
 
 def test_the_harness_pairs_at_each_state_that_it_asks() -> None:

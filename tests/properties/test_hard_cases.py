@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numpy as np
 import pytest
 from hard_strangers import PointSprings, Softened, simpson, trapezoid
 from subjects import load_property, load_subject, with_promises
@@ -19,7 +18,6 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
-from contactverif.run.run import run
 from contactverif_properties.hard_solved import covered_share
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]
@@ -57,16 +55,6 @@ def test_a_right_formulation_by_a_stranger_is_not_accused(name: str, property_id
     outcomes = [judge_case(question, case, stranger) for case in question.cases(None)]
     assert {outcome.reason for outcome in outcomes if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)} == set()
     assert sum(outcome.decided for outcome in outcomes) >= 0.9 * len(outcomes)
-
-
-def test_all_named_cases_run_whatever_the_number_of_examples() -> None:
-    (row,) = run([load_subject("vts-ppt-balanced")], [load_property("hard.search")], examples=1, seed=3).rows
-    assert (row.planned, row.judged, row.verdict) == (14, 14, Verdict.PASS)
-
-
-def test_who_does_not_see_a_segment_on_edge_is_not_accused() -> None:
-    (row,) = run([load_subject("vts-ppt-balanced")], [load_property("hard.steep-slave")], seed=0).rows
-    assert row.verdict is Verdict.PASS, row.reason
 
 
 @pytest.mark.parametrize("property_id", HARD)
@@ -115,13 +103,6 @@ def test_a_gap_of_one_step_is_undecided_without_that_promise() -> None:
 
 
 # --- the search ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["mortar", "mortar-dual-lm", "chen-hisada", "sts"])
-def test_a_body_behind_a_node_of_the_first_is_not_touched(name: str) -> None:
-    """The middle of the overlap with the body behind is over a node of the plate in front of it."""
-    outcome = judge_named("hard.search", "a second body behind the first", load_subject(name))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
 
 
 # --- ends and overlaps --------------------------------------------------------------------------------------------
@@ -174,18 +155,6 @@ def test_the_covered_share_is_that_of_the_last_segment() -> None:
 
 
 # --- touch --------------------------------------------------------------------------------------------------------
-
-
-def test_a_normal_over_a_distance_of_zero_is_no_number() -> None:
-    class Naive(PointSprings):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            x = z.reshape(-1, 2)
-            arms = x[: interface.n_slave_nodes, None] - x[None, interface.n_slave_nodes :]
-            distance = np.hypot(arms[..., 0], arms[..., 1]).min()
-            return super().residual(interface, pairing, z) * (distance / distance)
-
-    naive = Subject("naive", lambda *, penalty: Naive(penalty, places=(0.0, 1.0)))
-    assert judge_named("hard.touch", "gap 0, 0.00° to 1.08°", naive).breach
 
 
 def test_without_a_load_a_law_that_is_not_linear_is_not_accused() -> None:

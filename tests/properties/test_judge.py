@@ -69,15 +69,6 @@ def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) ->
     assert outcome.measurement.values[FORCE.name] == pytest.approx(error * size / 4, rel=1e-3)
 
 
-def test_forces_the_wrong_way_and_no_forces_are_seen() -> None:
-    class Wrong(Exact):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return -super().residual(interface, pairing, z)
-
-    assert judge_case(patch_flat_transmission, named_case("a1"), subject(Wrong)).verdict is Verdict.FAIL
-    assert judge_case(patch_flat_transmission, named_case("a1"), subject(Handmade)).verdict is Verdict.FAIL
-
-
 def test_states_that_penetrate_are_not_for_barriers() -> None:
     """A barrier is not defined there, and would be accused of its NaN. Multipliers are asked nearly everything."""
     traits = Traits(

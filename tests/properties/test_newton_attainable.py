@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from subjects import Changed, load_subject
+from subjects import load_subject
 
-import contactverif_nts
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
 from contactverif.mechanics.changed_scenes import snap
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.judge import judge_case
 from contactverif_properties.newton_attainable import (
-    ADDED,
-    ERROR,
     OFFSETS,
-    RESIDUAL,
     examine,
     newton_attainable,
     settle,
@@ -30,35 +21,11 @@ from contactverif_properties.newton_attainable import (
 SCENE = "c-prime:penalty=1e4"
 
 
-def make_far_rounding(*, penalty: float) -> Any:
-    """VTS-ME that subtracts the first node's position only after it was rounded a second time, far from the origin."""
-    inner = contactverif_nts.vts_me(penalty=penalty)
-
-    def residual(interface: Any, pairing: Any, z: Any) -> Any:
-        return inner.residual(interface, pairing, (z / 3) * 3)
-
-    return Changed(inner, residual=residual, traits=inner.traits.revise(translation_stable=True))
-
-
-@pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-me"])
-def test_differences_first_attain_what_stored_positions_allow(name: str) -> None:
-    measurement = newton_attainable.measure(load_scene_case(SCENE), load_subject(name))
-    assert measurement.values[ADDED.name] <= 1.0
-    assert 0 < measurement.values[RESIDUAL.name] <= 1.0
-    assert 0 < measurement.values[ERROR.name] <= 1.0
-
-
 def test_the_error_of_the_solution_grows_with_the_way() -> None:
     details = newton_attainable.measure(load_scene_case(SCENE), load_subject("nts")).details
     errors = [details[f"error over the shortest segment at 2^{power}"] for power in OFFSETS]
     assert errors[-1] > 1e3 * errors[0]
     assert errors[-1] < 1e-8
-
-
-def test_a_position_that_is_rounded_far_from_the_origin_is_told() -> None:
-    outcome = judge_case(newton_attainable, load_scene_case(SCENE), Subject("far", make_far_rounding))
-    assert outcome.verdict is Verdict.FAIL
-    assert ADDED.name in outcome.reason
 
 
 def test_who_promises_nothing_breaks_nothing() -> None:

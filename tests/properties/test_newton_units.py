@@ -73,19 +73,6 @@ def test_another_pairing_in_other_units_is_told_in_words() -> None:
     assert any("the pairing is another one in other units" in outcome.reason for outcome in outcomes)
 
 
-def test_a_stiffness_with_a_unit_is_told_by_the_steps() -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.nts(penalty=penalty)
-
-        def tangent(interface: Any, pairing: Any, z: Any) -> Any:
-            return inner.tangent(interface, pairing, z).toarray() + np.eye(z.size)
-
-        return Changed(inner, tangent=tangent)
-
-    outcomes = [judge_case(newton_units, case, Subject("guard", make)) for case in draw(10)]
-    assert any(STEPS.name in outcome.reason for outcome in outcomes)
-
-
 def test_who_does_not_state_the_unit_of_its_penalty_is_not_asked() -> None:
     assert "unit is unknown" in newton_units.refusal(Traits())
     assert "not independent" in newton_units.refusal(load_subject("vts-ppt-lm").traits)

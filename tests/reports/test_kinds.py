@@ -108,13 +108,6 @@ def test_a_report_without_kinds_is_read(tmp_path: Path) -> None:
     assert run.rows[0].outcomes[0].summary.kind == ""
 
 
-def test_the_kind_of_a_counterexample_comes_back(tmp_path: Path) -> None:
-    write(run_with_kinds(), tmp_path / "report.nc")
-    shrunk = read_run(tmp_path / "report.nc").rows[3].shrunk
-    assert shrunk is not None
-    assert shrunk.case.kind == "inside a segment"
-
-
 @pytest.mark.parametrize(
     ("share", "words"), [(0.0, "0 %"), (1e-6, "0.1 %"), (0.1234, "12.3 %"), (0.9999, "99.9 %"), (1.0, "100 %")]
 )
