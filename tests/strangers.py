@@ -69,21 +69,8 @@ class PointsFirst:
         place, gap = xi[rows, master], gaps[rows, master]
         free = interface.master.neighbours[master] < 0
         active = (gap <= 0) & ~(free[:, 0] & (place < 0)) & ~(free[:, 1] & (place > 1))
-        nothing = np.full(len(c), np.nan)
-        return ContactPoints(
-            slave_segment=carrier,
-            c=c,
-            master_segment=master,
-            xi=place,
-            position=point,
-            normal=normals[master],
-            gap=gap,
-            pressure=np.where(active, -self.penalty * gap, 0.0),
-            weight=weight,
-            active=active,
-            area_from=nothing,
-            area_to=nothing,
-        )
+        pressure, ends = np.where(active, -self.penalty * gap, 0.0), np.full((2, len(c)), np.nan)
+        return ContactPoints(carrier, c, master, place, point, normals[master], gap, pressure, weight, active, *ends)
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         points, forces = self.contact_points(interface, pairing, z), np.zeros((interface.n_nodes, 2))
@@ -143,21 +130,9 @@ class SlaveNormalAtGaussPoints(PointsFirst):
         m = master[here]
         gaps = gap[here, m]
         active = gaps < 0
-        nothing = np.full(len(here), np.nan)
-        return ContactPoints(
-            slave_segment=carrier[here],
-            c=c[here],
-            master_segment=m,
-            xi=xi[here, m],
-            position=point[here],
-            normal=normal[here],
-            gap=gaps,
-            pressure=np.where(active, -self.penalty * gaps, 0.0),
-            weight=weight[here],
-            active=active,
-            area_from=nothing,
-            area_to=nothing,
-        )
+        pressure, ends = np.where(active, -self.penalty * gaps, 0.0), np.full((2, len(here)), np.nan)
+        places = (carrier[here], c[here], m, xi[here, m], point[here], normal[here])
+        return ContactPoints(*places, gaps, pressure, weight[here], active, *ends)
 
 
 class NearbyOnly(PointsFirst):

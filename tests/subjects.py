@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from contactverif.contract.case import Case
@@ -51,6 +51,26 @@ class Changed:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.inner, name)
+
+
+def change_verbs(inner: Any, **changes: Callable[..., Any]) -> Changed:
+    """Return a formulation of which some verbs are answered by `change(right, *arguments)`; `right` is its own verb."""
+    return Changed(inner, **{verb: partial(change, getattr(inner, verb)) for verb, change in changes.items()})
+
+
+class ResidualAlone:
+    """A formulation that pairs at each state of its residual, and has no other verb."""
+
+    def __init__(self, inner: Any) -> None:
+        self.inner, self.traits = inner, inner.traits.revise(batched=False, tangent=None)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return self.inner.residual(interface, self.inner.pair(interface, z), z)
+
+
+def alone(name: str) -> Subject:
+    """Return the residual of an installed formulation, which shall do without the other verbs."""
+    return Subject("alone", lambda *, penalty: ResidualAlone(load_subject(name).with_penalty(penalty).plugin))
 
 
 def reporting(change: Callable[[Any], Any], make: Callable[..., Any]) -> Subject:

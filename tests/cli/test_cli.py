@@ -152,14 +152,6 @@ def test_a_mistake_in_a_replay_is_one_line(ask: Ask, nts_report: Path, options: 
     check_mistake(answer, message)
 
 
-def test_a_mistake_in_a_process_of_its_own_has_no_traceback() -> None:
-    for arguments in (["verify", "nope"], ["verify", "nts", "--out", "/no/such/folder/r.nc"], ["replay", "no.nc"]):
-        finished = subprocess.run(command(*arguments), env=environment(), capture_output=True, text=True, check=False)
-        assert (finished.returncode, finished.stdout) == (2, "")
-        assert finished.stderr.startswith("contactverif: ")
-        assert finished.stderr.count("\n") == 1
-
-
 def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask, tmp_path: Path) -> None:
     """Without cells nobody knows on which side the base lies; --flip says that it is the other one."""
     mesh = meshio.read(PUNCH)

@@ -99,17 +99,6 @@ def test_what_cannot_be_is_one_line(
     assert not list(tmp_path.glob("*.html"))
 
 
-def test_a_netcdf_file_of_something_else(ask: Ask, tmp_path: Path) -> None:
-    import netCDF4
-
-    path = tmp_path / "other.nc"
-    with netCDF4.Dataset(path, "w") as file:
-        file.title = "temperatures"
-    answer = ask("report", path)
-    assert answer.status == 2
-    assert "a netCDF file of something else" in answer.err
-
-
 def test_what_a_report_names_is_said_before_it_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert announce_stored("two-pass/vts-me:n=4,area=reference") == "two-pass/vts-me:n=4,area=reference"
     words = "the report names the formulation two-pass/vts-me, n = 4, area = 'reference'\n"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from asking import Ask, check_mistake
 from handmade_run import run_with
-from subjects import load_subject
+from subjects import Changed, load_subject
 
 from contactverif.cli import scene_drawing
 from contactverif.cli.gallery import MEANINGS
@@ -191,27 +191,12 @@ def test_a_formulation_that_cannot_be_asked_is_a_line(
     assert not (tmp_path / "none.png").exists()
 
 
-class WrongTangent:
-    """VTS-PPT with a tangent of the wrong sign, so that Newton's method diverges."""
-
-    def __init__(self, penalty: float) -> None:
-        subject = load_subject("vts-ppt")
-        self.right = subject.with_penalty(penalty).plugin
-
-    def pair(self, interface: Any, z: Any) -> Any:
-        return self.right.pair(interface, z)
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self.right.residual(interface, pairing, z)
-
-    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return -1e4 * np.eye(z.size)
-
-
 def test_draw_says_what_to_try_where_newtons_method_diverges(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    diverging = Subject("mine", lambda *, penalty: WrongTangent(penalty))
+    plugin = load_subject("vts-ppt").with_penalty(1e4).plugin
+    plugin = Changed(plugin, tangent=lambda *state: -1e4 * np.eye(state[-1].size))
+    diverging = Subject("mine", lambda *, penalty: plugin)
     monkeypatch.setattr(scene_drawing, "load_formulation", lambda name, limits: diverging)
     answer = ask("draw", "--scene", "c", "-f", "mine", "--out", tmp_path / "c.svg", columns=80)
     assert answer.status == 0

@@ -92,20 +92,9 @@ def test_points_count_with_their_own_weights_and_idle_ones_carry_nothing() -> No
 
 def _points(pressure: Any, weight: Any, active: Any) -> ContactPoints:
     n = len(pressure)
-    return ContactPoints(
-        slave_segment=np.zeros(n, np.int64),
-        c=np.zeros(n),
-        master_segment=np.zeros(n, np.int64),
-        xi=np.zeros(n),
-        position=np.zeros((n, 2)),
-        normal=np.zeros((n, 2)),
-        gap=np.zeros(n),
-        pressure=np.array(pressure),
-        weight=np.array(weight),
-        active=np.array(active),
-        area_from=np.zeros(n),
-        area_to=np.zeros(n),
-    )
+    segment, zero, place = np.zeros(n, np.int64), np.zeros(n), np.zeros((n, 2))
+    numbers = (np.array(pressure), np.array(weight), np.array(active))
+    return ContactPoints(segment, zero, segment, zero, place, place, zero, *numbers, zero, zero)
 
 
 def test_a_rate_is_fitted_to_errors_above_the_floor() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import skfem
-from subjects import load_subject
+from subjects import Changed, load_subject
 
 from contactverif import oracle
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
@@ -18,7 +18,6 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import Subject
 from contactverif.geometry import chain_search, projection
 from contactverif.geometry.compiled import python_function
@@ -333,33 +332,29 @@ def test_a_body_out_of_reach_that_nothing_holds() -> None:
 # --- far away ---------------------------------------------------------------------------------------------------
 
 
-class Counting:
-    """A formulation that notes its calls, and how large the pairings are."""
-
-    def __init__(self, inner: Any, calls: list[tuple[Any, ...]]) -> None:
-        self.inner, self.calls = inner, calls
-        self.traits = inner.traits
-
-    def pair(self, interface: Interface, z: Any) -> Pairing:
-        pairing: Pairing = self.inner.pair(interface, z)
-        sizes = [(name, values.size) for name, values in sorted(pairing.items())]
-        self.calls.append(("pair", len(interface.slave), len(interface.master), z.size, *sizes))
-        return pairing
-
-    def residual(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
-        self.calls.append(("residual", z.shape))
-        return self.inner.residual(interface, pairing, z)
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
-        tangent = self.inner.tangent(interface, pairing, z)
-        self.calls.append(("tangent", tangent.shape, tangent.nnz))
-        return tangent
-
-
 def count_calls(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
+    """Return a formulation that notes its calls and how large its answers are, and these notes."""
     calls: list[tuple[Any, ...]] = []
-    inner = load_subject(name)
-    return Subject(name, lambda *, penalty: Counting(inner._make(penalty=penalty), calls)), calls
+
+    def make(*, penalty: float) -> Changed:
+        plugin = load_subject(name)._make(penalty=penalty)
+
+        def note(verb: str, size: Callable[[Any], Any]) -> Callable[..., Any]:
+            def call(*arguments: Any) -> Any:
+                answer = getattr(plugin, verb)(*arguments)
+                calls.append((verb, size(answer)))
+                return answer
+
+            return call
+
+        return Changed(
+            plugin,
+            pair=note("pair", lambda pairing: {key: values.size for key, values in pairing.items()}),
+            residual=note("residual", np.shape),
+            tangent=note("tangent", lambda matrix: (matrix.shape, matrix.nnz)),
+        )
+
+    return Subject(name, make), calls
 
 
 def with_a_far_body(scene: Scene, role: str) -> Scene:

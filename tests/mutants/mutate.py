@@ -12,10 +12,14 @@ import re
 import sys
 import types
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from subjects import Changed, change_verbs, with_promises
+
 import contactverif_nts
+from contactverif import Pairing
 
 PACKAGE = "contactverif_nts"
 # The modules of the copy, in the order in which they import each other.
@@ -80,38 +84,48 @@ def changed_line(
     return mutant
 
 
-class Wrapped:
-    """A formulation (by default the balanced VTS-PPT) with some verbs replaced by those of `verbs`."""
+def wrap(
+    penalty: float, make: Callable[..., Any] = contactverif_nts.vts_ppt_balanced, **changes: Callable[..., Any]
+) -> Changed:
+    """Return a formulation (by default the balanced VTS-PPT) with verbs that are changed as by `change_verbs`."""
+    return change_verbs(make(penalty=penalty), **changes)
 
-    def __init__(
-        self,
-        penalty: float,
-        make: Callable[..., Any] = contactverif_nts.vts_ppt_balanced,
-        **verbs: Callable[..., Any],
-    ) -> None:
-        self._inner = make(penalty=penalty)
-        if hasattr(self._inner, "n_multipliers"):
-            self.n_multipliers = self._inner.n_multipliers
-        self._verbs = verbs
-        self.traits = self._inner.traits
 
-    def pair(self, interface: Any, z: Any) -> Any:
-        return self._answer("pair", interface, z)
+def decides(make: Callable[..., Any], change: Callable[..., Any], **changes: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the factory of a formulation whose active points are those of `change(pairing, interface)`."""
 
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._answer("residual", interface, pairing, z)
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        pairing = right(interface, z)
+        return Pairing({**pairing, "active": change(pairing, interface)})
 
-    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._answer("tangent", interface, pairing, z)
+    return lambda *, penalty: wrap(penalty, make, pair=pair, **changes)
 
-    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._answer("contact_points", interface, pairing, z)
 
-    def _answer(self, verb: str, *arguments: Any) -> Any:
-        right = getattr(self._inner, verb)
-        return self._verbs[verb](right, *arguments) if verb in self._verbs else right(*arguments)
+def whole_segments(pairing: Any, interface: Any) -> Any:
+    """Return that all points of a slave segment are active as soon as one of them is."""
+    closed = np.zeros(len(interface.slave), dtype=bool)
+    closed[pairing["segment"][pairing["active"]]] = True
+    return closed[pairing["segment"]] & (pairing["master"] >= 0)
+
+
+def says(make: Callable[..., Any], **promises: Any) -> Callable[..., Any]:
+    """Return the factory of a right formulation that promises more than it keeps."""
+    return with_promises(make, **promises)._make
+
+
+def reports(make: Callable[..., Any], change: Callable[..., dict[str, Any]]) -> Callable[..., Any]:
+    """Return the factory of a formulation that computes the right thing and reports other arrays.
+
+    They are those of `change(points, interface, x)`; positions x (n_nodes, 2).
+    """
+
+    def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        points = right(interface, pairing, z)
+        return replace(points, **change(points, interface, z[: interface.n_unknowns].reshape(-1, 2)))
+
+    return lambda *, penalty: wrap(penalty, make, contact_points=contact_points)
 
 
 def replaces(verb: str, make: Callable[..., Any] = contactverif_nts.vts_ppt_balanced) -> Callable[..., Any]:
     """Decorate `change(right, *arguments)`, which answers one verb; return the factory of the wrong formulation."""
-    return lambda change: lambda *, penalty: Wrapped(penalty, make, **{verb: change})
+    return lambda change: lambda *, penalty: wrap(penalty, make, **{verb: change})

@@ -6,10 +6,11 @@ Their tangents are exact, and action equals reaction.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, replaces
+from mutate import Mutant, decides, replaces, says, whole_segments
 from wrong_invariants import Look, make_factored
 
 import contactverif_mortar
@@ -46,25 +47,11 @@ def _reports_a_fifth_less(right: Any, interface: Any, pairing: Any, z: Any) -> C
     return replace(points, pressure=np.where(abs(sine) > LEAST_TURN, 0.8, 1.0) * points.pressure)
 
 
-def _says_that_kinks_pass(*, penalty: float) -> Any:
-    """Make a mortar method with normals averaged over kinks that promises to pass at them."""
-    inner = contactverif_mortar.mortar(penalty=penalty, normals="averaged")
-    return replace(inner, traits=inner.traits.revise(kinked=True, witnesses={}))
-
-
-@replaces("pair", contactverif_nts.vts_g)
-def _whole_segments(right: Any, interface: Any, z: Any) -> Any:
-    """Make VTS-G, in which all points of a slave segment press as soon as one of them penetrates."""
-    pairing = dict(right(interface, z))
-    segments, on_master = pairing["segment"], pairing["master"] >= 0
-    closed = np.bincount(segments[pairing["active"]], minlength=len(interface.slave)) > 0
-    return {**pairing, "active": closed[segments] & on_master}
-
-
 MUTANTS = (
     make_factored("springs a quarter as stiff where the slave bends", CURVED, _quarter_where_the_slave_bends),
     make_factored("springs softer by the square of depth over radius", ARC, _less_by_depth_over_radius),
     Mutant("pressures reported a fifth too small off the parallel", ARC, _reports_a_fifth_less),
-    Mutant("normals averaged over kinks said to pass there", KINKED, _says_that_kinks_pass),
-    Mutant("whole slave segments in contact", "projection.activity", _whole_segments),
-)
+    Mutant("normals averaged over kinks said to pass there", KINKED,
+           says(partial(contactverif_mortar.mortar, normals="averaged"), kinked=True, witnesses={})),
+    Mutant("whole slave segments in contact", "projection.activity", decides(contactverif_nts.vts_g, whole_segments)),
+)  # fmt: skip

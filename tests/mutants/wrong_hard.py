@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped, replaces
+from mutate import Mutant, replaces, wrap
 
 import contactverif_nts
 from contactverif import Pairing
@@ -30,7 +30,7 @@ def _leaves_out(drop: Keep, make: Any = contactverif_nts.vts_ppt_balanced) -> An
             x = z[: interface.n_unknowns].reshape(-1, 2)
             return Pairing({**pairing, "active": pairing["active"] & ~drop(interface, x, points)})
 
-        return Wrapped(penalty, make, pair=pair)
+        return wrap(penalty, make, pair=pair)
 
     return mutant
 
@@ -75,7 +75,7 @@ def _rounds_positions(bits: int, scale: Callable[[Any], float]) -> Any:
             grid = scale(z) * 2.0**-bits
             return right(interface, pairing, np.round(z / grid) * grid)
 
-        return Wrapped(penalty, residual=residual)
+        return wrap(penalty, residual=residual)
 
     return mutant
 
@@ -91,7 +91,7 @@ def _moves_nodes(move: Callable[[Any, Any], Any], make: Any = contactverif_nts.v
         return moved
 
     def mutant(*, penalty: float) -> Any:
-        return Wrapped(
+        return wrap(
             penalty,
             make,
             pair=lambda right, interface, z: right(interface, with_moved_nodes(interface, z)),
@@ -132,7 +132,7 @@ def _divides_by_the_distance(*, penalty: float) -> Any:
             unit = gap[~np.isnan(gap)] / gap[~np.isnan(gap)]
         return right(interface, pairing, z) * (unit.mean() if len(unit) else 1.0)
 
-    return Wrapped(penalty, contactverif_nts.vts_me, residual=residual)
+    return wrap(penalty, contactverif_nts.vts_me, residual=residual)
 
 
 @replaces("residual", contactverif_nts.nts_ar)
@@ -161,7 +161,7 @@ def _counts_twice(make: Any, double: Keep) -> Any:
             twice = double(interface, state[: interface.n_unknowns].reshape(-1, 2), points)
             return right(interface, pairing, z) * (2.0 if twice.any() else 1.0)
 
-        return Wrapped(penalty, make, residual=residual)
+        return wrap(penalty, make, residual=residual)
 
     return mutant
 

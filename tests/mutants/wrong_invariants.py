@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mutate import Mutant
-from subjects import Changed
+from mutate import Mutant, says
 
 import contactverif_mortar
 import contactverif_nts
@@ -154,16 +153,6 @@ class OneAndAHalfPasses:
         return sum(tangent.toarray() for tangent in tangents)
 
 
-def _says(make: Any, **traits: Any) -> Any:
-    """Return a right formulation that promises more than it keeps."""
-
-    def boast(*, penalty: float) -> Any:
-        inner = make(penalty=penalty)
-        return Changed(inner, traits=inner.traits.revise(**traits))
-
-    return boast
-
-
 class ForcesAlone:
     """The forces of NTS-AR, without a tangent, said to have a potential."""
 
@@ -176,13 +165,13 @@ class ForcesAlone:
 MUTANTS = (
     make_factored("pressure that falls with the tilt", RESULTANT, _cosine_of_tilt_squared, integrates_linear_gap=None),
     Mutant("quarter points said to integrate a linear gap", DISTRIBUTION,
-           _says(contactverif_nts.vts_me, integrates_linear_gap=True)),
+           says(contactverif_nts.vts_me, integrates_linear_gap=True)),
     make_factored("springs softer where the master bends", BEND, _soft_where_bent, area=None),
-    Mutant("current areas said to be symmetric", SYMMETRIC, _says(contactverif_nts.nts_ar, symmetric=True)),
+    Mutant("current areas said to be symmetric", SYMMETRIC, says(contactverif_nts.nts_ar, symmetric=True)),
     Mutant("nodes on segments said to be symmetric and smooth", CONTINUITY,
-           _says(contactverif_nts.nts_ar, symmetric=True, continuity="C1")),
-    Mutant("nodes on segments said to push continuously", CONTINUITY, _says(contactverif_nts.nts, continuity="C0")),
-    Mutant("cells said to be smooth", CONTINUITY, _says(contactverif_mortar.sts, continuity="C1")),
+           says(contactverif_nts.nts_ar, symmetric=True, continuity="C1")),
+    Mutant("nodes on segments said to push continuously", CONTINUITY, says(contactverif_nts.nts, continuity="C0")),
+    Mutant("cells said to be smooth", CONTINUITY, says(contactverif_mortar.sts, continuity="C1")),
     Mutant("forces without a potential said to have one", SYMMETRIC, ForcesAlone),
     make_factored("springs stiffer towards the longer neighbour", MIRROR, _stiffer_towards_the_longer_neighbour,
                   area=None),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped, replaces
+from mutate import Mutant, replaces, wrap
 
 import contactverif_nts
 from contactverif import Pairing
@@ -28,7 +28,7 @@ def _least_pressure(*, penalty: float) -> Any:
         pressed = inner.contact_points(interface, pairing, z).pressure > 1e-9
         return Pairing({**pairing, "active": pairing["active"] & pressed})
 
-    return Wrapped(penalty, contactverif_nts.vts_me, pair=pair)
+    return wrap(penalty, contactverif_nts.vts_me, pair=pair)
 
 
 @replaces("tangent")

@@ -6,11 +6,10 @@ is what catches it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from mutate import Mutant, Wrapped, changed_line
+from mutate import Mutant, changed_line, reports, wrap
 
 import contactverif_nts
 
@@ -35,16 +34,6 @@ _MOVED = "\n            ".join(
 )
 
 
-def _reports_pressure(factor: float, make: Any) -> Any:
-    """Return right forces, and report `factor` times the pressure at the contact points."""
-
-    def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        points = right(interface, pairing, z)
-        return replace(points, pressure=factor * points.pressure)
-
-    return lambda *, penalty: Wrapped(penalty, make, contact_points=contact_points)
-
-
 def _softens_both_passes(*, penalty: float) -> Any:
     """Return nine tenths of the forces of two passes of NTS-AR, and of their tangent."""
 
@@ -52,7 +41,7 @@ def _softens_both_passes(*, penalty: float) -> Any:
         return 0.9 * right(*arguments)
 
     make = partial(contactverif_nts.two_pass, inner=contactverif_nts.nts_ar)
-    return Wrapped(penalty, make, residual=soften, tangent=soften)
+    return wrap(penalty, make, residual=soften, tangent=soften)
 
 
 def _line(name: str, caught_by: str, old: str, new: str, factory: str, module: str = "eq6") -> Mutant:
@@ -65,9 +54,9 @@ MUTANTS = (
     _line(f"area of competence at a free end off by {SMALL}", NORMAL, _AREA,
           f"{_AREA} * (1 + {SMALL} * (other[i] < 0))", "nts_ar"),
     Mutant("reported pressure of VTS-ME with the wrong sign", NORMAL,
-           _reports_pressure(-1.0, contactverif_nts.vts_me)),
+           reports(contactverif_nts.vts_me, lambda points, *_: {"pressure": -points.pressure})),
     Mutant(f"reported pressure of VTS-G off by {SMALL}", NORMAL,
-           _reports_pressure(1 + float(SMALL), contactverif_nts.vts_g)),
+           reports(contactverif_nts.vts_g, lambda points, *_: {"pressure": (1 + float(SMALL)) * points.pressure})),
     _line("NTS-AR softened in shallow contact", NORMAL_SOLVE, _FORCE, f"{_FORCE} * (0.9 if {_SHALLOW} else 1.0)",
           "nts_ar"),
     _line("points of VTS-ME at Gauss points", SINGLE, _PLACES, "c = np.polynomial.legendre.leggauss(n)[0]", "vts_me",

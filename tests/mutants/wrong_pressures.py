@@ -5,12 +5,10 @@ Forces balance, and a uniform pressure is exact. Only a pressure that varies sho
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, says, wrap
 
 import contactverif_mortar
 import contactverif_nts
@@ -46,25 +44,15 @@ def _smooths_multipliers(*, penalty: float) -> Any:
         forces, rows = (dense(right(interface, pairing, state)) for state in (smooth(interface, z), z))
         return np.vstack([np.hstack([forces[:n, :n], forces[:n, n:] @ smoothing(interface)]), rows[n:]])
 
-    return Wrapped(penalty, contactverif_mortar.mortar_lm, residual=residual, tangent=tangent)
-
-
-def _claims(make: Callable[..., Any], **promises: Any) -> Callable[..., Any]:
-    """Return a formulation with promises that it does not keep."""
-
-    def mutant(*, penalty: float) -> Any:
-        inner = make(penalty=penalty)
-        return replace(inner, traits=inner.traits.revise(**promises))
-
-    return mutant
+    return wrap(penalty, contactverif_mortar.mortar_lm, residual=residual, tangent=tangent)
 
 
 MUTANTS = (
     Mutant("multipliers smoothed before they press", INF_SUP, _smooths_multipliers),
     Mutant("two multipliers a segment, said to be stable", INF_SUP,
-           _claims(contactverif_nts.vts_ppt_lm, inf_sup=True)),
+           says(contactverif_nts.vts_ppt_lm, inf_sup=True)),
     Mutant("gaps at points in place of weighted gaps, said not to lock", LOCKING,
-           _claims(contactverif_mortar.sts, locks=False)),
+           says(contactverif_mortar.sts, locks=False)),
     Mutant("two virtual slave nodes a segment, said not to lock", LOCKING,
-           _claims(contactverif_nts.vts_ppt_balanced, locks=False)),
+           says(contactverif_nts.vts_ppt_balanced, locks=False)),
 )  # fmt: skip

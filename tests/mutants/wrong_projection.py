@@ -7,16 +7,14 @@ two optional ones.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped, changed_line
+from mutate import Mutant, changed_line, decides, reports
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif import Pairing
 from contactverif_nts.two_passes import two_pass
 
 SEGMENT, PLACE, ACTIVITY = "projection.segment", "projection.place", "projection.activity"
@@ -29,18 +27,8 @@ TWO_PASS = partial(two_pass, inner=NTS_AR)
 Change = Callable[..., Any]  # From points, interface and positions to the arrays that are reported in place of others.
 
 
-def _reports(make: Any, change: Change) -> Any:
-    """Return a factory whose formulation computes the right thing and reports other arrays."""
-
-    def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-        points = right(interface, pairing, z)
-        return replace(points, **change(points, interface, z[: interface.n_unknowns].reshape(-1, 2)))
-
-    return lambda *, penalty: Wrapped(penalty, make, contact_points=contact_points)
-
-
-def reports(name: str, caught_by: str, change: Change, make: Any = VTS_ME) -> Mutant:
-    return Mutant(name, caught_by, _reports(make, change))
+def report(name: str, caught_by: str, change: Change, make: Any = VTS_ME) -> Mutant:
+    return Mutant(name, caught_by, reports(make, change))
 
 
 def line(name: str, caught_by: str, module: str, old: str, new: str, *, factory: str = "vts_me") -> Mutant:
@@ -59,16 +47,6 @@ def _gap_from_coordinates(points: Any, interface: Any, x: Any) -> Any:
     return {"gap": (points.normal * points.position).sum(axis=1) - (points.normal * first).sum(axis=1)}
 
 
-def _neighbour_decides(penalty: float) -> Any:
-    """Decide for each point what is right for the one before it."""
-
-    def pair(right: Any, interface: Any, z: Any) -> Any:
-        pairing = right(interface, z)
-        return Pairing({**pairing, "active": np.roll(pairing["active"], 1)})
-
-    return Wrapped(penalty, VTS_ME, pair=pair)
-
-
 # The nearest of the segments that end at the nearest node.
 _BY_NEAREST_NODE = (
     "from contactverif.geometry.projection import distance_to_segment; "
@@ -85,38 +63,38 @@ def _beside_no_master(points: Any, interface: Any, x: Any) -> Any:
 
 
 MUTANTS = (
-    reports("position of the foot, of nodes without a master segment", PLACE, _beside_no_master, MORTAR),
-    reports("nodal forces doubled over half of a weight", FORCES,
+    report("position of the foot, of nodes without a master segment", PLACE, _beside_no_master, MORTAR),
+    report("nodal forces doubled over half of a weight", FORCES,
             lambda points, *_: {"pressure": 2 * points.pressure, "weight": points.weight / 2}, contactverif_nts.nts),
-    reports("points called weighted nodes", FORCES,
+    report("points called weighted nodes", FORCES,
             lambda points, *_: {"weighted": ~points.weighted}, STS),
-    reports("slave segment of the neighbour reported", PLACE,
+    report("slave segment of the neighbour reported", PLACE,
             lambda points, interface, x: {"slave_segment": (points.slave_segment - 1) % len(interface.slave)}),
-    reports("place on the slave reported from its other end", PLACE, lambda points, *_: {"c": -points.c}),
-    reports("another master segment reported", SEGMENT,
+    report("place on the slave reported from its other end", PLACE, lambda points, *_: {"c": -points.c}),
+    report("another master segment reported", SEGMENT,
             lambda points, interface, x: {"master_segment": (points.master_segment + 1) % len(interface.master)}),
-    reports("ξ reported from the other end", PLACE, lambda points, *_: {"xi": 1 - points.xi}),
-    reports("ξ clipped in the report", PLACE, lambda points, *_: {"xi": np.clip(points.xi, 0, 1)}),
-    reports("foot reported as position", PLACE,
+    report("ξ reported from the other end", PLACE, lambda points, *_: {"xi": 1 - points.xi}),
+    report("ξ clipped in the report", PLACE, lambda points, *_: {"xi": np.clip(points.xi, 0, 1)}),
+    report("foot reported as position", PLACE,
             lambda points, *_: {"position": points.position - points.gap[:, None] * points.normal}),
-    reports("normal into the master reported", PLACE, lambda points, *_: {"normal": -points.normal}),
-    reports("normal of the reference configuration reported", PLACE, _normal_of_reference),
-    reports("gap reported half as large", PLACE, lambda points, *_: {"gap": points.gap / 2}, STS),
-    reports("gap from absolute coordinates reported", PLACE, _gap_from_coordinates),
-    reports("pressure reported one in a million too large", FORCES,
+    report("normal into the master reported", PLACE, lambda points, *_: {"normal": -points.normal}),
+    report("normal of the reference configuration reported", PLACE, _normal_of_reference),
+    report("gap reported half as large", PLACE, lambda points, *_: {"gap": points.gap / 2}, STS),
+    report("gap from absolute coordinates reported", PLACE, _gap_from_coordinates),
+    report("pressure reported one in a million too large", FORCES,
             lambda points, *_: {"pressure": points.pressure * (1 + 1e-6)}),
-    reports("idle points report a pressure", FORCES, lambda points, *_: {"pressure": np.abs(points.gap)}),
-    reports("weight reported half as large", FORCES, lambda points, *_: {"weight": points.weight / 2}),
-    reports("weight of the whole segment", AREA,
+    report("idle points report a pressure", FORCES, lambda points, *_: {"pressure": np.abs(points.gap)}),
+    report("weight reported half as large", FORCES, lambda points, *_: {"weight": points.weight / 2}),
+    report("weight of the whole segment", AREA,
             lambda points, interface, x: {"weight": interface.slave.lengths(x)[points.slave_segment]}),
-    reports("weight of what is not covered", AREA, lambda points, *_: {"weight": points.weight * 1.25}, STS),
-    reports("area reported from the first node", AREA,
+    report("weight of what is not covered", AREA, lambda points, *_: {"weight": points.weight * 1.25}, STS),
+    report("area reported from the first node", AREA,
             lambda points, *_: {"area_from": np.full_like(points.c, -1.0)}, contactverif_nts.vts_ppt),
-    reports("two thirds of the area reported", AREA,
+    report("two thirds of the area reported", AREA,
             lambda points, *_: {"area_to": points.area_to - (points.area_to - points.area_from) / 3},
             contactverif_nts.vts_ppt),
-    reports("activity of the neighbour reported", ACTIVITY, lambda points, *_: {"active": np.roll(points.active, 1)}),
-    Mutant("activity of the neighbour", ACTIVITY, lambda *, penalty: _neighbour_decides(penalty)),
+    report("activity of the neighbour reported", ACTIVITY, lambda points, *_: {"active": np.roll(points.active, 1)}),
+    Mutant("activity of the neighbour", ACTIVITY, decides(VTS_ME, lambda pairing, _: np.roll(pairing["active"], 1))),
     line("penetrations below 1e-9 left open", ACTIVITY, "eq6",
          "is_pressed(g,", "is_pressed(g + 1e-9,"),
     line("gaps below 1e-9 closed", ACTIVITY, "eq6",
@@ -126,6 +104,6 @@ MUTANTS = (
     # At a vertex of a flat master both segments meet the foot at their ends, and neither counts it as its own.
     line("force dropped where a slave node stands over a master node", RESULTANT, "eq6",
          "on_surface = foot_on_surface(", "on_surface = 0 < dot(d, t) < l_12 and foot_on_surface(", factory="nts_ar"),
-    reports("weighted nodes reported as points", PLACE, lambda points, *_: {"weighted": False}, MORTAR),
-    reports("second pass reported as points of the slave", PLACE, lambda points, *_: {"on_master": False}, TWO_PASS),
+    report("weighted nodes reported as points", PLACE, lambda points, *_: {"weighted": False}, MORTAR),
+    report("second pass reported as points of the slave", PLACE, lambda points, *_: {"on_master": False}, TWO_PASS),
 )  # fmt: skip

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from handles import ReusesItsHandle
-from mutate import Mutant, Wrapped, replaces
+from mutate import Mutant, replaces, wrap
+from subjects import Changed
 
+import contactverif_nts
 from contactverif.contract.arrays import dense
 
 PURITY = "purity"
@@ -36,7 +38,7 @@ def _remembers(*, memory: str, user: str, argument: int) -> Callable[..., Any]:
                 changed[argument] = earlier[argument]
             return right(*changed)
 
-        return Wrapped(penalty, **{memory: remember, user: use})
+        return wrap(penalty, **{memory: remember, user: use})
 
     return make
 
@@ -48,7 +50,7 @@ def _keeps_first_interface(*, penalty: float) -> Any:
     def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
         return right(first.setdefault(interface.nodes.shape, interface), pairing, z)
 
-    return Wrapped(penalty, residual=residual)
+    return wrap(penalty, residual=residual)
 
 
 def _caches_by_positions(*, penalty: float) -> Any:
@@ -62,7 +64,7 @@ def _caches_by_positions(*, penalty: float) -> Any:
             last[key] = right(interface, pairing, z)
         return last[key]
 
-    return Wrapped(penalty, residual=residual)
+    return wrap(penalty, residual=residual)
 
 
 class _LastPenalty:
@@ -77,7 +79,7 @@ def _shares_its_penalty(*, penalty: float) -> Any:
     def residual(right: Any, *arguments: Any) -> Any:
         return right(*arguments) * (_LastPenalty.value / penalty)
 
-    return Wrapped(penalty, residual=residual)
+    return wrap(penalty, residual=residual)
 
 
 _SHARED_ANSWERS: dict[Any, Any] = {}
@@ -93,20 +95,18 @@ def _shares_its_answers(right: Any, interface: Any, pairing: Any, z: Any) -> Any
     return _SHARED_ANSWERS[key]
 
 
-class _InOneCall(Wrapped):
-    """A formulation that is right in each method, and wrong where it computes residual and tangent in one call."""
-
-    def __init__(self, penalty: float, change: Callable[[Any, Any], tuple[Any, Any]]) -> None:
-        super().__init__(penalty)
-        self._change = change
-
-    def residual_and_tangent(self, interface: Any, pairing: Any, z: Any) -> tuple[Any, Any]:
-        arguments = interface, pairing, z
-        return self._change(self._inner.residual(*arguments), dense(self._inner.tangent(*arguments)))
-
-
 def _in_one_call(change: Callable[[Any, Any], tuple[Any, Any]]) -> Callable[..., Any]:
-    return lambda *, penalty: _InOneCall(penalty, change)
+    """Return a factory: right in each method, and wrong where residual and tangent are computed in one call."""
+
+    def make(*, penalty: float) -> Changed:
+        inner = contactverif_nts.vts_ppt_balanced(penalty=penalty)
+
+        def both(*state: Any) -> tuple[Any, Any]:
+            return change(inner.residual(*state), dense(inner.tangent(*state)))
+
+        return Changed(inner, residual_and_tangent=both)
+
+    return make
 
 
 def _without_small_entries(residual: Any, tangent: Any) -> tuple[Any, Any]:
@@ -114,55 +114,44 @@ def _without_small_entries(residual: Any, tangent: Any) -> tuple[Any, Any]:
     return residual, np.where(np.abs(tangent) > 1e-6 * np.abs(tangent).max(), tangent, 0.0)
 
 
-class _LastInOneCall(Wrapped):
-    """Residual and tangent in one call, the tangent at the state of the last residual that was asked alone."""
+def _last_in_one_call(*, penalty: float) -> Changed:
+    """Take the tangent in one call at the state of the last residual that was asked alone."""
+    inner, last = contactverif_nts.vts_ppt_balanced(penalty=penalty), []
 
-    last: Any = None
+    def residual(*state: Any) -> Any:
+        last[:] = [state]
+        return inner.residual(*state)
 
-    def residual(self, *arguments: Any) -> Any:
-        self.last = arguments
-        return self._inner.residual(*arguments)
+    def both(*state: Any) -> tuple[Any, Any]:
+        fits = last and last[0][0] is state[0]
+        return inner.residual(*state), inner.tangent(*(last[0] if fits else state))
 
-    def residual_and_tangent(self, *arguments: Any) -> tuple[Any, Any]:
-        fits = self.last is not None and self.last[0] is arguments[0]
-        return self._inner.residual(*arguments), self._inner.tangent(*(self.last if fits else arguments))
+    return Changed(inner, residual=residual, residual_and_tangent=both)
 
 
 MUTANTS = (
     Mutant("one object in the handles of all pairings", PURITY, ReusesItsHandle),
     Mutant("residual in one call that pulls", PURITY, _in_one_call(lambda residual, tangent: (-residual, tangent))),
-    Mutant(
-        "tangent in one call made symmetric",
-        PURITY,
-        _in_one_call(lambda residual, tangent: (residual, (tangent + tangent.T) / 2)),
-    ),
+    Mutant("tangent in one call made symmetric", PURITY,
+           _in_one_call(lambda residual, tangent: (residual, (tangent + tangent.T) / 2))),
     Mutant("tangent in one call without small entries", PURITY, _in_one_call(_without_small_entries)),
-    Mutant("tangent in one call at the state of the last residual", PURITY, lambda *, penalty: _LastInOneCall(penalty)),
-    Mutant(
-        "tangent at the state of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=2)
-    ),
-    Mutant(
-        "residual at the state of the last tangent", PURITY, _remembers(memory="tangent", user="residual", argument=2)
-    ),
-    Mutant(
-        "tangent on the pairing of the last residual", PURITY, _remembers(memory="residual", user="tangent", argument=1)
-    ),
-    Mutant("tangent on the last pairing", PURITY, _remembers(memory="pair", user="tangent", argument=1)),
-    Mutant("residual on the last pairing", PURITY, _remembers(memory="pair", user="residual", argument=1)),
-    Mutant(
-        "tangent of the last residual's interface", PURITY, _remembers(memory="residual", user="tangent", argument=0)
+    Mutant("tangent in one call at the state of the last residual", PURITY, _last_in_one_call),
+    *(
+        Mutant(name, PURITY, _remembers(memory=memory, user=user, argument=argument))
+        for name, memory, user, argument in (
+            ("tangent at the state of the last residual", "residual", "tangent", 2),
+            ("residual at the state of the last tangent", "tangent", "residual", 2),
+            ("tangent on the pairing of the last residual", "residual", "tangent", 1),
+            ("tangent on the last pairing", "pair", "tangent", 1),
+            ("residual on the last pairing", "pair", "residual", 1),
+            ("tangent of the last residual's interface", "residual", "tangent", 0),
+            ("contact points of the last residual", "residual", "contact_points", 2),
+            ("contact points of the last pairing", "pair", "contact_points", 1),
+            ("residual on the pairing of the last contact points", "contact_points", "residual", 1),
+        )
     ),
     Mutant("residual of the first interface", PURITY, _keeps_first_interface),
     Mutant("residual kept by its positions alone", PURITY, _caches_by_positions),
-    Mutant(
-        "contact points of the last residual", PURITY, _remembers(memory="residual", user="contact_points", argument=2)
-    ),
-    Mutant("contact points of the last pairing", PURITY, _remembers(memory="pair", user="contact_points", argument=1)),
-    Mutant(
-        "residual on the pairing of the last contact points",
-        PURITY,
-        _remembers(memory="contact_points", user="residual", argument=1),
-    ),
     Mutant("penalty of the last instance", PURITY, _shares_its_penalty),
     Mutant("residual kept for any penalty", PURITY, _shares_its_answers),
-)
+)  # fmt: skip

@@ -11,11 +11,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped, replaces
+from mutate import Mutant, decides, replaces, whole_segments, wrap
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif import Pairing
 
 UNILATERAL, NODAL_PUSH, OBJECTIVITY = "unilateral", "nodal-push", "objectivity"
 
@@ -26,19 +25,7 @@ def _turn_signs_round(make: Callable[..., Any]) -> Callable[..., Any]:
     def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
         return -right(interface, pairing, z)
 
-    return lambda *, penalty: Wrapped(penalty, make, residual=residual, tangent=residual)
-
-
-def _whole_segments(make: Callable[..., Any], **verbs: Any) -> Callable[..., Any]:
-    """Make all points of a slave segment active as soon as one of them is."""
-
-    def pair(right: Any, interface: Any, z: Any) -> Any:
-        pairing = right(interface, z)
-        closed = np.zeros(len(interface.slave), dtype=bool)
-        closed[pairing["segment"][pairing["active"]]] = True
-        return Pairing({**pairing, "active": closed[pairing["segment"]] & (pairing["master"] >= 0)})
-
-    return lambda *, penalty: Wrapped(penalty, make, pair=pair, **verbs)
+    return lambda *, penalty: wrap(penalty, make, residual=residual, tangent=residual)
 
 
 def _report_no_tension(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
@@ -70,9 +57,10 @@ MUTANTS = (
     Mutant("all signs turned round", UNILATERAL, _turn_signs_round(contactverif_nts.nts_ar)),
     Mutant("all signs of a mortar method turned round", UNILATERAL, _turn_signs_round(contactverif_mortar.mortar)),
     Mutant("all signs of multipliers turned round", UNILATERAL, _turn_signs_round(contactverif_nts.nts_lm)),
-    Mutant("whole slave segment active with one of its points", UNILATERAL, _whole_segments(contactverif_nts.vts_me)),
+    Mutant("whole slave segment active with one of its points", UNILATERAL,
+           decides(contactverif_nts.vts_me, whole_segments)),
     Mutant("whole slave segment active, and no tension reported", NODAL_PUSH,
-           _whole_segments(contactverif_nts.vts_me, contact_points=_report_no_tension)),
+           decides(contactverif_nts.vts_me, whole_segments, contact_points=_report_no_tension)),
     Mutant("shares of the slave nodes spread too far", NODAL_PUSH, _outward_shares),
     Mutant("noise of 1e-6 in the tangent", OBJECTIVITY, _noisy_tangent),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, Wrapped
+from mutate import Mutant, wrap
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCES, PURITY = "projection.forces", "purity"
@@ -19,7 +19,7 @@ EXCESS = 1.01
 Condition = Callable[[Any, Any], bool]  # (interface, positions (n_nodes, 2)) → is the defect there
 
 
-def _wrong_in(condition: Condition) -> Callable[..., Wrapped]:
+def _wrong_in(condition: Condition) -> Callable[..., Any]:
     """Return a formulation whose forces and tangent are too large where the condition holds."""
 
     def factor(interface: Any, z: Any) -> float:
@@ -33,7 +33,7 @@ def _wrong_in(condition: Condition) -> Callable[..., Wrapped]:
     def tangent(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
         return right(interface, pairing, z) * factor(interface, z)
 
-    return lambda *, penalty: Wrapped(penalty, residual=residual, tangent=tangent)
+    return lambda *, penalty: wrap(penalty, residual=residual, tangent=tangent)
 
 
 def _directions(surface: Any, x: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from handles import HidesNumbers, WrongTangent
-from mutate import Mutant, Wrapped
+from mutate import Mutant, wrap
 
 import contactverif_nts
 
@@ -24,7 +24,7 @@ def _change_tangent(change: Callable[[Any, Any], None]) -> Callable[..., Any]:
         change(interface, matrix)
         return matrix
 
-    return lambda *, penalty: Wrapped(penalty, tangent=tangent)
+    return lambda *, penalty: wrap(penalty, tangent=tangent)
 
 
 def _is_large(interface: Any) -> bool:
@@ -51,7 +51,7 @@ def _spoil_entry(power: int, make: Any = contactverif_nts.vts_ppt_balanced) -> C
             _blocks(matrix)[node, node, 0, 1] += 10.0**-power * _sizes(matrix)[node, node]
         return matrix
 
-    return lambda *, penalty: Wrapped(penalty, make, tangent=tangent)
+    return lambda *, penalty: wrap(penalty, make, tangent=tangent)
 
 
 def _one_tiny_entry(interface: Any, matrix: Any) -> None:

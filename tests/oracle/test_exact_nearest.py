@@ -1,4 +1,4 @@
-"""The exact nearest segments against a plain loop in fractions, against the other oracle, and by hand."""
+"""The exact nearest segments against a plain loop in fractions, and by hand."""
 
 from __future__ import annotations
 
@@ -6,16 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_projection import project_point
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.case import Case
 from contactverif.oracle import nearest_segments
-from contactverif.strategies import general_cases, tie_cases
 
-CHECKED = settings(max_examples=100, derandomize=True, database=None, deadline=None)
 SEGMENTS = np.array([[0, 1], [1, 2]])
 
 
@@ -50,26 +44,6 @@ def test_no_nearest_segment_is_left_out(seed: int) -> None:
         assert sorted(near.segment for near in nearest.segments) == [
             number for number, distance in enumerate(distances) if distance == min(distances)
         ]
-
-
-@CHECKED
-@given(st.one_of(general_cases(), tie_cases()))
-def test_both_oracles_agree_on_the_nodes_of_a_slave(case: Case) -> None:
-    interface, x = case.interface, case.z.reshape(-1, 2)
-    for segment in range(len(interface.slave)):
-        other = project_point(interface, case.z, segment, -1)
-        nearest = nearest_segments(
-            x, interface.master.segments, tuple(x[interface.slave.segments[segment, 0]].tolist())
-        )
-        first = nearest.segments[0]
-        assert (first.segment, first.xi, nearest.squared_distance) == (
-            other.segment,
-            other.xi,
-            other.squared_distance,
-        )
-        assert first.signed_squared_gap == other.signed_squared_gap
-        assert {near.segment for near in nearest.segments} == set(other.tied)
-        assert nearest.n_undecided == len(other.undecided)
 
 
 def test_at_a_sharp_tip_the_smaller_overshoot_says_on_which_side_the_point_is() -> None:

@@ -171,7 +171,7 @@ def test_several_and_closed_chains() -> None:
 @pytest.mark.parametrize(
     ("make", "options", "named"),
     [
-        (contactverif_nts.vts_me, {"n": 0}, "n: found 0"),
+        (contactverif_nts.vts_me, {"n": 0}, "n: found 0; needed a whole number from 1 to 1000"),
         (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
         (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
         (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),

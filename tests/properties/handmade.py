@@ -27,20 +27,10 @@ class Handmade:
 
     def points(self, *, c: float, half_area: float = np.nan) -> ContactPoints:
         """One point, on the first slave segment."""
-        nan = np.array([np.nan])
+        nan, place = np.array([np.nan]), np.full((1, 2), np.nan)
+        segments, area = (np.array([0]), np.array([-1])), (np.array([c - half_area]), np.array([c + half_area]))
         return ContactPoints(
-            slave_segment=np.array([0]),
-            c=np.array([c]),
-            master_segment=np.array([-1]),
-            xi=nan,
-            position=np.full((1, 2), np.nan),
-            normal=np.full((1, 2), np.nan),
-            gap=nan,
-            pressure=nan,
-            weight=nan,
-            active=np.array([True]),
-            area_from=np.array([c - half_area]),
-            area_to=np.array([c + half_area]),
+            segments[0], np.array([c]), segments[1], nan, place, place, nan, nan, nan, np.array([True]), *area
         )
 
 

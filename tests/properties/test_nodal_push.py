@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import load_subject
+from subjects import change_verbs, load_subject
 
 from contactverif import Interface, Subject
 from contactverif.contract.case import Case
@@ -20,32 +20,15 @@ CORNER = Interface.from_chains(SLAVE, [[1.005, 0.0], [1.0025, -0.5], [0.0025, -0
 STRAIGHT = Interface.from_chains([[0.0, -0.25], [1.0, -0.25]], [[1.5, 0.0], [0.5, 0.0], [-0.5, 0.0]])
 
 
-class Pulled:
-    """VTS-PPT, but one node is pulled."""
+def pull(node: int, sign: float) -> Subject:
+    """Return VTS-PPT with forces times a sign, but for one node, which is pulled."""
 
-    node = 3
+    def residual(right: Any, *state: Any) -> Any:
+        forces = np.array(right(*state))
+        forces[..., 2 * node + 1] -= 2 * np.abs(forces).max()
+        return sign * forces
 
-    def __init__(self, *, penalty: float) -> None:
-        self._inner = vts_ppt(penalty=penalty)
-        self.traits = self._inner.traits
-
-    def pair(self, interface: Any, z: Any) -> Any:
-        return self._inner.pair(interface, z)
-
-    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self._inner.contact_points(interface, pairing, z)
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = np.array(self._inner.residual(interface, pairing, z))
-        forces[..., 2 * self.node + 1] -= 2 * np.abs(forces).max()
-        return forces
-
-
-class PulledSlave(Pulled):
-    node = 0
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return -super().residual(interface, pairing, z)
+    return Subject("pulled", lambda *, penalty: change_verbs(vts_ppt(penalty=penalty), residual=residual))
 
 
 def _judge(subject: Subject, interface: Interface) -> Verdict:
@@ -64,8 +47,8 @@ def test_a_part_of_a_force_round_a_corner_is_no_reason_to_accuse() -> None:
 
 def test_a_node_that_is_pulled_where_there_is_no_corner_is_found() -> None:
     assert _judge(load_subject("vts-ppt"), STRAIGHT) is Verdict.PASS
-    assert _judge(Subject("pulled", Pulled), STRAIGHT) is Verdict.FAIL
+    assert _judge(pull(3, 1.0), STRAIGHT) is Verdict.FAIL
 
 
 def test_a_slave_node_that_is_pulled_beside_a_corner_is_found() -> None:
-    assert _judge(Subject("pulled slave", PulledSlave), CORNER) is Verdict.FAIL
+    assert _judge(pull(0, -1.0), CORNER) is Verdict.FAIL

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, load_property, load_subject, measure_case
+from subjects import Changed, alone, load_property, load_subject, measure_case
 from textbook_cells import WeightedGaps
 
 from contactverif.contract.property import Verdict
@@ -92,15 +92,7 @@ def test_mortar_from_a_textbook_does_not_lock() -> None:
 
 
 def test_a_formulation_without_a_pairing_is_not_judged() -> None:
-    right = load_subject("mortar").with_penalty(1.0).plugin
-
-    class ResidualOnly:
-        traits = right.traits.revise(batched=False)
-
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return right.residual(interface, right.pair(interface, z), z)
-
-    result = run([Subject("residual only", lambda *, penalty: ResidualOnly())], [QUESTION])
+    result = run([alone("mortar")], [QUESTION])
     assert result.rows[0].verdict is Verdict.NOT_PROVIDED
 
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, WRONG, springs_of
-from subjects import load_subject, measure_case
+from subjects import alone, load_subject, measure_case
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Promises, Rules, Traits
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
@@ -25,18 +20,6 @@ from contactverif_properties.stability_solutions import stability_stiffness
 
 def state_named(name: str) -> Case:
     return next(case for case in (*stability_states(), *stability_scenes()) if case.name == name)
-
-
-def without_pair(make: Any, *, penalty: float) -> Any:
-    inner = make(penalty=penalty)
-
-    class ResidualOnly:
-        traits = Traits(promises=Promises(translation_stable=True), rules=Rules(penalty=inner.traits.rules.penalty))
-
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return inner.residual(interface, inner.pair(interface, z), z)
-
-    return ResidualOnly()
 
 
 def test_names_are_distinct_and_every_sweep_has_states() -> None:
@@ -100,8 +83,7 @@ def test_only_the_offset_accuses_points_that_are_rounded_first() -> None:
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-ppt", "mortar"])
 def test_a_formulation_that_is_a_residual_alone_is_judged(name: str) -> None:
-    subject = Subject(name, partial(without_pair, load_subject(name)._make))
-    sweep, stiffness = run([subject], [stability_sweep, stability_stiffness], examples=1).rows
+    sweep, stiffness = run([alone(name)], [stability_sweep, stability_stiffness], examples=1).rows
     assert sweep.verdict is Verdict.PASS, sweep.reason
     assert stiffness.verdict is Verdict.NOT_APPLICABLE
     assert not stiffness.unexpected

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from gauss_springs import RIGHT, WRONG, GaussSprings, by_points_first, springs_of
-from subjects import load_property, measure_case
+from gauss_springs import RIGHT, WRONG, by_points_first, springs_of
+from subjects import ResidualAlone, load_property, measure_case
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
@@ -66,22 +65,11 @@ def test_a_statement_of_not_being_stable_is_kept_by_a_named_state() -> None:
     )
 
 
-class ResidualOnly:
-    """Springs without `pair`, which decide anew in each residual."""
-
-    def __init__(self, inner: GaussSprings) -> None:
-        self.inner = inner
-        self.traits = inner.traits.revise(batched=False)
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return self.inner.residual(interface, self.inner.pair(interface, z), z)
-
-
 @pytest.mark.parametrize("name", ["differences first", "cross product", "point rounded before the difference"])
 def test_a_plugin_that_is_a_residual_and_nothing_else_is_judged(name: str) -> None:
     way, before = (RIGHT | WRONG)[name]
     inner = springs_of(way, before, translation_stable=True)
-    subject = Subject(name, lambda *, penalty: ResidualOnly(inner.with_penalty(penalty).plugin))
+    subject = Subject(name, lambda *, penalty: ResidualAlone(inner.with_penalty(penalty).plugin))
     verdicts = [judge_case(stability_translation, case, subject).verdict for case in cases(60)]
     assert (Verdict.FAIL in verdicts) is (name in WRONG)
     assert verdicts.count(Verdict.UNDECIDED) <= (10 if name in WRONG else 0)

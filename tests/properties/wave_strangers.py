@@ -78,18 +78,7 @@ class Heights:
             weight = np.bincount(segment, weights=weight)
             segment, share = np.arange(len(weight)), np.full(len(weight), 0.5)
             position, pressure = ends.mean(axis=1), load / weight
-        nothing = np.full(len(weight), np.nan)
-        return ContactPoints(
-            slave_segment=segment,
-            c=2 * share - 1,
-            master_segment=np.full(len(weight), -1),
-            xi=nothing,
-            position=position,
-            normal=np.tile([0.0, 1.0], (len(weight), 1)),
-            gap=-pressure / self.penalty,
-            pressure=pressure,
-            weight=weight,
-            active=pressure > 0,
-            area_from=nothing,
-            area_to=nothing,
-        )
+        master, nothing = np.full(len(weight), -1), np.full(len(weight), np.nan)
+        normal, gap = np.tile([0.0, 1.0], (len(weight), 1)), -pressure / self.penalty
+        places = (segment, 2 * share - 1, master, nothing, position, normal)
+        return ContactPoints(*places, gap, pressure, weight, pressure > 0, nothing, nothing)

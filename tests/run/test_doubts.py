@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from expected_verdicts import FAILS
 from hypothesis import strategies as st
+from subjects import Changed
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
@@ -16,7 +17,7 @@ from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Property, PropertyInfo, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Rules, Traits
+from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
@@ -78,24 +79,15 @@ def test_a_share_beyond_one_is_refused() -> None:
         PropertyInfo("x.y", "x", "A number.", (ERROR,), least_contact=80)
 
 
-class Negated:
-    """A formulation with all signs of its residual turned round."""
-
-    def __init__(self, inner: Any) -> None:
-        self.inner, self.traits = inner, Traits(rules=Rules(enforcement=inner.traits.rules.enforcement))
-        if hasattr(inner, "n_multipliers"):
-            self.n_multipliers = inner.n_multipliers
-
-    def pair(self, interface: Any, z: Any) -> Any:
-        return self.inner.pair(interface, z)
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return -self.inner.residual(interface, pairing, z)
+def negate(inner: Any) -> Changed:
+    """Return a formulation that turns all signs of a residual round, and promises nothing."""
+    traits = Traits().revise(enforcement=inner.traits.rules.enforcement)
+    return Changed(inner, traits=traits, tangent=None, residual=lambda *state: -inner.residual(*state))
 
 
 @pytest.mark.parametrize("make", [nts, nts_ar, mortar_lm])
 def test_an_opposite_sign_fails_any_run_and_is_said(make: Any) -> None:
-    subject = Subject("mine", lambda *, penalty: Negated(make(penalty=penalty)))
+    subject = Subject("mine", lambda *, penalty: negate(make(penalty=penalty)))
     result = run([subject], load_properties(["purity"]), seed=1, examples=3)
     assert result.opposite_signs == ("mine",)
     assert not result.promises_kept

@@ -10,7 +10,6 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from lossy_store import lose_one_outcome
 from test_scheduler import facts
 
 from contactverif.contract.errors import MisuseError
@@ -291,13 +290,3 @@ def test_a_run_that_lacks_an_outcome_a_row_or_a_witness_has_a_gap() -> None:
     assert "2 rows instead of 1" in find_gap(replace(result, rows=result.rows * 2), subjects, questions, sampling)
     rows = tuple(replace(row, witness=None) for row in result.rows)
     assert "no outcome of its witness" in find_gap(replace(result, rows=rows), subjects, questions, sampling)
-
-
-def test_a_lost_outcome_makes_no_run_green(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The store loses one on the way, and the rows do not notice."""
-    lose_one_outcome(monkeypatch)
-    subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
-    result = run(subjects, questions, examples=20, seed=1)
-    assert result.promises_kept
-    gap = find_gap(result, subjects, questions, Sampling(20, 1))
-    assert gap == "vts-ppt patch.flat.resultant: outcomes of 19 of 20 cases"

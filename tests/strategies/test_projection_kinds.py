@@ -45,14 +45,6 @@ def test_every_case_is_of_the_kind_that_it_names(cases: list[Case]) -> None:
     assert tuple(KIND_TESTS) == KINDS
 
 
-def test_both_oracles_find_the_same_nearest_segment(cases: list[Case]) -> None:
-    """An inside point that `is_of_kind` finds has one nearest segment, and a foot on it, for `project_point` too."""
-    for case in cases:
-        projection = project_point(case.interface, case.z, *probe_of(case))
-        is_inside = len(projection.tied) == 1 and 0 < projection.xi < 1
-        assert is_of_kind(case.interface, case.z, "inside a segment", *probe_of(case)) == is_inside
-
-
 def test_each_kind_gets_its_share() -> None:
     counts = Counter(case.kind for case in collect_cases(projection_states(), 1000))
     print("\n" + "\n".join(f"{counts[kind]:6} {kind}" for kind in KINDS))

@@ -21,7 +21,7 @@ import pytest
 import xarray as xr
 from fresh_process import MAIN
 from msgspec import structs
-from subjects import Changed, load_subject
+from subjects import Changed, alone, load_subject
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
@@ -46,20 +46,6 @@ from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 WAVY = Cell("wavy", 1, 30.0)
 PROBLEMS = {name: problem for name, problem in load_problems().items() if isinstance(problem, Problem)}
 ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "wavy", "--scene", "kinked", "--repeats", "2"]
-
-
-def residual_alone(name: str) -> Subject:
-    """Return a formulation that has neither a pairing nor a tangent."""
-
-    class Alone:
-        def __init__(self, *, penalty: float) -> None:
-            self.inner = load_subject(name).with_penalty(penalty).plugin
-            self.traits = self.inner.traits
-
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return self.inner.residual(interface, self.inner.pair(interface, np.atleast_2d(z)[0]), z)
-
-    return Subject("alone", Alone)
 
 
 @pytest.mark.parametrize("scene", PROBLEMS)
@@ -103,14 +89,14 @@ def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
 
 
 def test_a_residual_alone_is_one_more_curve_and_its_differences_are_counted_as_such() -> None:
-    record = run_cell(WAVY, [residual_alone("vts-ppt"), load_subject("vts-ppt")], 1, 0)
-    alone, whole = (record.runs[name] for name in ("alone", "vts-ppt"))
-    assert alone.outcome == Outcome.SOLVED
-    assert alone.errors["forces"] == pytest.approx(whole.errors["forces"], rel=1e-6)
-    assert (alone.counts["pairs"], alone.counts["tangents"]) == (0, 0)
-    assert alone.counts["differences"] >= 2 * record.unknowns * alone.counts["iterations"]
-    assert alone.seconds["differences"][0] > 0
-    assert alone.seconds["tangent"] == [0.0]
+    record = run_cell(WAVY, [alone("vts-ppt"), load_subject("vts-ppt")], 1, 0)
+    single, whole = (record.runs[name] for name in ("alone", "vts-ppt"))
+    assert single.outcome == Outcome.SOLVED
+    assert single.errors["forces"] == pytest.approx(whole.errors["forces"], rel=1e-6)
+    assert (single.counts["pairs"], single.counts["tangents"]) == (0, 0)
+    assert single.counts["differences"] >= 2 * record.unknowns * single.counts["iterations"]
+    assert single.seconds["differences"][0] > 0
+    assert single.seconds["tangent"] == [0.0]
 
 
 def test_a_failure_is_kept_and_stops_no_one() -> None:
