@@ -8,7 +8,7 @@ from typing import Any
 
 from contactverif.contract.case import Case
 from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Property
+from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_formulation, load_properties
@@ -35,6 +35,13 @@ def measure_case(question: Property, case: Case, subject: Subject) -> Measuremen
     outcome = judge_case(question, case, subject)
     assert outcome.measurement is not None, outcome.reason
     return outcome.measurement
+
+
+def judge_as(verdict: Verdict, question: Property, case: Case, subject: Subject) -> Outcome:
+    """Judge a case; fail if the verdict is another one."""
+    outcome = judge_case(question, case, subject)
+    assert outcome.verdict is verdict, outcome.reason
+    return outcome
 
 
 class Changed:

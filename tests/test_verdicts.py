@@ -39,7 +39,7 @@ from expected_verdicts import (
     table_in_readme,
 )
 from expected_verdicts import FLAT as PATCH
-from subjects import load_property, load_subject, with_promises
+from subjects import judge_as, load_property, load_subject, with_promises
 
 import contactverif_nts
 from contactverif.contract.case import Case
@@ -181,8 +181,7 @@ def printed_forces(name: str) -> Any:
 
 def test_the_balanced_vts_ppt_is_cleared_on_the_tilted_case() -> None:
     for property_id in (FORCE, MOMENT):
-        outcome = judge_case(load_property(property_id), named_case("tilted"), load_subject("vts-ppt-balanced"))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, load_property(property_id), named_case("tilted"), load_subject("vts-ppt-balanced"))
 
 
 def test_random_tilts_find_the_printed_vts_ppt_out_without_the_witness() -> None:

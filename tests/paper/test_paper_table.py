@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from subjects import load_property, load_subject
+from subjects import judge_as, load_property, load_subject
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.property import Verdict
@@ -17,7 +17,6 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
-from contactverif.run.judge import judge_case
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 ELASTIC_A = ("a1", "a2-uniform", "a2-graded")
@@ -108,8 +107,6 @@ def test_vts_me_with_multipliers_passes_by_stress_and_is_caught_by_its_multiplie
     assert pressures.max() == pytest.approx(most, abs=1e-10)
     question = load_property("patch.flat.solve")
     subject = load_subject("vts-me-lm")
-    outcome = judge_case(question, catalogue.make_scene(name).case(), subject)
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, question, catalogue.make_scene(name).case(), subject)
     beyond = {key for key, value in outcome.measurement.values.items() if value > outcome.measurement.tolerances[key]}
     assert beyond == {"multiplier error"}

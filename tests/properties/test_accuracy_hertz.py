@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from subjects import load_subject, with_promises
+from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
 from contactverif.contract.case import Case
@@ -45,9 +45,7 @@ def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
 @pytest.mark.parametrize("name", ["nts", "vts-g:n=3", "vts-me:n=4", "two-pass/nts"])
 def test_the_master_forces_of_others_do_not_converge_even_at_a_fixed_penalty(name: str) -> None:
     """More points a segment make the error smaller, and leave the rate what it is."""
-    outcome = judge_case(accuracy_hertz, CASES["parabola-layer"], load_subject(name))
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, accuracy_hertz, CASES["parabola-layer"], load_subject(name))
     assert outcome.measurement.values["rate of master forces"] <= 0.1
 
 

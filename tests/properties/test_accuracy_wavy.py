@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import load_subject
+from subjects import judge_as, load_subject
 from wave_strangers import Heights
 
 from contactverif.contract.case import Case
@@ -75,8 +75,7 @@ def _right(name: str) -> Subject:
 @pytest.mark.parametrize("case", NAMES[::2] + CONTRAST_NAMES)
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formulation_of_another_kind_is_cleared(name: str, case: str) -> None:
-    outcome = judge_case(accuracy_wavy, _case(accuracy_wavy, case), _right(name))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
+    judge_as(Verdict.PASS, accuracy_wavy, _case(accuracy_wavy, case), _right(name))
 
 
 @pytest.mark.parametrize("name", ["nts-ar", "vts-me", "vts-me:n=12"])
@@ -104,9 +103,7 @@ def test_constant_pressures_have_the_error_that_the_bound_is_made_of() -> None:
 def test_the_errors_of_all_meshes_are_kept_and_a_witness_fails_clearly(
     name: str, question: Property, case: str
 ) -> None:
-    outcome = judge_case(question, _case(question, case), load_subject(name))
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, question, _case(question, case), load_subject(name))
     assert outcome.measurement.series.keys() == WAVY_STUDIES.series.keys()
     assert {values.shape for values in outcome.measurement.series.values()} == {(len(MESHES),)}
     error = "pressure error on the finest mesh"

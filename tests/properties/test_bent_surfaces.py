@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, change_verbs, load_property, load_subject
+from subjects import Changed, change_verbs, judge_as, load_property, load_subject
 
 import contactverif_mortar
 from contactverif.contract.case import Case
@@ -133,6 +133,5 @@ def test_multipliers_have_the_pressure_without_springs() -> None:
 
 def test_an_end_that_is_lost_for_want_of_a_tolerance_is_no_accusation() -> None:
     question = load_property("patch.curved")
-    outcome = judge_case(question, question.cases(None)[0], load_subject("nts-ar:tau=0"))
-    assert outcome.verdict is Verdict.UNDECIDED
+    outcome = judge_as(Verdict.UNDECIDED, question, question.cases(None)[0], load_subject("nts-ar:tau=0"))
     assert "an end of the slave" in outcome.reason

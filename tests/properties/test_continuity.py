@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from strangers import SlaveNormalAtGaussPoints
-from subjects import load_subject, with_promises
+from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
 from contactverif.contract.arrays import FloatArray
@@ -18,7 +18,6 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Promises, Traits
 from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.continuity import N_STEPS, continuity, find_jumps
 
@@ -49,15 +48,13 @@ class Cloud:
 
 def test_a_smooth_formulation_without_a_pairing_is_not_accused() -> None:
     for case in cases(12):
-        outcome = judge_case(continuity, case, Subject("cloud", Cloud))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, continuity, case, Subject("cloud", Cloud))
 
 
 @pytest.mark.parametrize("make", [SlaveNormalAtGaussPoints, ClippedCells, WeightedGaps])
 def test_a_stranger_that_pushes_along_the_slave_is_continuous(make: Callable[..., Any]) -> None:
     for case in cases(4):
-        outcome = judge_case(continuity, case, with_promises(make, continuity="C0"))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, continuity, case, with_promises(make, continuity="C0"))
 
 
 def test_the_size_and_the_place_of_a_jump_are_found() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, load_subject, reporting
+from subjects import Changed, judge_as, load_subject, reporting
 
 import contactverif_nts
 from contactverif.contract.case import Case
@@ -19,7 +19,6 @@ from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import pressure_of, two_blocks
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
@@ -78,8 +77,7 @@ def test_a_wrong_tangent_is_no_reason_to_accuse_a_right_residual(wrong: str) -> 
         return Changed(inner, tangent=tangent)
 
     for scene in ("c-prime:lowered=0,degrees=17.3", "example-1bis"):
-        outcome = judge_case(patch_flat_solve, load_scene_case(scene), Subject(wrong, make))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, patch_flat_solve, load_scene_case(scene), Subject(wrong, make))
 
 
 def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fresh_process import PYTHON
 from handmade import Handmade, case, subject
+from subjects import judge_as
 
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
@@ -53,18 +54,14 @@ class Exact(Handmade):
 
 
 def test_exact_forces_pass() -> None:
-    outcome = judge_case(patch_flat_transmission, named_case("a1"), subject(Exact))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.PASS, patch_flat_transmission, named_case("a1"), subject(Exact))
     assert outcome.measurement.values == {FORCE.name: 0.0}
 
 
 @pytest.mark.parametrize("node", range(5))
 @pytest.mark.parametrize("error", [1.0, 1e-6, 1e-12])
 def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) -> None:
-    outcome = judge_case(patch_flat_transmission, named_case("a1"), subject(Exact, node=node, error=error))
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, patch_flat_transmission, named_case("a1"), subject(Exact, node=node, error=error))
     size = [1, 2, 1, 2, 2][node]
     assert outcome.measurement.values[FORCE.name] == pytest.approx(error * size / 4, rel=1e-3)
 
@@ -105,17 +102,13 @@ class Pair(Handmade):
 
 def test_forces_balance_or_lack_what_they_lack() -> None:
     assert judge_case(force_balance, case(), subject(Pair)).verdict is Verdict.PASS
-    outcome = judge_case(force_balance, case(), subject(Pair, back=0.96))
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, force_balance, case(), subject(Pair, back=0.96))
     assert outcome.measurement.values["force imbalance"] == pytest.approx(0.04)
 
 
 def test_a_couple_balances_in_force_and_not_in_moment() -> None:
     """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
-    outcome = judge_case(moment_balance, case(), subject(Pair))
-    assert outcome.verdict is Verdict.FAIL
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.FAIL, moment_balance, case(), subject(Pair))
     arm = 2 - (6 / 7 - 1 / 2)
     assert outcome.measurement.values["moment imbalance"] == pytest.approx(arm / case().diameter)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import load_subject
+from subjects import judge_as, load_subject
 
 import contactverif_nts
 from contactverif.contract.arrays import FloatArray
@@ -110,8 +110,7 @@ def test_one_step_tells_exact_from_basic_on_the_same_scene() -> None:
 
 def test_a_solution_that_is_not_found_is_undecided() -> None:
     case = load_scene_case("c:penalty=1e4")  # a virtual slave node on a master node: VTS-ME enters a 2-cycle
-    outcome = judge_case(newton_order, case, load_subject("vts-me"))
-    assert outcome.verdict is Verdict.UNDECIDED
+    outcome = judge_as(Verdict.UNDECIDED, newton_order, case, load_subject("vts-me"))
     assert "2-cycle" in outcome.reason
     assert judge_case(newton_history, case, load_subject("vts-me")).verdict is Verdict.UNDECIDED
 
@@ -142,8 +141,7 @@ def test_a_body_that_nothing_presses_any_more_comes_to_rest() -> None:
         tilt=0.125,
     )
     half_passes = load_subject("mortar-two-half-pass")
-    outcome = judge_case(newton_history, scene.case(), half_passes)
-    assert outcome.verdict is Verdict.PASS, outcome.reason
+    judge_as(Verdict.PASS, newton_history, scene.case(), half_passes)
     trace = solve(scene, half_passes.for_case(scene.case()))
     sizes = np.abs(trace.u[:, scene.slices[1]]).max(axis=1)
     assert ((sizes > 0) & (sizes < 1e-32)).any()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, Springs, case, over_a_node, subject
-from subjects import load_subject
+from subjects import judge_as, load_subject
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
@@ -21,8 +21,7 @@ SEEDS = range(1, 30)
 
 def test_a_force_that_turns_with_the_state_is_objective() -> None:
     for seed in SEEDS:
-        outcome = judge_case(objectivity, case(seed=seed), subject(Springs, penalty="distributed"))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, objectivity, case(seed=seed), subject(Springs, penalty="distributed"))
 
 
 def test_a_force_along_an_axis_is_not() -> None:
@@ -55,8 +54,7 @@ def test_a_tangent_that_does_not_turn_is_found_where_the_forces_do() -> None:
         def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
             return self.points(c=0.0)
 
-    outcome = judge_case(objectivity, case(seed=1), subject(Axis))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, objectivity, case(seed=1), subject(Axis))
     assert outcome.reason.startswith("error of the tangent after a rotation")
 
 
@@ -74,9 +72,7 @@ def test_springs_that_act_twice_need_half_of_the_penetration() -> None:
     ]  # fmt: skip
     interface = Interface.from_chains(slave, master)
     state = Case(interface, interface.nodes.reshape(-1), penalty=512.0, seed=1882)
-    outcome = judge_case(objectivity, state, load_subject("two-pass/mortar"))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.PASS, objectivity, state, load_subject("two-pass/mortar"))
     name = "error of the tangent after a rotation"
     assert outcome.measurement.values[name] > 0.55 * outcome.measurement.tolerances[name]
 
@@ -93,8 +89,7 @@ def test_half_passes_that_push_the_master_alone_are_objective() -> None:
         forces = half_passes.residual(interface, half_passes.pair(interface, state.z), state.z).reshape(-1, 2)
         assert not forces[:4].any()
         assert forces[4:].any()
-        outcome = judge_case(objectivity, state, formulation)
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, objectivity, state, formulation)
 
 
 class Nearest(Handmade):

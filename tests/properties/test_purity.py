@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
+from subjects import judge_as
 
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Verdict
@@ -141,9 +142,7 @@ def test_a_batch_that_rounds_otherwise_passes_where_one_state_just_touches() -> 
     touching = replace(touching, z=touching.z + 100 / 3)
     differences = []
     for seed in range(200):
-        outcome = judge_case(purity, replace(touching, seed=seed), subject(TwoRoundings, batched=True))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
-        assert outcome.measurement is not None
+        outcome = judge_as(Verdict.PASS, purity, replace(touching, seed=seed), subject(TwoRoundings, batched=True))
         differences.append(outcome.measurement.values[BATCHED.name])
     assert max(differences) > 0
 

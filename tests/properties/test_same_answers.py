@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from handmade import Springs, case, over_a_node, subject
 from strangers import NearbyOnly, TurnedFrame
-from subjects import load_property, load_subject, with_promises
+from subjects import judge_as, load_property, load_subject, with_promises
 from test_straight_slaves import RIGHT_ONES
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
@@ -79,8 +79,7 @@ def ring_in_ring(slave: list[tuple[float, float]], master: list[tuple[float, flo
 def test_a_point_tied_to_a_segment_that_it_penetrates_and_one_that_it_does_not_accuses_nobody(
     stranger: Any, slave: list[tuple[float, float]], master: list[tuple[float, float]]
 ) -> None:
-    outcome = judge_case(renumbering, ring_in_ring(slave, master), Subject("stranger", stranger))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
+    judge_as(Verdict.PASS, renumbering, ring_in_ring(slave, master), Subject("stranger", stranger))
 
 
 class NodalSprings(CentredSprings):
@@ -103,8 +102,7 @@ class NodalSprings(CentredSprings):
 
 def test_a_stranger_with_a_potential_is_not_accused() -> None:
     for state in cases_of("symmetric"):
-        outcome = judge_case(symmetric, state, Subject("nodal", NodalSprings))
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, symmetric, state, Subject("nodal", NodalSprings))
 
 
 def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
@@ -121,8 +119,7 @@ def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
     # The points are at ±1/√3. Now the first one is moved over the bisector of the roof.
     nodes = np.array([*np.add(slave, [1 / np.sqrt(3), 0.0]), *master])
     state = Case(Interface.from_chains(nodes[:2], nodes[2:]), nodes.reshape(-1), seed=1)
-    outcome = judge_case(symmetric, state, Subject("decides", Decides))
-    assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
+    judge_as(Verdict.UNDECIDED, symmetric, state, Subject("decides", Decides))
     beside = replace(state, z=state.z + np.array([0.25, 0, 0.25, 0, 0, 0, 0, 0, 0, 0]))
     assert judge_case(symmetric, beside, Subject("decides", Decides)).verdict is Verdict.PASS
 
@@ -139,8 +136,7 @@ def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:
             tangent[0, 1] = tangent[1, 0] = self.penalty / 2
             return tangent
 
-    outcome = judge_case(symmetric, case(seed=1), subject(Half, symmetric=True, tangent="exact"))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, symmetric, case(seed=1), subject(Half, symmetric=True, tangent="exact"))
     assert outcome.reason.startswith("work in a closed loop")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, alone, load_property, load_subject, measure_case
+from subjects import Changed, alone, judge_as, load_property, load_subject, measure_case
 from textbook_cells import WeightedGaps
 
 from contactverif.contract.property import Verdict
@@ -49,8 +49,7 @@ def test_what_locks_is_far_above_both_bounds(name: str) -> None:
 def test_nothing_locks_at_the_softest_penalty() -> None:
     for name in ("sts", "vts-me", "two-pass/nts"):
         for columns in COLUMNS:
-            outcome = judge_case(QUESTION, CASES[case_name(columns, PENALTIES[0])], load_subject(name))
-            assert outcome.verdict is Verdict.PASS, outcome.reason
+            judge_as(Verdict.PASS, QUESTION, CASES[case_name(columns, PENALTIES[0])], load_subject(name))
 
 
 @pytest.mark.parametrize("name", ["mortar-lm", "mortar-dual-lm", "nts-lm"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from strangers import STRANGERS
-from subjects import load_property, load_subject, with_promises
+from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
@@ -58,8 +58,7 @@ def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id
     if question.promise(subject.traits) is None:
         return
     for case in cases_of(property_id):
-        outcome = judge_case(question, case, subject)
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, question, case, subject)
 
 
 def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:

@@ -9,7 +9,7 @@ import gauss_springs
 import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
-from subjects import load_subject
+from subjects import judge_as, load_subject
 
 from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.contract.counterexample import counterexamples
@@ -125,18 +125,15 @@ def test_long_states_are_long_and_in_contact() -> None:
 def test_a_right_tangent_passes_in_doubles_alone_and_without_a_pairing(name: str, paired: bool) -> None:
     innocent = plain(name, paired=paired)
     for each in FEW[:20]:
-        outcome = judge_case(tangent_sparsity, each, innocent)
-        assert outcome.verdict is Verdict.PASS, outcome.reason
-    outcome = judge_case(tangent_long, long_states()[4], innocent)
-    assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, tangent_sparsity, each, innocent)
+    judge_as(Verdict.PASS, tangent_long, long_states()[4], innocent)
 
 
 @pytest.mark.parametrize("name", gauss_springs.RIGHT)
 def test_other_ways_of_writing_pass_in_long_double(name: str) -> None:
     innocent = gauss_springs.springs_of(*gauss_springs.RIGHT[name])
     for each in FEW[:15]:
-        outcome = judge_case(tangent_sparsity, each, innocent)
-        assert outcome.verdict is Verdict.PASS, outcome.reason
+        judge_as(Verdict.PASS, tangent_sparsity, each, innocent)
 
 
 @pytest.mark.parametrize("name", ["nts", "vts-ppt-balanced", "mortar"])
@@ -144,8 +141,7 @@ def test_other_ways_of_writing_pass_in_long_double(name: str) -> None:
 def test_one_entry_off_by_1e_6_of_its_block_is_found_among_hundreds_of_nodes(name: str, number: int, node: int) -> None:
     """Differences of doubles are enough."""
     state = long_states()[number]
-    outcome = judge_case(tangent_long, state, plain(name, off_by(1e-6, node)))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_long, state, plain(name, off_by(1e-6, node)))
     name = f"{'slave' if node < state.interface.n_slave_nodes else 'master'} node {node}"
     assert f"row {2 * node} (x of {name}), column {2 * node + 1} (y of {name})" in outcome.reason
 
@@ -173,8 +169,7 @@ def test_a_coupling_outside_the_pattern_is_found_where_unknowns_move_together() 
             return forces
 
     far = Subject("coupled", lambda *, penalty: Coupled(inner.with_penalty(penalty).plugin))
-    outcome = judge_case(tangent_long, long_states()[0], far)
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_long, long_states()[0], far)
     place = "row 5 (y of slave node 2), column 300 (x of master node 150), not in the pattern"
     assert f"{place}: tangent 0, " in outcome.reason
 
@@ -206,8 +201,7 @@ def test_at_a_kink_the_derivative_to_either_side_is_right_and_another_one_undeci
 ) -> None:
     """2 is the central difference, which no judge can tell from a derivative."""
     at = case()
-    outcome = judge_case(tangent_sparsity, at, subject(Kinked, at=at.z[1], stiffness=stiffness))
-    assert outcome.verdict is verdict, outcome.reason
+    outcome = judge_as(verdict, tangent_sparsity, at, subject(Kinked, at=at.z[1], stiffness=stiffness))
     if verdict is Verdict.UNDECIDED:
         assert outcome.reason.startswith("a kink")
 
@@ -220,8 +214,7 @@ def test_a_kink_excuses_no_other_block() -> None:
             return forces
 
     at = case()
-    outcome = judge_case(tangent_sparsity, at, subject(Twice, at=at.z[1], stiffness=0.5))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_sparsity, at, subject(Twice, at=at.z[1], stiffness=0.5))
     assert "row 4 (x of master node 2), column 4 (x of master node 2)" in outcome.reason
 
 
@@ -250,8 +243,7 @@ class Sharp(Handmade):
 def test_a_residual_that_bends_sharply_is_judged_as_well_as_differences_can(
     length: float, wrong: float, verdict: Verdict
 ) -> None:
-    outcome = judge_case(tangent_sparsity, over_a_node(6 / 7), subject(Sharp, length=length, wrong=wrong))
-    assert outcome.verdict is verdict, outcome.reason
+    judge_as(verdict, tangent_sparsity, over_a_node(6 / 7), subject(Sharp, length=length, wrong=wrong))
 
 
 def test_each_formulation_is_judged_by_the_sharpest_way_that_it_takes() -> None:

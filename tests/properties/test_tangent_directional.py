@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
+from subjects import judge_as
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.traits import Promises, Traits
@@ -113,9 +114,7 @@ def one_entry(size: float) -> Callable[[Any], Any]:
 
 
 def test_an_exact_tangent_passes_all_three_conditions() -> None:
-    outcome = judge_case(tangent_directional, case(), subject(Smooth, takes_complex=True))
-    assert outcome.verdict is Verdict.PASS, outcome.reason
-    assert outcome.measurement is not None
+    outcome = judge_as(Verdict.PASS, tangent_directional, case(), subject(Smooth, takes_complex=True))
     assert set(outcome.measurement.values) == {CENTRAL.name, TAYLOR.name, COMPLEX.name}
     assert outcome.measurement.values[TAYLOR.name] == pytest.approx(2.0, abs=0.05)
 
@@ -126,16 +125,14 @@ def test_without_complex_numbers_there_is_no_complex_step() -> None:
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-8])
 def test_an_error_in_one_entry_is_found(size: float) -> None:
-    outcome = judge_case(tangent_directional, case(), subject(Smooth, error=one_entry(size)))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Smooth, error=one_entry(size)))
     assert CENTRAL.name in outcome.reason
 
 
 def test_a_complex_step_finds_what_a_central_difference_cannot() -> None:
     wrong = one_entry(1e-10)
     assert judge_case(tangent_directional, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
-    outcome = judge_case(tangent_directional, case(), subject(Smooth, error=wrong, takes_complex=True))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Smooth, error=wrong, takes_complex=True))
     assert outcome.reason.startswith(COMPLEX.name)
 
 
@@ -223,10 +220,8 @@ class Nearest(Handmade):
 
 def test_a_true_kink_is_undecided_where_it_would_fail() -> None:
     at_kink, beside = over_a_node(0.0), over_a_node(1 / 7)
-    on_frozen_pairing = judge_case(tangent_directional, at_kink, subject(Nearest))
-    assert on_frozen_pairing.verdict is Verdict.PASS
-    outcome = judge_case(tangent_directional, at_kink, subject(Nearest, wrong=0.1))
-    assert outcome.verdict is Verdict.UNDECIDED
+    judge_as(Verdict.PASS, tangent_directional, at_kink, subject(Nearest))
+    outcome = judge_as(Verdict.UNDECIDED, tangent_directional, at_kink, subject(Nearest, wrong=0.1))
     assert outcome.reason.startswith("a kink: a decision hangs on ")
     assert judge_case(tangent_directional, beside, subject(Nearest)).verdict is Verdict.PASS
     assert judge_case(tangent_directional, beside, subject(Nearest, wrong=0.1)).verdict is Verdict.FAIL
@@ -274,6 +269,5 @@ def test_a_row_counts_over_its_own_derivative() -> None:
             k[1, 1] *= 1 + 1e-6
             return k
 
-    outcome = judge_case(tangent_directional, case(), subject(Uneven))
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Uneven))
     assert "row 1 (y of slave node 0)" in outcome.reason

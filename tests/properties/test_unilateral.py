@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import load_subject
+from subjects import judge_as, load_subject
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
@@ -66,8 +66,7 @@ def test_nodes_a_rounding_beyond_free_ends_are_undecided(turn: Turn) -> None:
         flat_state("", [-excess, 1 + excess], flat_master([0, 1]), depth=0.25, turn=turn) for excess in (last_bit, 0.5)
     )
     without_tau = load_subject("nts:tau=0")
-    outcome = judge_case(unilateral, over, without_tau)
-    assert outcome.verdict is Verdict.UNDECIDED, outcome.reason
+    outcome = judge_as(Verdict.UNDECIDED, unilateral, over, without_tau)
     assert outcome.reason == "a kink: moved by roundoff, it begins one way and not another"
     assert judge_case(unilateral, over, load_subject("nts")).verdict is Verdict.PASS
     assert judge_case(unilateral, beyond, without_tau).verdict is Verdict.FAIL
@@ -142,8 +141,7 @@ def test_single_nodes_are_judged_where_that_is_promised_and_told_elsewhere() -> 
     case = named_case("c")
     springs = Subject("one segment", OneSegment)
     assert judge_case(unilateral, case, springs).verdict is Verdict.PASS
-    outcome = judge_case(nodal_push, case, springs)
-    assert outcome.verdict is Verdict.FAIL
+    outcome = judge_as(Verdict.FAIL, nodal_push, case, springs)
     assert "pull of a node" in outcome.reason
     assert nodal_push.promise(springs.traits) is None
     assert judge_case(nodal_push, case, Subject("right", Springs)).verdict is Verdict.PASS

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from subjects import judge_as
 from threadpoolctl import threadpool_info
 
 from contactverif.contract.case import Case
@@ -280,8 +281,7 @@ def test_how_it_crashed_is_said(error: BaseException, beginning: str) -> None:
     def answer(size: int) -> float:
         raise error
 
-    outcome = judge_case(ZERO, a_case(1), subject(answer))
-    assert outcome.verdict is Verdict.CRASHED
+    outcome = judge_as(Verdict.CRASHED, ZERO, a_case(1), subject(answer))
     assert outcome.reason.startswith(beginning)
 
 
