@@ -12,18 +12,12 @@ from contactverif import load_formulation, named_case
 from contactverif.contract.arrays import dense
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
-from contactverif.isolation import host, process
+from contactverif.isolation import process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
 
 CASE = named_case("c")
 METHODS = ("residual", "tangent", "residual_and_tangent", "residual")
-
-
-@pytest.fixture(autouse=True)
-def nothing_is_left_behind():
-    yield
-    host.end_all()
 
 
 @pytest.fixture

@@ -24,12 +24,6 @@ CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)
 
 
-@pytest.fixture(autouse=True)
-def nothing_is_left_behind():
-    yield
-    host.end_all()
-
-
 def ask(subject: Subject) -> None:
     formulation = subject.for_case(CASE)
     formulation.residual(CASE.interface, formulation.pair(CASE.interface, CASE.z), CASE.z)

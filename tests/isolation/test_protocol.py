@@ -14,7 +14,6 @@ from contactverif import Subject, load_properties, named_case, verify
 from contactverif.contract.errors import PluginError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import NotLoaded
-from contactverif.isolation import host
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
 from contactverif.isolation.messages import Reply, Request
@@ -22,12 +21,6 @@ from contactverif.isolation.messages import Reply, Request
 PLAIN = Path(__file__).with_name("plain_program.py")
 PAGE = Path(__file__).parents[2] / "docs/reference/protocol.md"
 CASE = named_case("c")
-
-
-@pytest.fixture(autouse=True)
-def nothing_is_left_behind():
-    yield
-    host.end_all()
 
 
 def load(name: str) -> Subject:

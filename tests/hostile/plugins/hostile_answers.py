@@ -149,20 +149,18 @@ tangent_operator = answers("tangent")(
 )
 
 
-@answers("tangent")
-def tangent_indices(answer: Any) -> Any:
-    """Answer a sparse matrix with column numbers far beyond the matrix."""
-    answer = sparse.csr_array(answer)
-    answer.indices[:] = 2**30
-    return answer
+def _number_columns(matrix: Any, number: int) -> Any:
+    matrix = sparse.csr_array(matrix)
+    matrix.indices[:] = number
+    return matrix
 
 
-@answers("tangent")
-def tangent_negative_indices(answer: Any) -> Any:
-    """Answer a sparse matrix with negative column numbers."""
-    answer = sparse.csr_array(answer)
-    answer.indices[:] = -(2**30)
-    return answer
+tangent_indices = answers("tangent")(
+    lambda answer: _number_columns(answer, 2**30), "Answer a sparse matrix with column numbers far beyond the matrix."
+)
+tangent_negative_indices = answers("tangent")(
+    lambda answer: _number_columns(answer, -(2**30)), "Answer a sparse matrix with negative column numbers."
+)
 
 
 @answers("tangent")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import time
+from collections.abc import Callable
 from typing import Any
 
 import hypothesis
 import typer
-from hostile_kit import EITHER, LONG, before, raises
+from hostile_kit import EITHER, LONG, Factory, before, raises
 
 from contactverif.contract.errors import ContractError, MisuseError
 
@@ -32,51 +33,19 @@ def recursion_error() -> None:
     descend()
 
 
-@before("residual")
-def text_raises() -> None:
-    """Raise an exception whose text raises another one."""
-
-    class NoTextError(Exception):
-        def __str__(self) -> str:
-            raise RuntimeError("no text")
-
-    raise NoTextError
+def _with_text(text: Callable[[], Any], summary: str) -> Factory:
+    """Make a plugin that raises an exception whose text is what a function returns."""
+    return raises("residual")(type("StrangeError", (Exception,), {"__str__": lambda self: text()}), summary)
 
 
-@before("residual")
-def text_is_no_text() -> None:
-    """Raise an exception whose text is a number."""
-
-    class NumberError(Exception):
-        def __str__(self) -> str:
-            return 7  # type: ignore[return-value]
-
-    raise NumberError
+def _raise_again() -> str:
+    raise RuntimeError("no text")
 
 
-@before("residual")
-def text_exits() -> None:
-    """Raise an exception whose text ends the process with status 0."""
-
-    class ExitError(Exception):
-        def __str__(self) -> str:
-            os._exit(0)
-
-    raise ExitError
-
-
-@before("residual")
-def text_hangs() -> None:
-    """Raise an exception whose text never comes."""
-
-    class SlowError(Exception):
-        def __str__(self) -> str:
-            time.sleep(LONG)
-            return ""
-
-    raise SlowError
-
-
+text_raises = _with_text(_raise_again, "Raise an exception whose text raises another one.")
+text_is_no_text = _with_text(lambda: 7, "Raise an exception whose text is a number.")
+text_exits = _with_text(lambda: os._exit(0), "Raise an exception whose text ends the process with status 0.")
+text_hangs = _with_text(lambda: time.sleep(LONG), "Raise an exception whose text never comes.")
 name_with_controls = raises("residual")(
     lambda: type("\x1b[2J\x1b[HAll tests passed\r\n\x07", (Exception,), {})("\x1b]0;title\x07"),
     "Raise an exception whose class name clears the terminal.",

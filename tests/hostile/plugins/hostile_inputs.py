@@ -7,51 +7,39 @@ import itertools
 import os
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from hostile_kit import EITHER, IMPURE, answers, instead
+from hostile_kit import EITHER, IMPURE, Factory, answers, instead
 
 _calls = itertools.count(1)
 _last: list[Any] = []
 
 
-def _overwrite(array: Any) -> None:
-    """Write the number 7.5 over the first entry of an array, whatever its flags say."""
-    number = np.full(1, 7.5 if array.dtype.kind == "f" else 0, array.dtype)
-    ctypes.memmove(array.ctypes.data, number.ctypes.data, number.nbytes)
+def _overwrites(choose: Callable[..., Any], summary: str) -> Factory:
+    """Make a plugin that writes over the first entry of an array after the right answer, whatever its flags say."""
+
+    def overwrite(right: Any, *arguments: Any) -> Any:
+        answer, array = right(), choose(*arguments)
+        number = np.full(1, 7.5 if array.dtype.kind == "f" else 0, array.dtype)
+        ctypes.memmove(array.ctypes.data, number.ctypes.data, number.nbytes)
+        return answer
+
+    return instead("residual", ends=EITHER)(overwrite, summary)
 
 
-@instead("residual", ends=EITHER)
-def write_to_z(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-    """Write into the read-only state after the right answer."""
-    answer = right()
-    _overwrite(z)
-    return answer
-
-
-@instead("residual", ends=EITHER)
-def write_to_nodes(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-    """Write into the read-only nodes of the interface after the right answer."""
-    answer = right()
-    _overwrite(interface.nodes)
-    return answer
-
-
-@instead("residual", ends=EITHER)
-def write_to_segments(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-    """Write into the read-only segments of the interface after the right answer."""
-    answer = right()
-    _overwrite(interface.slave.segments)
-    return answer
-
-
-@instead("residual", ends=EITHER)
-def write_to_pairing(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
-    """Write into the read-only pairing after the right answer."""
-    answer = right()
-    _overwrite(pairing["master"])
-    return answer
+write_to_z = _overwrites(lambda interface, pairing, z: z, "Write into the read-only state after the right answer.")
+write_to_nodes = _overwrites(
+    lambda interface, *_: interface.nodes, "Write into the read-only nodes of the interface after the right answer."
+)
+write_to_segments = _overwrites(
+    lambda interface, *_: interface.slave.segments,
+    "Write into the read-only segments of the interface after the right answer.",
+)
+write_to_pairing = _overwrites(
+    lambda interface, pairing, z: pairing["master"], "Write into the read-only pairing after the right answer."
+)
 
 
 @instead("residual", ends=EITHER)

@@ -8,9 +8,10 @@ import logging
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 
-from hostile_kit import EITHER, LIKE_NTS, MOST_FILES, before
+from hostile_kit import EITHER, LIKE_NTS, MOST_FILES, Factory, before
 
 _calls = itertools.count(1)
 
@@ -76,39 +77,36 @@ def close_python_streams() -> None:
             stream.close()
 
 
-@before("residual", ends=EITHER)
-def write_rubbish_everywhere() -> None:
-    """Write rubbish to every open file descriptor but the standard streams, and so to the harness."""
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            os.set_blocking(number, False)
-            os.write(number, b"\xff\x00rubbish" * 1000)
-        with suppress(OSError):
-            os.set_blocking(number, True)
+def _at_every_file(act: Callable[[int], object], summary: str, *, wait: bool = True, most: int = MOST_FILES) -> Factory:
+    """Make a plugin that does something to every open file descriptor but the standard streams."""
+
+    def act_everywhere() -> None:
+        for number in range(3, most):
+            with suppress(OSError):
+                if not wait:
+                    os.set_blocking(number, False)
+                act(number)
+            with suppress(OSError):
+                if not wait:
+                    os.set_blocking(number, True)
+
+    return before("residual", ends=EITHER)(act_everywhere, summary)
 
 
-@before("residual", ends=EITHER)
-def announce_a_huge_answer() -> None:
-    """Write bytes to every open file descriptor that announce more than a message may hold."""
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            os.write(number, b"\xff\xff\xff\xff\xff\xff\xff\x7f")
-
-
-@before("residual", ends=EITHER)
-def read_everything() -> None:
-    """Read from every open file descriptor whatever is there, and so what the harness asks next."""
-    for number in range(3, MOST_FILES):
-        with suppress(OSError):
-            os.set_blocking(number, False)
-            os.read(number, 2**16)
-        with suppress(OSError):
-            os.set_blocking(number, True)
-
-
-@before("residual", ends=EITHER)
-def duplicate_the_output() -> None:
-    """Put standard output in the place of every other file descriptor."""
-    for number in range(3, 40):
-        with suppress(OSError):
-            os.dup2(1, number)
+write_rubbish_everywhere = _at_every_file(
+    lambda number: os.write(number, b"\xff\x00rubbish" * 1000),
+    "Write rubbish to every open file descriptor but the standard streams, and so to the harness.",
+    wait=False,
+)
+announce_a_huge_answer = _at_every_file(
+    lambda number: os.write(number, b"\xff\xff\xff\xff\xff\xff\xff\x7f"),
+    "Write bytes to every open file descriptor that announce more than a message may hold.",
+)
+read_everything = _at_every_file(
+    lambda number: os.read(number, 2**16),
+    "Read from every open file descriptor whatever is there, and so what the harness asks next.",
+    wait=False,
+)
+duplicate_the_output = _at_every_file(
+    lambda number: os.dup2(1, number), "Put standard output in the place of every other file descriptor.", most=40
+)
